@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surface patches from tracked contours, after Jia and Tian: numpy and scipy, no Blender.
+
+Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the caller's unit, and a
+convex body has negative curvatures under its outward normal.
+"""
+
+from .domain import Domain
+from .local_geometry import DegenerateCurvesError, Frame
+from .monge import MongePatch
+from .reconstruction import METHODS, SOLVERS, Reconstruction, reconstruct
+from .tracking import Contour, SamplingPlane, Surface, track
+from .verification import distances, fit_error, overlapped
+
+__all__ = [
+    "METHODS",
+    "SOLVERS",
+    "Contour",
+    "DegenerateCurvesError",
+    "Domain",
+    "Frame",
+    "MongePatch",
+    "Reconstruction",
+    "SamplingPlane",
+    "Surface",
+    "distances",
+    "fit_error",
+    "overlapped",
+    "reconstruct",
+    "track",
+]

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arguments import Array
+
+SAMPLES = 1024  # of the boundary; its radius is then good to 1e-5
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The part of the tangent plane a patch is meant for; star-shaped about the origin.
+
+    ends : (m, 2), m >= 3, the projected ends of the contours, by azimuth
+    """
+
+    ends: Array
+
+    @cached_property
+    def _polar(self) -> tuple[Array, Array]:
+        """Azimuths, ascending, and radii of the boundary."""
+        from scipy.interpolate import CubicSpline
+
+        closed = np.vstack([self.ends, self.ends[:1]])
+        chords = np.linalg.norm(np.diff(closed, axis=0), axis=1)
+        at = np.concatenate([[0.0], np.cumsum(chords)])
+        x, y = CubicSpline(at, closed, bc_type="periodic")(np.linspace(0.0, at[-1], SAMPLES + 1)[:-1]).T
+        azimuths = np.arctan2(y, x)
+        order = np.argsort(azimuths)
+        return azimuths[order], np.hypot(x, y)[order]
+
+    def _radius(self, azimuth: Array) -> Array:
+        return np.interp(azimuth, *self._polar, period=2.0 * np.pi)
+
+    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+        """Whether each (x, y) lies inside or on the boundary; booleans of the shape of x and y."""
+        return np.hypot(x, y) <= self._radius(np.arctan2(y, x)) * (1.0 + 1e-5)
+
+    def boundary(self, n: int) -> Array:
+        """n points on the boundary, (n, 2), counterclockwise from azimuth 0 in equal turns."""
+        azimuth = 2.0 * np.pi * np.arange(n) / n
+        return self._radius(azimuth)[:, None] * np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+
+    @property
+    def area(self) -> float:
+        """The area inside, in length^2."""
+        x, y = self.boundary(SAMPLES).T
+        return float(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+    def grid(self, count: int) -> tuple[Array, float]:
+        """The grid of (8): about `count` points (m, 2) inside with uniform spacing h, and h."""
+        h = float(np.sqrt(self.area / count))
+        reach = self.boundary(SAMPLES)
+        low, high = np.floor(reach.min(axis=0) / h), np.ceil(reach.max(axis=0) / h)
+        axes = (h * (np.arange(a, b) + 0.5) for a, b in zip(low, high, strict=True))
+        x, y = (axis.ravel() for axis in np.meshgrid(*axes))
+        inside = self.contains(x, y)
+        return np.column_stack([x[inside], y[inside]]), h
+
+    def triangulation(self, rings: int) -> tuple[Array, NDArray[np.intp]]:
+        """Points (1 + 3 rings (rings + 1), 2) and counterclockwise triangles (6 rings^2, 3) over the domain.
+
+        Ring k has 6k points in equal turns, so that triangles are of one size and near to equilateral
+        where the domain is near to a disk.
+        """
+        points = [np.zeros((1, 2))]
+        triangles = []
+        start, inner_start = 1, 0
+        for k in range(1, rings + 1):
+            points.append(self.boundary(6 * k) * (k / rings))
+            outer = np.arange(6 * k)
+            # Outer point s of sector q stands between the inner points s - 1 and s of that sector.
+            sector, s = np.divmod(outer, k)
+            inner = inner_start + (sector * (k - 1) + s) % max(6 * (k - 1), 1)
+            following = start + (outer + 1) % (6 * k)
+            triangles.append(np.column_stack([start + outer, following, inner]))
+            between = s > 0
+            before = inner_start + (sector * (k - 1) + s - 1) % max(6 * (k - 1), 1)
+            triangles.append(np.column_stack([start + outer, inner, before])[between])
+            inner_start, start = start, start + 6 * k
+        return np.vstack(points), np.vstack(triangles)
+
+
+def closed_spline_domain(ends: ArrayLike, radius: float) -> Domain:
+    """The domain through projected curve ends (m, 2), in any order.
+
+    Ends within 1e-3 radius of the origin (a curve that runs to one side only) or of another end
+    do not count. Raises ValueError where fewer than three are left.
+    """
+    points = np.asarray(ends, dtype=float)
+    points = points[np.hypot(*points.T) > 1e-3 * radius]
+    points = points[np.argsort(np.arctan2(points[:, 1], points[:, 0]), kind="stable")]
+    apart = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 1e-3 * radius
+    if np.count_nonzero(apart) < 3:
+        raise ValueError(f"ends: wanted three or more apart from each other, got {np.count_nonzero(apart)}")
+    return Domain(points[apart])

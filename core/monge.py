@@ -1,0 +1,156 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Monge patch z(x, y) of equation (1) in its Darboux frame, and its differential geometry."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arguments import Array
+
+
+def exponents(lowest: int, highest: int) -> list[tuple[int, int]]:
+    """(i, j) of the terms x^i y^j of these degrees, in the order of (1): 30 21 12 03 40 31 22 13 04 ..."""
+    return [(i, d - i) for d in range(lowest, highest + 1) for i in range(d, -1, -1)]
+
+
+def monomials(x: Array, y: Array, terms: list[tuple[int, int]], dx: int = 0, dy: int = 0) -> Array:
+    """The terms x^i y^j at n points, (n, len(terms)), differentiated dx times by x and dy times by y."""
+    highest = max((i + j for i, j in terms), default=0)
+    x_powers, y_powers = (np.vander(v, highest + 1, increasing=True) for v in (x, y))
+    i, j = np.array(terms, dtype=int).reshape(-1, 2).T
+    factor = np.ones(len(terms))
+    for k in range(dx):
+        factor *= i - k
+    for k in range(dy):
+        factor *= j - k
+    # Where a derivative has killed a term its factor is 0, whatever power stands beside it.
+    return factor * x_powers[:, np.maximum(i - dx, 0)] * y_powers[:, np.maximum(j - dy, 0)]
+
+
+class Derivatives(NamedTuple):
+    """Height and partial derivatives, all of the shape of x and y."""
+
+    z: Array
+    x: Array
+    y: Array
+    xx: Array
+    xy: Array
+    yy: Array
+
+
+@dataclass(frozen=True)
+class MongePatch:
+    """z = (k1 x^2 + k2 y^2) / 2 + sum a_ij x^i y^j, equation (1), in the local frame.
+
+    k1, k2 : the principal curvatures at the origin, k1 <= k2, in 1/length
+    coefficients : a30 a21 a12 a03 a40 a31 a22 a13 a04 ..., a_ij in length^(1 - i - j)
+
+    All methods take x and y of one shape (or that broadcast) and answer in that shape.
+    """
+
+    k1: float
+    k2: float
+    coefficients: Array
+
+    @property
+    def degree(self) -> int:
+        """The degree d of (1)."""
+        terms, degree = len(self.coefficients), 2
+        while terms > 0:
+            degree += 1
+            terms -= degree + 1
+        return degree
+
+    def scaled(self, factor: float) -> "MongePatch":
+        """The same surface with every length multiplied by `factor`."""
+        orders = np.array([i + j for i, j in exponents(3, self.degree)], dtype=float)
+        return MongePatch(self.k1 / factor, self.k2 / factor, self.coefficients * factor ** (1.0 - orders))
+
+    def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
+        """Height, slopes and second derivatives at (x, y)."""
+        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        flat = x_array.ravel(), y_array.ravel()
+        terms = exponents(2, self.degree)
+        a = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
+        orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+        return Derivatives(
+            *((monomials(*flat, terms, dx, dy) @ a).reshape(x_array.shape) for dx, dy in orders)
+        )
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """z(x, y)."""
+        return self.derivatives(x, y).z
+
+    def normal(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Unit normal on the side of +z, shape (..., 3)."""
+        d = self.derivatives(x, y)
+        n = np.stack([-d.x, -d.y, np.ones_like(d.x)], axis=-1)
+        return n / np.linalg.norm(n, axis=-1, keepdims=True)
+
+    def first_form(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array, Array]:
+        """E, F, G of the first fundamental form."""
+        d = self.derivatives(x, y)
+        return 1.0 + d.x**2, d.x * d.y, 1.0 + d.y**2
+
+    def second_form(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array, Array]:
+        """L, M, N of the second fundamental form, negative where the patch falls away below the normal."""
+        d = self.derivatives(x, y)
+        w = np.sqrt(1.0 + d.x**2 + d.y**2)
+        return d.xx / w, d.xy / w, d.yy / w
+
+    def gaussian_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """K = (LN - M^2) / (EG - F^2), in 1/length^2."""
+        d = self.derivatives(x, y)
+        return (d.xx * d.yy - d.xy**2) / (1.0 + d.x**2 + d.y**2) ** 2
+
+    def mean_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """H = (EN - 2FM + GL) / 2(EG - F^2), in 1/length."""
+        (e, f, g), (ll, mm, nn) = self.first_form(x, y), self.second_form(x, y)
+        return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e * g - f**2))
+
+    def principal_curvatures(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """kappa1 <= kappa2 at (x, y), in 1/length."""
+        mean = self.mean_curvature(x, y)
+        # H^2 - K is a square, (kappa1 - kappa2)^2 / 4; at umbilics rounding takes it below 0.
+        half = np.sqrt(np.maximum(mean**2 - self.gaussian_curvature(x, y), 0.0))
+        return mean - half, mean + half
+
+    def closest_point(self, points: ArrayLike) -> Array:
+        """The foot on the patch of each local point, (n, 3) -> (n, 3).
+
+        Newton's method on the squared distance, all points at once, from the vertical projection;
+        a step that does not shorten the distance is halved.
+        """
+        q = np.asarray(points, dtype=float)
+        foot = q[:, :2].copy()
+        damping = np.ones(len(q))
+        d = self.derivatives(foot[:, 0], foot[:, 1])
+        squared = (d.z - q[:, 2]) ** 2
+        for _ in range(50):
+            step = damping[:, None] * _newton_step(d, foot, q)
+            trial = foot + step
+            d_trial = self.derivatives(trial[:, 0], trial[:, 1])
+            squared_trial = ((trial - q[:, :2]) ** 2).sum(axis=1) + (d_trial.z - q[:, 2]) ** 2
+            nearer = squared_trial <= squared
+            foot[nearer], squared[nearer] = trial[nearer], squared_trial[nearer]
+            d = Derivatives(*(np.where(nearer, new, old) for new, old in zip(d_trial, d, strict=True)))
+            damping = np.where(nearer, np.minimum(2.0 * damping, 1.0), 0.5 * damping)
+            if np.all(np.abs(step) <= 1e-12 * (np.abs(q[:, :2]) + np.abs(step).max(initial=0.0))):
+                break
+        return np.column_stack([foot, d.z])
+
+
+def _newton_step(d: Derivatives, foot: Array, q: Array) -> Array:
+    """-H^-1 g of half the squared distance, (n, 2); where H is not positive, without its z'' part."""
+    above = d.z - q[:, 2]
+    gx, gy = foot[:, 0] - q[:, 0] + above * d.x, foot[:, 1] - q[:, 1] + above * d.y
+    hxx, hxy, hyy = 1.0 + d.x**2 + above * d.xx, d.x * d.y + above * d.xy, 1.0 + d.y**2 + above * d.yy
+    bowl = (hxx > 0.0) & (hxx * hyy - hxy**2 > 0.0)
+    hxx = np.where(bowl, hxx, 1.0 + d.x**2)
+    hxy = np.where(bowl, hxy, d.x * d.y)
+    hyy = np.where(bowl, hyy, 1.0 + d.y**2)
+    det = hxx * hyy - hxy**2
+    return np.column_stack([hxy * gy - hyy * gx, hxy * gx - hxx * gy]) / det[:, None]

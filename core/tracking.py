@@ -1,0 +1,243 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contour tracking in a sampling plane (paper, sections III-C and V), on anything that can answer a ray."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arguments import Array, finite_array, number, unit_vector
+
+MAX_TURN = math.cos(math.radians(45.0))  # between contacts; a sharper turn is a crease to a finger
+MAX_TILT = math.cos(math.radians(75.0))  # against the normal at the point; beyond, slopes exceed 3.7
+EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
+
+Vector = tuple[float, float, float]
+
+
+class Surface(Protocol):
+    """Anything that can be touched."""
+
+    def ray_cast(
+        self, origin: Vector, direction: Vector, distance: float
+    ) -> tuple[Sequence[float], Sequence[float]] | None:
+        """The first point hit within `distance` along the unit `direction`, and the unit normal there."""
+
+
+@dataclass(frozen=True)
+class SamplingPlane:
+    """A plane through the reference point, holding the tangent at `azimuth`, leaning by `tilt` (radians)."""
+
+    azimuth: float
+    tilt: float = 0.0
+
+    def axes(self, normal: ArrayLike, tangent: ArrayLike | None = None) -> Array:
+        """Columns t (the tangent), u (up, in the plane) and t x u (the plane's normal), (3, 3).
+
+        Azimuth 0 is `tangent` projected onto the tangent plane of `normal`; without one world X, or
+        world Y where X is within 26 degrees of the normal. Raises ValueError where `tangent` is
+        along the normal, or the tilt is not between -90 and 90 degrees.
+        """
+        n = unit_vector("normal", normal)
+        azimuth, tilt = number("azimuth", self.azimuth), number("tilt", self.tilt)
+        if abs(tilt) >= math.pi / 2:
+            raise ValueError(f"tilt: wanted less than 90 degrees, got {math.degrees(tilt):g}")
+        if tangent is None:
+            tangent = (0.0, 1.0, 0.0) if abs(n[0]) > 0.9 else (1.0, 0.0, 0.0)
+        e1 = unit_vector("tangent", tangent)
+        e1 -= (e1 @ n) * n
+        if np.linalg.norm(e1) < 1e-6:
+            raise ValueError("tangent: wanted a direction across the normal, got one along it")
+        e1 /= np.linalg.norm(e1)
+        t = math.cos(azimuth) * e1 + math.sin(azimuth) * np.cross(n, e1)
+        u = math.cos(tilt) * n + math.sin(tilt) * np.cross(n, t)
+        return np.column_stack([t, u, np.cross(t, u)])
+
+
+@dataclass(frozen=True)
+class Contour:
+    """A tracked contour: the contacts along one curve through the reference point.
+
+    points : (n, 3), in any order, the reference point among them or not
+    plane_normal : (3,), of the sampling plane, or None for a curve of unknown plane or of none
+    normals : (n, 3), the surface normal at each contact, or None
+    noise : standard deviation of the contacts, or None where it is not known
+    stops : why tracking ended at the first and at the last point, or None
+
+    Raises ValueError for another shape or for numbers that are not finite.
+    """
+
+    points: Array
+    plane_normal: Array | None = None
+    normals: Array | None = None
+    noise: float | None = None
+    stops: tuple[str, str] | None = None
+
+    def __post_init__(self) -> None:
+        points = finite_array("points", self.points, (None, 3))
+        object.__setattr__(self, "points", points)
+        if self.plane_normal is not None:
+            object.__setattr__(self, "plane_normal", unit_vector("plane_normal", self.plane_normal))
+        if self.normals is not None:
+            normals = finite_array("normals", self.normals, (len(points), 3))
+            object.__setattr__(self, "normals", normals)
+        if self.noise is not None:
+            object.__setattr__(self, "noise", number("noise", self.noise, least=0.0))
+
+
+def track(
+    surface: Surface,
+    point: ArrayLike,
+    normal: ArrayLike,
+    planes: Sequence[SamplingPlane],
+    *,
+    extent: float,
+    step: float,
+    noise: float = 0.0,
+    rng: np.random.Generator | int | None = None,
+    tangent: ArrayLike | None = None,
+) -> list[Contour]:
+    """Slides a finger over `surface` both ways from `point`, once in each plane.
+
+    point, normal : (3,), the reference point and the outward normal; a sheet can be touched from either side
+    planes : azimuths measured from `tangent`, see SamplingPlane.axes
+    extent, step : lengths along the curve, of each half and between contacts
+    noise : standard deviation of the sensor, in the plane along the curve's normal; drawn from `rng`
+
+    One Contour a plane, running from azimuth + 180 degrees to azimuth, the point itself in it, exact.
+    Raises ValueError for bad numbers, and where there is no surface at the point.
+    """
+    p = finite_array("point", point, (3,))
+    n = unit_vector("normal", normal)
+    step = number("step", step, above=0.0)
+    extent = number("extent", extent, above=0.0)
+    if extent < step:
+        raise ValueError(f"step: wanted no more than the extent {extent:g}, got {step:g}")
+    noise = number("noise", noise, least=0.0)
+    generator = np.random.default_rng(rng)
+    count = math.floor(extent / step * (1.0 + 1e-9))
+    start, up, side = _first_contact(surface, _vector(p), _vector(n), step)
+    contours = []
+    for plane in planes:
+        axes = plane.axes(n, tangent)
+        back, ahead = (
+            _half_contour(surface, start, up, side, _vector(n), _vector(across), count, step)
+            for across in (-axes[:, 2], axes[:, 2])
+        )
+        points = np.array([*back[0][::-1], tuple(p), *ahead[0]])
+        normals = np.array([*back[1][::-1], up, *ahead[1]])
+        if noise:
+            in_plane = normals - np.outer(normals @ axes[:, 2], axes[:, 2])
+            in_plane /= np.linalg.norm(in_plane, axis=1, keepdims=True)
+            offsets = generator.normal(0.0, noise, len(points))
+            offsets[len(back[0])] = 0.0
+            points += offsets[:, None] * in_plane
+        contours.append(Contour(points, axes[:, 2], normals, noise, (back[2], ahead[2])))
+    return contours
+
+
+def _first_contact(surface: Surface, p: Vector, n: Vector, step: float) -> tuple[Vector, Vector, float]:
+    """The contact at the reference point, the normal there on the side of `n`, and that side's sign."""
+    reach = 0.1 * step  # shorter than a step: a wall close above the point is not the point's
+    hit = surface.ray_cast(_along(p, n, reach), _scaled(n, -1.0), 2.0 * reach)
+    if hit is None:
+        raise ValueError(
+            f"point: wanted one on the surface, got one with no surface within {reach:g} along the normal"
+        )
+    side = math.copysign(1.0, _dot(_vector(hit[1]), n))
+    return _vector(hit[0]), _scaled(_vector(hit[1]), side), side
+
+
+def _half_contour(
+    surface: Surface,
+    contact: Vector,
+    surface_normal: Vector,
+    side: float,
+    n: Vector,
+    across: Vector,
+    count: int,
+    step: float,
+) -> tuple[list[Vector], list[Vector], str]:
+    """Contacts, surface normals and the reason of the stop on one side of the reference point.
+
+    All in Python floats: a contact costs a ray cast, not a dozen numpy calls. `across` is the
+    plane's normal, `up` the curve's normal in the plane, `up x across` the way ahead.
+    """
+    points: list[Vector] = []
+    normals: list[Vector] = []
+    up = _in_plane(surface_normal, across)
+    if up is None:
+        return points, normals, CREASE
+    for _ in range(count):
+        tangent = _cross(up, across)
+        # A finger bumps into a wall; the ray from above would come down behind it.
+        if surface.ray_cast(_along(contact, up, step), tangent, step) is not None:
+            return points, normals, CREASE
+        hit = _next_contact(surface, contact, tangent, up, step)
+        if hit is None:
+            below = _along(_along(contact, tangent, step), up, -0.5 * step)
+            flank = surface.ray_cast(below, _scaled(tangent, -1.0), step)
+            return points, normals, NO_CONTACT if flank is None else CREASE
+        contact, surface_normal = _vector(hit[0]), _scaled(_vector(hit[1]), side)
+        next_up = _in_plane(surface_normal, across)
+        if next_up is None or _dot(next_up, up) < MAX_TURN:
+            return points, normals, CREASE
+        if _dot(surface_normal, n) < MAX_TILT:
+            return points, normals, NOT_MONGE
+        up = next_up
+        points.append(contact)
+        normals.append(surface_normal)
+    return points, normals, EXTENT
+
+
+def _next_contact(
+    surface: Surface, contact: Vector, tangent: Vector, up: Vector, step: float
+) -> tuple[Sequence[float], Sequence[float]] | None:
+    """The hit one `step` from `contact`, by a ray from above back along the curve's normal.
+
+    A step along the tangent lands farther than a step along the curve, so where that is more than
+    0.1 % the ray is cast once more from where the chord has the right length.
+    """
+    forward = step
+    for _ in range(2):
+        origin = _along(_along(contact, tangent, forward), up, step)
+        hit = surface.ray_cast(origin, _scaled(up, -1.0), 2.0 * step)
+        if hit is None:
+            return None
+        chord = math.dist(contact, hit[0])
+        if abs(chord - step) <= 1e-3 * step:
+            break
+        forward *= step / chord
+    return hit
+
+
+def _in_plane(v: Vector, across: Vector) -> Vector | None:
+    """`v` projected onto the plane, unit; None where the surface lies in the plane: no curve to follow."""
+    projected = _along(v, across, -_dot(v, across))
+    length = math.sqrt(_dot(projected, projected))
+    return _scaled(projected, 1.0 / length) if length > 1e-3 else None
+
+
+def _vector(v: Sequence[float] | Array) -> Vector:
+    x, y, z = v
+    return float(x), float(y), float(z)
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _scaled(a: Vector, factor: float) -> Vector:
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+def _along(a: Vector, direction: Vector, length: float) -> Vector:
+    return a[0] + length * direction[0], a[1] + length * direction[1], a[2] + length * direction[2]

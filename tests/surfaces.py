@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exact surfaces to touch, with their curvatures known in closed form; lengths read as millimetres."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Exact:
+    """A level set F = 0, F > 0 outside, that answers rays; and a point on it where all is known.
+
+    level : maps x, y, z (arrays or floats) to F
+    gradient : maps a point (3,) to grad F (3,)
+    point, k1, k2 : a reference point, and the principal curvatures there
+    """
+
+    level: Callable
+    gradient: Callable
+    point: np.ndarray
+    k1: float
+    k2: float
+
+    @property
+    def normal(self):
+        g = self.gradient(self.point)
+        return g / np.linalg.norm(g)
+
+    def ray_cast(self, origin, direction, distance):
+        """First crossing along the ray: bracketed on 40 samples, then bisected by regula falsi (Illinois)."""
+        origin, direction = np.asarray(origin), np.asarray(direction)
+        t = np.linspace(0.0, distance, 41)
+        f = self.level(*(origin[:, None] + direction[:, None] * t))
+        crossing = np.flatnonzero(np.sign(f[:-1]) * np.sign(f[1:]) <= 0)
+        if not len(crossing):
+            return None
+        a, b = t[crossing[0]], t[crossing[0] + 1]
+        fa, fb = f[crossing[0]], f[crossing[0] + 1]
+        for _ in range(60):
+            if fa == fb or abs(b - a) < 1e-15 * distance:
+                break
+            c = b - fb * (b - a) / (fb - fa)
+            fc = self.level(*(origin + c * direction))
+            if fc * fb < 0:
+                a, fa = b, fb
+            else:
+                fa *= 0.5
+            b, fb = c, fc
+            if fc == 0:
+                break
+        hit = origin + b * direction
+        g = self.gradient(hit)
+        return hit, g / np.linalg.norm(g)
+
+
+def plane():
+    return Exact(lambda x, y, z: z, lambda p: np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0, 0.0)
+
+
+def ellipsoid(a, b, c, u=0.0, v=0.0):
+    """Semi-axes a, b, c; the point at longitude u, latitude v. K and H by the textbook formula."""
+    axes2 = np.array([a, b, c]) ** 2
+    p = np.array([a * np.cos(u) * np.cos(v), b * np.sin(u) * np.cos(v), c * np.sin(v)])
+    s = np.sum((p / axes2) ** 2)
+    gaussian = 1.0 / (np.prod(axes2) * s**2)
+    mean = -(axes2.sum() - p @ p) / (2.0 * np.prod(axes2) * s**1.5) * -1.0
+    mean = (p @ p - axes2.sum()) / (2.0 * np.prod(axes2) * s**1.5)
+    half = np.sqrt(max(mean**2 - gaussian, 0.0))
+    return Exact(
+        lambda x, y, z: x**2 / a**2 + y**2 / b**2 + z**2 / c**2 - 1.0,
+        lambda q: 2.0 * q / axes2,
+        p,
+        mean - half,
+        mean + half,
+    )
+
+
+def sphere(r):
+    return ellipsoid(r, r, r, 0.7, 0.4)
+
+
+def cylinder(r):
+    return Exact(
+        lambda x, y, z: x**2 + y**2 - r**2,
+        lambda p: np.array([2.0 * p[0], 2.0 * p[1], 0.0]),
+        np.array([r * np.cos(0.5), r * np.sin(0.5), 3.0]),
+        -1.0 / r,
+        0.0,
+    )
+
+
+def torus(big, small, angle, outside=1.0):
+    """Around z, touched at `angle` of the tube, 0 its outer equator, pi its inner. outside -1: from within."""
+    rho = big + small * np.cos(angle)
+    kappas = sorted([-outside / small, -outside * np.cos(angle) / rho])
+
+    def gradient(p):
+        ring = np.hypot(p[0], p[1])
+        away = 2.0 * (ring - big) / ring
+        return outside * np.array([away * p[0], away * p[1], 2.0 * p[2]])
+
+    return Exact(
+        lambda x, y, z: outside * ((np.hypot(x, y) - big) ** 2 + z**2 - small**2),
+        gradient,
+        np.array([rho * np.cos(0.3), rho * np.sin(0.3), small * np.sin(angle)]),
+        *kappas,
+    )
+
+
+def bottle_neck():
+    """The paper's: kappa -0.0423 around the neck and 0.0172 along it, the skin of a torus's hole."""
+    small = 1.0 / 0.0172
+    return torus(small + 1.0 / 0.0423, small, np.pi, outside=-1.0)
+
+
+def graph(terms):
+    """z = sum c x^i y^j over {(i, j): c}, i + j >= 2, touched at the origin."""
+
+    def partial(x, y, dx, dy):
+        total = 0.0 * x * y
+        for (i, j), c in terms.items():
+            if i >= dx and j >= dy:
+                factor = np.prod(np.arange(i - dx + 1, i + 1)) * np.prod(np.arange(j - dy + 1, j + 1))
+                total = total + c * factor * x ** (i - dx) * y ** (j - dy)
+        return total
+
+    hessian = [
+        [2.0 * terms.get((2, 0), 0.0), terms.get((1, 1), 0.0)],
+        [terms.get((1, 1), 0.0), 2.0 * terms.get((0, 2), 0.0)],
+    ]
+    return Exact(
+        lambda x, y, z: z - partial(x, y, 0, 0),
+        lambda p: np.array([-partial(p[0], p[1], 1, 0), -partial(p[0], p[1], 0, 1), 1.0]),
+        np.zeros(3),
+        *np.linalg.eigvalsh(hessian),
+    )
+
+
+def monkey_saddle():
+    return graph({(3, 0): 1.0 / 900.0, (1, 2): -3.0 / 900.0})
+
+
+def saddle():
+    """A hyperbolic quadric with curvatures -0.03 and 0.02."""
+    return graph({(2, 0): -0.015, (0, 2): 0.01})
+
+
+def quartic():
+    """A quartic Monge patch with every term of (1) in it."""
+    return graph({
+        (2, 0): -0.02, (0, 2): 0.0075, (3, 0): 2e-4, (2, 1): -3e-4, (1, 2): 1e-4, (0, 3): 2e-4,
+        (4, 0): -8e-6, (3, 1): 5e-6, (2, 2): 1e-5, (1, 3): -6e-6, (0, 4): 4e-6,
+    })  # fmt: skip

@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The closed spline domain, its grid and its triangulation."""
+
+import numpy as np
+import pytest
+
+from core.domain import closed_spline_domain
+
+
+def circle(angles, radius=1.0):
+    a = np.radians(angles)
+    return radius * np.column_stack([np.cos(a), np.sin(a)])
+
+
+SIXTH = np.arange(0, 360, 60)
+UNEVEN = circle([0, 35, 80, 180, 215, 260])
+STUBBY = circle(SIXTH) * np.array([1, 1, 0.4, 1, 0.7, 1])[:, None]
+
+
+def test_six_even_ends_make_nearly_a_disk():
+    domain = closed_spline_domain(circle(SIXTH, 12.0), 12.0)
+    assert domain.area == pytest.approx(np.pi * 144, rel=0.02)
+    assert np.linalg.norm(domain.boundary(500), axis=1) == pytest.approx(12.0, rel=0.01)
+
+
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_the_boundary_passes_through_the_ends_in_any_order(ends):
+    rng = np.random.default_rng(0)
+    domain = closed_spline_domain(rng.permutation(ends), 1.0)
+    azimuth = np.arctan2(ends[:, 1], ends[:, 0]) % (2 * np.pi)
+    fine = domain.boundary(36000)
+    nearest = fine[np.round(azimuth * 36000 / (2 * np.pi)).astype(int) % 36000]
+    assert nearest == pytest.approx(ends, abs=2e-4)
+    for inside, factor in ((True, 0.999), (False, 1.001)):
+        assert np.all(domain.contains(*(factor * ends).T) == inside)
+    assert bool(domain.contains(0.0, 0.0))
+
+
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_grid_cells_and_triangles_fill_the_area(ends):
+    domain = closed_spline_domain(ends, 1.0)
+    points, h = domain.grid(600)
+    assert len(points) == pytest.approx(600, rel=0.05)
+    assert len(points) * h**2 == pytest.approx(domain.area, rel=0.05)
+    assert np.all(domain.contains(*points.T))
+    assert np.unique(np.round(np.diff(np.unique(points[:, 0])) / h, 6)).tolist() == [1.0]
+    points, triangles = domain.triangulation(20)
+    assert points.shape == (1 + 3 * 20 * 21, 2)
+    assert triangles.shape == (6 * 20**2, 3)
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    areas = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    assert areas.min() > 0.0
+    assert areas.sum() == pytest.approx(domain.area, rel=5e-3)
+
+
+def test_the_triangulation_is_a_disk_with_triangles_near_to_equilateral():
+    points, triangles = closed_spline_domain(circle(SIXTH), 1.0).triangulation(12)
+    edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    edges, uses = np.unique(edges, axis=0, return_counts=True)
+    assert set(uses) == {1, 2}
+    assert np.count_nonzero(uses == 1) == 6 * 12
+    assert len(points) - len(edges) + len(triangles) == 1
+    corners = points[triangles]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    assert (sides.max(axis=1) / sides.min(axis=1)).max() < 1.6
+
+
+def test_a_curve_that_ends_at_the_point_is_no_end():
+    domain = closed_spline_domain(np.vstack([circle(SIXTH), [[1e-5, 0.0]], circle([0])]), 1.0)
+    assert len(domain.ends) == 6
+
+
+def test_fewer_than_three_ends_bound_nothing():
+    for ends in (circle([0, 180]), circle([0, 0, 180, 180]), [[0, 0], [0, 0], [1, 0]]):
+        with pytest.raises(ValueError, match="ends: wanted three or more apart"):
+            closed_spline_domain(ends, 1.0)
+
+
+def test_lengths_scale():
+    small, large = closed_spline_domain(STUBBY, 1.0), closed_spline_domain(STUBBY * 1e6, 1e6)
+    assert large.area == pytest.approx(small.area * 1e12)
+    assert large.boundary(50) == pytest.approx(small.boundary(50) * 1e6)

@@ -1,0 +1,233 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The whole way from contours to a patch: exactness, equivariance, and what is refused."""
+
+import numpy as np
+import pytest
+import surfaces
+from scipy.spatial.transform import Rotation
+
+from core import (
+    METHODS,
+    Contour,
+    DegenerateCurvesError,
+    SamplingPlane,
+    distances,
+    overlapped,
+    reconstruct,
+    track,
+)
+
+AZIMUTHS = np.radians([13, 73, 133])
+UPRIGHT = [SamplingPlane(a) for a in AZIMUTHS]
+TILTED = [SamplingPlane(a, t) for a, t in zip(AZIMUTHS, np.radians([12, -18, 8]), strict=True)]
+
+
+def off_data(surface, r):
+    """Mean |dz| over the domain, measured by rays along the patch's normal direction."""
+    heights, wanted = [], []
+    for x, y in r.domain.grid(200)[0]:
+        start = r.frame.to_world([[x, y, r.radius]])[0]
+        hit = surface.ray_cast(start, -r.frame.axes[:, 2], 2 * r.radius)
+        wanted.append(r.frame.to_local([hit[0]])[0, 2])
+        heights.append(float(r.patch.height(x, y)))
+    return np.mean(np.abs(np.subtract(heights, wanted)))
+
+
+@pytest.mark.parametrize("planes", [UPRIGHT, TILTED], ids=["upright", "tilted"])
+@pytest.mark.parametrize("method", ["tagc", "quadratic-variation"])
+@pytest.mark.parametrize(
+    "surface",
+    [
+        surfaces.plane(),
+        surfaces.sphere(25),
+        surfaces.cylinder(20),
+        surfaces.torus(40, 20, 0.6),
+        surfaces.torus(40, 20, 2.6),
+        surfaces.ellipsoid(35, 25, 20, 0.6, 0.5),
+        surfaces.bottle_neck(),
+        surfaces.quartic(),
+    ],
+    ids=["plane", "sphere", "cylinder", "torus outer", "torus inner", "ellipsoid", "bottle neck", "quartic"],
+)
+def test_exact_surfaces_of_paper_size(surface, method, planes):
+    """The errors these methods have on 12 mm patches: 2 % of the radius, 4 % where the ellipsoid's curvature
+    radius is down to 18 mm and least |K| flattens the rim; the curvatures to 0.0025 / mm."""
+    contours = track(surface, surface.point, surface.normal, planes, extent=12, step=1)
+    r = reconstruct(surface.point, contours, outward=surface.normal, method=method)
+    assert off_data(surface, r) < (0.04 if surface.k1 < -0.05 else 0.02) * r.radius
+    assert [r.patch.k1, r.patch.k2] == pytest.approx([surface.k1, surface.k2], abs=2.5e-3)
+    assert r.fit_error == pytest.approx(
+        np.mean(np.abs(r.patch.height(*r.contacts[:, :2].T) - r.contacts[:, 2]))
+    )
+    assert len(r.contacts) == 72
+    assert r.status in ("ok", "uncertain")
+
+
+def test_a_quartic_along_its_own_curves_is_seen_by_least_squares_in_the_true_frame():
+    """Three curves hide three of the nine directions, whatever the noise: the condition number tells."""
+    s = surfaces.quartic()
+    five = [SamplingPlane(a) for a in np.radians([5, 41, 77, 113, 149])]
+    contours = track(s, s.point, s.normal, five, extent=12, step=0.1)
+    r = reconstruct(s.point, contours, outward=s.normal, method="least-squares")
+    assert r.condition_number < 100
+    assert r.status == "ok"
+    assert off_data(s, r) < 0.05
+    assert r.patch.coefficients[:4] == pytest.approx([2e-4, -3e-4, 1e-4, 2e-4], abs=2e-4)
+    three = reconstruct(s.point, contours[::2], outward=s.normal, method="least-squares")
+    assert three.condition_number > 1e3
+    assert three.status == "uncertain"
+
+
+def test_degree_2_is_the_quadric_alone():
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    contours = track(s, s.point, s.normal, UPRIGHT, extent=5, step=0.5)
+    results = [reconstruct(s.point, contours, outward=s.normal, method=m, degree=2) for m in METHODS]
+    for r in results:
+        assert r.patch.degree == 2
+        assert r.patch.height(1.0, 2.0) == pytest.approx(r.patch.k1 / 2 + 2 * r.patch.k2)
+
+
+@pytest.mark.parametrize("degree", [3, 5, 6])
+def test_other_degrees(degree):
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    contours = track(s, s.point, s.normal, UPRIGHT, extent=12, step=1)
+    r = reconstruct(s.point, contours, outward=s.normal, degree=degree)
+    assert r.patch.degree == degree
+    assert off_data(s, r) < 0.04 * r.radius
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
+def test_rotating_scaling_and_moving_the_data_moves_the_result(method, scale):
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    contours = track(s, s.point, s.normal, TILTED, extent=12, step=1, noise=0.02, rng=1)
+    turn = Rotation.from_rotvec([0.5, -1.1, 0.8]).as_matrix()
+    shift = scale * np.array([30.0, -20.0, 10.0])
+
+    def moved(p):
+        return scale * np.asarray(p) @ turn.T + shift
+
+    one = reconstruct(s.point, contours, outward=s.normal, method=method)
+    other = reconstruct(
+        moved(s.point), [Contour(moved(c.points)) for c in contours], outward=turn @ s.normal, method=method
+    )
+    assert other.frame.axes == pytest.approx(turn @ one.frame.axes, abs=1e-9)
+    assert other.frame.origin == pytest.approx(moved(s.point))
+    assert other.radius == pytest.approx(scale * one.radius)
+    assert [other.patch.k1, other.patch.k2] == pytest.approx(
+        [one.patch.k1 / scale, one.patch.k2 / scale], rel=1e-7
+    )
+    assert other.domain.area == pytest.approx(scale**2 * one.domain.area)
+    if method == "least-squares":
+        # Its blind directions multiply rounding by the condition number, 1e4: on the data it is the same.
+        x, y = one.contacts[:, :2].T
+    else:
+        x, y = one.domain.grid(100)[0].T
+    # An optimiser stops within its tolerance, not within rounding.
+    tolerance = {"tagc": 1e-4, "quadratic-variation": 1e-9, "least-squares": 1e-6}[method]
+    heights = other.patch.height(scale * x, scale * y) / scale
+    assert heights == pytest.approx(one.patch.height(x, y), abs=tolerance * one.radius)
+    assert other.status == one.status
+
+
+@pytest.mark.parametrize("surface", [surfaces.sphere(25), surfaces.plane()], ids=["sphere", "plane"])
+def test_umbilics_turn_with_the_data_too(surface):
+    contours = track(surface, surface.point, surface.normal, UPRIGHT, extent=12, step=1, noise=0.02, rng=2)
+    turn = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix()
+    one = reconstruct(surface.point, contours, outward=surface.normal, method="quadratic-variation")
+    turned = [Contour(c.points @ turn.T) for c in contours]
+    other = reconstruct(
+        turn @ surface.point, turned, outward=turn @ surface.normal, method="quadratic-variation"
+    )
+    assert other.frame.axes == pytest.approx(turn @ one.frame.axes, abs=1e-9)
+
+
+def test_distances_of_mesh_vertices_over_the_domain():
+    """A ball's far side and its inner wall lie over the domain too, but are not the patch's."""
+    ball = surfaces.sphere(25)
+    contours = track(ball, ball.point, ball.normal, UPRIGHT, extent=8, step=0.8)
+    r = reconstruct(ball.point, contours, outward=ball.normal, weight=1e5)
+    directions = np.random.default_rng(0).normal(size=(20000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    vertices, normals = np.vstack([25 * directions, 22 * directions]), np.vstack([directions, -directions])
+    over = overlapped(r.frame, r.domain, r.radius, vertices, normals)
+    expected = 20000 * (1 - np.cos(8 / 25)) / 2
+    assert len(over) == pytest.approx(expected, rel=0.15)
+    assert np.linalg.norm(r.frame.to_world(over), axis=1) == pytest.approx(25.0)
+    assert distances(r.patch, over).mean() < 0.05
+
+
+def test_four_to_six_planes_and_curves_that_are_not_planar():
+    s = surfaces.torus(40, 20, 0.6)
+    for count in (4, 5, 6):
+        planes = [SamplingPlane(a) for a in np.pi * np.arange(count) / count]
+        contours = track(s, s.point, s.normal, planes, extent=10, step=1)
+        assert off_data(s, reconstruct(s.point, contours, outward=s.normal)) < 0.15
+    # A finger that swerves: the contour of one plane, continued in another one's.
+    one, other = track(s, s.point, s.normal, [SamplingPlane(0.1), SamplingPlane(0.35)], extent=10, step=1)
+    swerving = Contour(np.vstack([one.points[:11], other.points[11:]]))
+    rest = track(s, s.point, s.normal, [SamplingPlane(1.2), SamplingPlane(2.3)], extent=10, step=1)
+    r = reconstruct(s.point, [swerving, *rest], outward=s.normal)
+    assert off_data(s, r) < 0.5
+
+
+def test_a_miss_within_the_sensors_accuracy_casts_no_doubt():
+    s = surfaces.plane()
+    contours = track(s, s.point, s.normal, UPRIGHT, extent=10, step=1, noise=0.3, rng=0)
+    bare = [Contour(c.points) for c in contours]
+    assert reconstruct(s.point, bare, outward=s.normal).status == "uncertain"
+    assert reconstruct(s.point, bare, outward=s.normal, sensor_std=0.3).status == "ok"
+    assert reconstruct(s.point, contours, outward=s.normal).status == "ok"
+
+
+GOOD = track(
+    surfaces.sphere(25), surfaces.sphere(25).point, surfaces.sphere(25).normal, UPRIGHT, extent=5, step=1
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"method": "magic"}, "method: wanted one of tagc, quadratic-variation, least-squares, got 'magic'"),
+        ({"solver": "slow"}, "solver: wanted one of fast, descent, got 'slow'"),
+        ({"degree": 7}, "degree: wanted a whole number from 2 to 6, got 7"),
+        ({"degree": 3.5}, "degree: wanted a whole number from 2 to 6, got 3.5"),
+        ({"weight": 0}, "weight: wanted a finite number above 0, got 0"),
+        ({"sensor_std": -1}, "sensor_std: wanted a finite number of 0 or more, got -1"),
+        ({"outward": (0, 0, 0)}, "outward: wanted a vector with a direction"),
+        ({"point": (np.nan, 0, 0)}, "point: wanted finite numbers"),
+    ],
+)
+def test_bad_arguments_are_named(change, message):
+    arguments = {"point": surfaces.sphere(25).point, "outward": surfaces.sphere(25).normal} | change
+    with pytest.raises(ValueError, match=message):
+        reconstruct(arguments.pop("point"), GOOD, **arguments)
+
+
+def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():
+    s = np.linspace(0.1, 1.0, 9)
+    curves = [Contour(np.outer(s, [1.0, slope, 0.0]) / np.hypot(1, slope)) for slope in (0.0, 1e-2, 0.0206)]
+    with pytest.raises(DegenerateCurvesError):
+        reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
+
+
+def test_no_numbers_but_finite_ones_come_out_of_random_curves():
+    rng = np.random.default_rng(6)
+    for _ in range(200):
+        curves = [
+            Contour(rng.normal(size=(rng.integers(3, 12), 3)) * 10.0 ** rng.uniform(-8, 8)) for _ in range(3)
+        ]
+        try:
+            r = reconstruct((0, 0, 0), curves, outward=rng.normal(size=3), method=METHODS[rng.integers(3)])
+        except DegenerateCurvesError:
+            continue
+        numbers = [
+            r.fit_error,
+            r.total_absolute_curvature,
+            r.condition_number,
+            r.patch.k1,
+            r.patch.k2,
+            r.radius,
+        ]
+        assert np.isfinite([*numbers, *r.patch.coefficients, r.domain.area]).all()
