@@ -154,5 +154,5 @@ def _require_distinct(tangents: Array) -> None:
         angle = math.degrees(math.asin(min(1.0, sines[alike])))
         raise DegenerateCurvesError(
             f"curves {alike[1] + 1} and {alike[0] + 1} run in one direction ({angle:.2g} degrees apart), "
-            f"which leaves {len(distinct)} distinct ones of the three needed: turn one of their sampling planes"
+            f"which leaves {len(distinct)} distinct ones of the three needed: turn one of their planes"
         )

@@ -92,7 +92,7 @@ def cylinder(r):
 
 
 def torus(big, small, angle, outside=1.0):
-    """Around z, touched at `angle` of the tube, 0 its outer equator, pi its inner. outside -1: from within."""
+    """Around z, touched at `angle` of the tube: 0 the outer equator, pi the inner. outside=-1: the hole."""
     rho = big + small * np.cos(angle)
     kappas = sorted([-outside / small, -outside * np.cos(angle) / rho])
 

@@ -115,7 +115,7 @@ def heights_missed(r):
 
 
 def test_on_a_cylinder_the_descent_crawls_and_a_step_cap_is_said(monkeypatch):
-    """K = 0 all over, so every grid point is a kink of |K| that the descent zigzags across, 15000 steps here."""
+    """K = 0 all over: every grid point is a kink of |K| that the descent zigzags across, 15000 steps here."""
     s = surfaces.cylinder(20)
     contours = touched(s)
     fast = reconstruct(s.point, contours, outward=s.normal, method="tagc")

@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+
+# The first of these that runs and is 3.11 or 3.13: what a version manager puts on PATH may only say
+# that the version is not there.
+VERSION := import sys; print("%d.%d" % sys.version_info[:2])
+ifndef PYTHON
+PYTHON := $(shell for p in python3.13 python3.11 python3; do \
+	case "$$($$p -c '$(VERSION)' 2>/dev/null)" in (3.11 | 3.13) echo $$p; break ;; esac; done)
+endif
+PYTHON_VERSION := $(filter 3.11 3.13,$(shell '$(PYTHON)' -c '$(VERSION)' 2>/dev/null))
+
+# One environment for each Python, ready when its stamp is there.
+VENV := build/venv-$(PYTHON_VERSION)
+VENV_PY := $(VENV)/bin/python
+READY := $(VENV)/.ready
+
+ZIP := build/tactile_patch.zip
+# Folders too, so that a deleted file counts as a change.
+SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
+	$(shell find core tactile_addon -name __pycache__ -prune -o -print)
+
+.PHONY: help demo test zip zip-nowheels clean
+
+help:
+	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
+	@echo 'make test              check style and types, then test the extension in Blender'
+	@echo 'make zip               build the zip files of a release, one for each platform, in build/dist'
+	@echo 'make zip-nowheels      build the zip for a Blender whose own Python has scipy, in build/dist'
+	@echo 'make clean             remove build; the downloaded wheels stay'
+	@echo 'All take PYTHON=...: 3.11 (tests in Blender 4.5) or 3.13 (Blender 5.2).'
+
+demo: $(ZIP)
+	$(VENV_PY) -m tools.demo --zip $(ZIP) --mesh "$(MESH)"
+
+test: $(ZIP)
+	$(VENV_PY) -m ruff check
+	$(VENV_PY) -m ruff format --check
+	$(VENV_PY) -m mypy core
+	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest
+
+zip: $(READY)
+	$(VENV_PY) tools/build.py --wheels all
+
+zip-nowheels: $(READY)
+	$(VENV_PY) tools/build.py --wheels none
+
+clean:
+	rm -rf build .mypy_cache .pytest_cache .ruff_cache
+
+# The environment has to be there to build, but a new one is no reason to build again.
+$(ZIP): $(SOURCES) | $(READY)
+	@zip=$$($(VENV_PY) tools/build.py --output build) && mv "$$zip" $@
+
+$(READY): tools/requirements.txt tools/check_bpy.py
+ifeq ($(PYTHON_VERSION),)
+	@echo 'Blender is a Python module for Python 3.11 (Blender 4.5) and 3.13 (Blender 5.2) only, which' \
+		'$(if $(PYTHON),$(PYTHON) is not,no python3 here is): install one (3.11 is in Debian 12, 3.13 in' \
+		'Debian 13; elsewhere pyenv install 3.13) and name it, as in make PYTHON=python3.13.' >&2; exit 2
+else
+	@'$(PYTHON)' -c 'import ensurepip, venv' 2>/dev/null || { \
+		echo 'This Python cannot make an environment: sudo apt install python3-venv' \
+			'(python$(PYTHON_VERSION)-venv if it is not the system'"'"'s own Python).' >&2; exit 2; }
+	@echo 'Installing Blender as a Python module, and the tools, in $(VENV): once, some minutes.'
+	@'$(PYTHON)' -m venv $(VENV)
+	@$(VENV_PY) -m pip install --quiet --disable-pip-version-check --requirement tools/requirements.txt
+	@$(VENV_PY) tools/check_bpy.py
+	@touch $@
+endif

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`blender -c tactile reconstruct [FILE]`: a patch from the shell, the report on standard output."""
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+
+import bpy
+
+from . import patch_object
+from .operators import METHODS, SOLVERS
+from .report import readable
+
+
+def main(args):
+    """Blender's entry of the command; `args` is what follows its name. Returns the exit code."""
+    sys.stdout.reconfigure(line_buffering=True)
+    options = _parser().parse_args([f" {a}" if _is_number(a) else a for a in args])
+    try:
+        report = _reconstruct(options)
+        _write(report, options)
+    except (RuntimeError, OSError, ValueError) as error:
+        print(f"tactile: {_sentence(error)}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser():
+    parser = argparse.ArgumentParser(prog="blender -c tactile", description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    add = commands.add_parser(
+        "reconstruct", help="touch a mesh and rebuild the patch around a point"
+    ).add_argument
+    add(
+        "file",
+        nargs="?",
+        type=Path,
+        metavar="FILE",
+        help=".blend, .ply, .stl or .obj; without, the open scene",
+    )
+    add(
+        "--target",
+        default="",
+        metavar="NAME",
+        help="object to touch (default: the active one, or the only mesh)",
+    )
+    vector = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
+    add("--location", **vector, help="where to touch (default: the 3D cursor)")
+    add("--normal", **vector, help="outward direction there (default: the surface's)")
+    add(
+        "--azimuths",
+        type=float,
+        nargs="+",
+        metavar="DEGREES",
+        help="three to six plane directions (0 60 120)",
+    )
+    add("--tilts", type=float, nargs="+", metavar="DEGREES", help="as many plane tilts (0)")
+    add("--extent", type=float, help="length of each half curve (an eighth of the object's size)")
+    add("--step", type=float, help="distance between contacts (a twelfth of the extent)")
+    add("--noise", type=float, help="standard deviation of the simulated sensor (0)")
+    add("--seed", type=int, help="of the noise (0)")
+    add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (tagc)")
+    add("--degree", type=int, choices=range(2, 7), help="of the polynomial (4)")
+    add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000)")
+    add("--solver", choices=[name for name, _, _ in SOLVERS], help="of tagc (fast)")
+    add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
+    add("--output", type=Path, metavar="OUT.blend", help="save the scene with the patch")
+    parser.set_defaults(fail=parser.error)
+    return parser
+
+
+def _reconstruct(options):
+    """Opens the file, runs the operator, saves; returns the report."""
+    arguments = {
+        name: value
+        for name in (
+            "location",
+            "normal",
+            "extent",
+            "step",
+            "noise",
+            "seed",
+            "method",
+            "degree",
+            "weight",
+            "solver",
+        )
+        if (value := getattr(options, name)) is not None
+    }
+    if options.azimuths is not None:
+        if not 3 <= len(options.azimuths) <= 6:
+            options.fail(f"--azimuths: wanted three to six, got {len(options.azimuths)}")
+        arguments["plane_count"] = len(options.azimuths)
+        arguments["azimuths"] = _six_radians(options.azimuths)
+    if options.tilts is not None:
+        if len(options.tilts) != arguments.get("plane_count", 3):
+            options.fail("--tilts: wanted as many as there are planes")
+        arguments["tilts"] = _six_radians(options.tilts)
+    if options.file is not None:
+        open_file(options.file)
+    bpy.ops.tactile.reconstruct(target=options.target or _default_target(), **arguments)
+    report = bpy.context.view_layer.objects.active[patch_object.RECORD].to_dict()
+    if options.output is not None:
+        bpy.ops.wm.save_as_mainfile(filepath=str(options.output.absolute()))
+    return report
+
+
+def open_file(path):
+    """Makes the file the scene: opens a .blend, imports a mesh into an empty one, coordinates as they are."""
+    if not path.is_file():
+        raise OSError(f'there is no file "{path}"')
+    full = str(path.absolute())
+    if path.suffix.lower() == ".blend":
+        bpy.ops.wm.open_mainfile(filepath=full, load_ui=False)
+        return
+    imports = {
+        ".ply": lambda: bpy.ops.wm.ply_import(filepath=full),
+        ".stl": lambda: bpy.ops.wm.stl_import(filepath=full),
+        ".obj": lambda: bpy.ops.wm.obj_import(filepath=full, forward_axis="Y", up_axis="Z"),
+    }
+    if path.suffix.lower() not in imports:
+        raise OSError(f'cannot read "{path.name}": wanted a .blend, .ply, .stl or .obj file')
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        imports[path.suffix.lower()]()
+    if not any(len(mesh.polygons) for mesh in bpy.data.meshes):
+        raise OSError(f'no mesh could be read from "{path.name}": is the file whole?')
+
+
+def _default_target():
+    """The name of the only mesh of the scene, where nothing else is active."""
+    if bpy.context.view_layer.objects.active is not None:
+        return ""
+    meshes = [obj.name for obj in bpy.context.scene.objects if obj.type == "MESH"]
+    return meshes[0] if len(meshes) == 1 else ""
+
+
+def _write(report, options):
+    if options.json == "-":
+        print(json.dumps(report, allow_nan=False))
+        return
+    if options.json is not None:
+        Path(options.json).write_text(json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    print(readable(report))
+
+
+def _six_radians(degrees):
+    return [math.radians(a) for a in degrees] + [0.0] * (6 - len(degrees))
+
+
+def _is_number(text):
+    """argparse takes -1e-3 for an option; a leading space tells it otherwise."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _sentence(error):
+    """An operator's error without the words Blender puts around it."""
+    return str(error).strip().splitlines()[0].removeprefix("Error: ")

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The report of a reconstruction as a table for people."""
+
+
+def readable(report):
+    """Lines of label and value; lengths in the unit of the scene or file."""
+    seconds = report["seconds"]
+    stops = sorted({stop for pair in report["stops"] for stop in pair})
+    rows = [
+        ("touched", report["source"]),
+        ("status", f"{report['status']}: {report['message']}"),
+        ("fit", f"{report['method']}, degree {report['degree']}"),
+        ("contacts", f"{report['contacts']} on {len(report['planes'])} curves, ended by: {', '.join(stops)}"),
+        ("step, extent, radius", f"{report['step']:.4g}, {report['extent']:.4g}, {report['radius']:.4g}"),
+        ("point", _vector(report["frame"]["origin"])),
+        ("normal", _vector(report["frame"]["normal"])),
+        ("direction d1", _vector(report["frame"]["d1"])),
+        ("kappa1, kappa2", f"{report['k1']:.5g}, {report['k2']:.5g} per unit of length"),
+        ("Gaussian curvature", f"{report['gaussian_curvature']:.5g} per unit of area"),
+        ("mean curvature", f"{report['mean_curvature']:.5g} per unit of length"),
+        ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
+        (
+            "mesh to patch",
+            f"mean {report['vertex_distance_mean']:.4g}, {_share(report, 'vertex_distance_mean')} of "
+            f"the radius; max {report['vertex_distance_max']:.4g}; {report['vertices']} vertices",
+        ),
+        ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
+        ("condition number", f"{report['condition_number']:.2g}"),
+        ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
+    ]
+    width = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
+
+
+def _vector(v):
+    return " ".join(f"{x:.5g}" for x in v)
+
+
+def _share(report, key):
+    return f"{100.0 * report[key] / report['radius']:.2f} %"

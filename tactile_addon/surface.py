@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mesh object of the scene as a surface to touch: as it evaluates, in world coordinates."""
+
+import math
+
+import bmesh
+import numpy as np
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+
+
+class MeshSurface:
+    """The evaluated mesh of an object; core.track touches it through `ray_cast`.
+
+    vertices, normals : (n, 3), of all its vertices; the normals have any length
+
+    The transform runs in Python floats: mathutils rounds to float32, which far from the world's
+    origin is coarser than the mesh.
+    """
+
+    def __init__(self, obj, depsgraph):
+        """Raises ValueError, with a sentence, where `obj` cannot be touched."""
+        evaluated = obj.evaluated_get(depsgraph)
+        if not evaluated.is_evaluated:
+            raise ValueError(
+                f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
+            )
+        matrix = np.array(evaluated.matrix_world, dtype=float)
+        _require_invertible(obj.name, matrix[:3, :3])
+        self._linear, self._origin = matrix[:3, :3], matrix[:3, 3]
+        self._inverse = np.linalg.inv(self._linear)
+        # The same for ray_cast, where a numpy call would cost more than the cast.
+        self._rows, self._inverse_rows, self._at = (
+            array.tolist() for array in (self._linear, self._inverse, self._origin)
+        )
+        if obj.data.is_editmode:
+            # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
+            evaluated.to_mesh()
+            evaluated.to_mesh_clear()
+        self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
+        if not len(self._mesh.polygons):
+            raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
+        co, normals = (np.empty((len(self._mesh.vertices), 3), dtype=np.float32) for _ in range(2))
+        self._mesh.vertices.foreach_get("co", co.ravel())
+        if not np.isfinite(co).all():
+            raise ValueError(
+                f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers'
+            )
+        self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
+        self.vertices = co @ self._linear.T + self._origin
+        self.normals = normals @ self._inverse
+
+    def ray_cast(self, origin, direction, distance):
+        """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
+        back, (x, y, z) = self._inverse_rows, self._at
+        direction = _product(back, direction)
+        scale = math.hypot(*direction)
+        origin = _product(back, (origin[0] - x, origin[1] - y, origin[2] - z))
+        hit, point, normal, _ = self._object.ray_cast(
+            origin, direction, distance=distance * scale, depsgraph=self._depsgraph
+        )
+        return (self._to_world(point), self._normal_to_world(normal)) if hit else None
+
+    def project(self, location):
+        """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""
+        local = self._to_local(location)
+        gram = self._linear.T @ self._linear
+        if not np.allclose(gram, gram[0, 0] * np.eye(3), rtol=0.0, atol=1e-4 * gram[0, 0]):
+            # Nearest within a stretched object is not nearest in the world.
+            stretched = bmesh.new()
+            stretched.from_mesh(self._mesh)
+            for vertex, co in zip(stretched.verts, self.vertices - self._origin, strict=True):
+                vertex.co = co
+            nearest = BVHTree.FromBMesh(stretched).find_nearest(Vector(np.subtract(location, self._origin)))[
+                0
+            ]
+            stretched.free()
+            local = self._inverse @ nearest
+        point, normal = self._nearest(local)
+        point = self._to_world(point)
+        return point, self._normal_to_world(normal), math.dist(location, point)
+
+    def deviations(self, points, normals, reach):
+        """Signed distances (n,) of world points to the mesh, positive outside it.
+
+        Measured along the unit normals (n, 3) either way, up to `reach`; to the nearest point of the
+        mesh where they meet nothing, as over a hole.
+        """
+        pairs = zip(points.tolist(), normals.tolist(), strict=True)
+        return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
+
+    def _deviation(self, point, normal, reach):
+        found = []
+        for sign in (-1.0, 1.0):
+            hit = self.ray_cast(point, [-sign * v for v in normal], reach)
+            if hit is not None:
+                found.append(sign * math.dist(point, hit[0]))
+        if found:
+            return min(found, key=abs)
+        foot = self._to_world(self._nearest(self._to_local(point))[0])
+        return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
+
+    def spacing(self, point):
+        """How far apart neighbouring float32 numbers are at a world point, in the world and in the mesh."""
+        scale = np.linalg.norm(self._linear, axis=0).max()
+        world, local = (
+            np.spacing(np.abs(p).astype(np.float32)).max() for p in (point, self._to_local(point))
+        )
+        return float(max(world, scale * local))
+
+    def _nearest(self, local):
+        """(point, normal) in object coordinates."""
+        found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
+        if not found:
+            raise ValueError("The location is too far away to be measured: set it on the surface")
+        return point, normal
+
+    def _to_local(self, point):
+        return self._inverse @ np.subtract(point, self._origin)
+
+    def _to_world(self, point):
+        x, y, z = _product(self._rows, point)
+        return x + self._at[0], y + self._at[1], z + self._at[2]
+
+    def _normal_to_world(self, normal):
+        """By the inverse transpose: outward stays outward under any scale, a mirroring one too."""
+        x, y, z = _product(zip(*self._inverse_rows, strict=True), normal)
+        length = math.hypot(x, y, z)
+        return x / length, y / length, z / length
+
+
+def _require_invertible(name, linear):
+    lengths = np.linalg.norm(linear, axis=0)
+    if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
+        raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')
+
+
+def _product(rows, v):
+    """A matrix, as rows of Python floats, times a vector."""
+    x, y, z = v
+    return [a * x + b * y + c * z for a, b, c in rows]

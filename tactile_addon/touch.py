@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One touch, from an object of the scene to a reconstruction and its report; nothing in the scene changes."""
+
+import math
+from time import perf_counter
+
+import numpy as np
+
+from .. import core
+from .surface import MeshSurface
+
+EXTENT_SHARE = 1.0 / 8.0  # of the object's largest dimension, where no extent is given
+STEPS = 12  # of a half contour, where no step is given
+COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about curvature
+
+
+def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed, **fit):
+    """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
+
+    location : world coordinates, projected onto the object
+    normal : outward, or None for the surface's
+    extent, step : 0 for a choice by the object's size
+    fit : what core.reconstruct takes
+
+    Returns the surface, the reconstruction, the contours and the report, a dict of plain values.
+    Raises ValueError with a sentence for the user.
+    """
+    clock = [perf_counter()]
+    surface = MeshSurface(obj, depsgraph)
+    extent, step = _lengths(obj.name, surface, extent, step, noise)
+    point, surface_normal = _reference_point(obj.name, surface, location, extent, step)
+    outward = surface_normal if normal is None else normal
+    clock.append(perf_counter())
+    contours = core.track(surface, point, outward, planes, extent=extent, step=step, noise=noise, rng=seed)
+    clock.append(perf_counter())
+    result = core.reconstruct(point, contours, outward=outward, **fit)
+    clock.append(perf_counter())
+    over = core.overlapped(result.frame, result.domain, result.radius, surface.vertices, surface.normals)
+    misses = core.distances(result.patch, over)
+    clock.append(perf_counter())
+    seconds = dict(zip(("prepare", "track", "fit", "verify"), np.diff(clock).tolist(), strict=True))
+    report = {
+        "source": obj.name,
+        "status": result.status,
+        "message": result.message,
+        "method": fit["method"],
+        "degree": fit["degree"],
+        "extent": extent,
+        "step": step,
+        "noise": noise,
+        "seed": seed,
+        **_reconstruction_report(result),
+        "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
+        "stops": [list(contour.stops) for contour in contours],
+        "vertices": len(over),
+        "vertex_distance_mean": float(misses.mean()) if len(over) else 0.0,
+        "vertex_distance_max": float(misses.max(initial=0.0)),
+        "seconds": seconds,
+    }
+    return surface, result, contours, report
+
+
+def _lengths(name, surface, extent, step, noise):
+    """Extent and step, chosen by the object's size where they are 0."""
+    size = float(np.ptp(surface.vertices, axis=0).max())
+    if min(extent, step, noise) < 0.0:
+        raise ValueError(
+            f"Extent, step and noise are lengths of 0 or more, got {extent:g}, {step:g} and {noise:g}"
+        )
+    if extent > size:
+        raise ValueError(f'The extent {extent:g} is longer than "{name}" ({size:g}): take a shorter one')
+    extent = extent or size * EXTENT_SHARE
+    if step > extent:
+        raise ValueError(f"The step {step:g} is longer than the extent {extent:g}: take a shorter one")
+    return extent, step or extent / STEPS
+
+
+def _reference_point(name, surface, location, extent, step):
+    """The point of the surface nearest to the location, and the normal there."""
+    if not np.isfinite(location).all():
+        raise ValueError("The location has coordinates that are not finite: set it on the surface")
+    point, normal, distance = surface.project(location)
+    if distance > extent:
+        raise ValueError(
+            f'The location is {distance:g} away from "{name}", farther than the extent {extent:g}: '
+            "move it to the surface"
+        )
+    if surface.spacing(point) > COARSE * step:
+        raise ValueError(
+            f"Coordinates at the point are {surface.spacing(point):g} apart in single precision, too coarse "
+            f"for a step of {step:g}: move the object nearer to the origin of the world or of its own mesh"
+        )
+    return point, normal
+
+
+def _reconstruction_report(result):
+    d1, d2, n = result.frame.axes.T.tolist()
+    return {
+        "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
+        "k1": result.patch.k1,
+        "k2": result.patch.k2,
+        "gaussian_curvature": float(result.patch.gaussian_curvature(0.0, 0.0)),
+        "mean_curvature": float(result.patch.mean_curvature(0.0, 0.0)),
+        "coefficients": result.patch.coefficients.tolist(),
+        "radius": result.radius,
+        "area": result.domain.area,
+        "contacts": len(result.contacts),
+        "fit_error": result.fit_error,
+        "total_absolute_curvature": result.total_absolute_curvature,
+        "condition_number": result.condition_number,
+    }

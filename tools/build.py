@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Build the extension's zip files with Blender's own packaging tool, taken from the bpy module.
+
+The manifest says which wheels there are and for which platforms; those missing in wheels/ are
+downloaded by the version, Python and platform their names spell. The paths of the zips built go to
+stdout, everything else to stderr.
+"""
+
+import argparse
+import importlib.util
+import json
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+MANIFEST = ROOT / "blender_manifest.toml"
+# Blender's pattern list can only exclude, so what ships is named: nothing else lying in a checkout,
+# an environment or a scan, can get into a release.
+SHIPPED = ("__init__.py", "LICENSE", "core", "tactile_addon")
+MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Build the extension's zip files.")
+    parser.add_argument(
+        "--wheels",
+        choices=("all", "host", "none"),
+        default="host",
+        help="all: a zip for every platform; host (default): one for this platform; "
+        "none: one without scipy, for a Blender whose Python has it",
+    )
+    parser.add_argument("--output", type=Path, default=ROOT / "build" / "dist", metavar="DIR")
+    args = parser.parse_args()
+
+    manifest = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))
+    platforms = {
+        "all": manifest["platforms"],
+        "host": [p for p in manifest["platforms"] if p == host_platform()],
+        "none": [],
+    }[args.wheels]
+    if args.wheels == "host" and not platforms:
+        sys.exit(f"No wheels are listed for {host_platform()}; use --wheels none.")
+    wheels = [w for w in manifest["wheels"] if wheel_platform(w) in platforms]
+
+    tool = packaging_tool()
+    for wheel in wheels:
+        download(ROOT / wheel)
+    args.output.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=args.output) as folder:
+        source, output = Path(folder, "source"), Path(folder, "zip")
+        output.mkdir()
+        stage(source, platforms, wheels)
+        run(tool, "validate", source)
+        if platforms:
+            run(tool, "build", "--source-dir", source, "--output-dir", output, "--split-platforms")
+        else:
+            name = f"{manifest['id']}-{manifest['version']}-nowheels.zip"
+            run(tool, "build", "--source-dir", source, "--output-filepath", output / name)
+        for path in sorted(output.iterdir()):
+            print(shutil.move(path, args.output / path.name))
+
+
+def host_platform() -> str:
+    """This machine's platform by Blender's name, such as "linux-x64"."""
+    system = platform.system().lower().replace("darwin", "macos")
+    machine = platform.machine().lower()
+    return f"{system}-{MACHINES.get(machine, machine)}"
+
+
+def wheel_platform(wheel: str) -> str:
+    """The platform, by Blender's name, that a wheel is for."""
+    tag = Path(wheel).stem.rsplit("-", 1)[1]
+    system = {"man": "linux", "win": "windows", "mac": "macos"}[tag[:3]]
+    return f"{system}-{'arm64' if tag.endswith('arm64') else 'x64'}"
+
+
+def packaging_tool() -> Path:
+    """Blender's command line for extensions; finding it does not start Blender."""
+    spec = importlib.util.find_spec("bpy")
+    if spec is not None and spec.origin is not None:
+        found = Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
+        if tool := next(found, None):
+            return tool
+    sys.exit("This Python has no bpy module, hence no Blender packaging tool: use `make zip`.")
+
+
+def download(wheel: Path) -> None:
+    """Fetch the file a wheel's name describes, unless it is there."""
+    if wheel.exists():
+        return
+    print(f"Downloading {wheel.name}", file=sys.stderr)
+    name, version, python, abi, tags = wheel.stem.split("-")
+    wheel.parent.mkdir(exist_ok=True)
+    # Into a folder of its own first: an interrupted download must not pass for a wheel later.
+    with tempfile.TemporaryDirectory(dir=wheel.parent) as folder:
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+        command += ["--only-binary=:all:", "--implementation", "cp", "--abi", abi]
+        command += ["--python-version", python.removeprefix("cp"), "--dest", folder]
+        for tag in tags.split("."):
+            command += ["--platform", tag]
+        status = subprocess.run([*command, f"{name}=={version}"], stdout=sys.stderr).returncode
+        if status or not Path(folder, wheel.name).exists():
+            sys.exit(f"Downloading {wheel.name} with pip failed; is there a network connection?")
+        Path(folder, wheel.name).replace(wheel)
+
+
+def stage(folder: Path, platforms: list[str], wheels: list[str]) -> None:
+    """Lay out what ships in `folder`, its manifest cut down to these platforms and wheels."""
+    for name in SHIPPED:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, folder / name)
+        else:
+            folder.mkdir(exist_ok=True)
+            shutil.copy2(ROOT / name, folder)
+    for wheel in wheels:
+        (folder / wheel).parent.mkdir(exist_ok=True)
+        shutil.copy2(ROOT / wheel, folder / wheel)
+
+    text = MANIFEST.read_text(encoding="utf-8")
+    expected = tomllib.loads(text)
+    for key, values in (("platforms", platforms), ("wheels", wheels)):
+        array = f"{key} = {json.dumps(values)}\n" if values else ""
+        text = re.sub(rf"^{key} = \[[^]]*\]\n", array, text, flags=re.MULTILINE)
+        expected[key] = values
+    # The text is edited to keep all the rest as it is written; this notices if it was written so
+    # that the edit missed.
+    if tomllib.loads(text) != {key: value for key, value in expected.items() if value}:
+        sys.exit(f"{MANIFEST.name}: platforms and wheels must be plain arrays, `key = [...]`.")
+    (folder / MANIFEST.name).write_text(text, encoding="utf-8")
+
+
+def run(tool: Path, *arguments: str | Path) -> None:
+    """Run Blender's tool; what it says shows only when it fails."""
+    result = subprocess.run(
+        [sys.executable, tool, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    if result.returncode:
+        sys.exit(f"{result.stdout.rstrip()}\nBlender's packaging tool refused to {arguments[0]}.")
+
+
+if __name__ == "__main__":
+    main()

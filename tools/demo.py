@@ -1,0 +1,197 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The main job, start to end: a mesh is touched in Blender, a patch rebuilt, reported, drawn and saved.
+
+`make demo` runs it on Suzanne, `make demo MESH=FILE` on a .ply, .stl, .obj or .blend file.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from tools import blender
+
+SPOT = (0.32, -0.19, 0.84)  # on Suzanne's forehead
+NOISE = 1.0 / 150.0  # of the extent; 0.05 mm on a 60 mm object
+WIDTH, HEIGHT = 1200, 900
+BAR_STEPS = 128
+BAR_REACH = 1.5  # patch radii from the middle of the bar to either end
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--zip", required=True, type=Path, help="the built extension")
+    parser.add_argument("--mesh", default="", help="a mesh file; Suzanne without")
+    options = parser.parse_args()
+    extension = blender.start(options.zip)
+    import bpy
+
+    try:
+        patch = touch(extension, options.mesh)
+    except (RuntimeError, OSError) as error:
+        sys.exit(f"demo: {str(error).strip()}")
+    report = patch[extension.tactile_addon.patch_object.RECORD].to_dict()
+    print(extension.tactile_addon.report.readable(report))
+    compose(extension, patch, "unit" if options.mesh else "m")
+    bpy.ops.wm.save_as_mainfile(filepath=str(blender.BUILD / "demo.blend"))
+    render(patch, blender.BUILD / "demo.png")
+    print(f"saved {blender.BUILD / 'demo.blend'} and {blender.BUILD / 'demo.png'}")
+
+
+def touch(extension, mesh=""):
+    """Fills the scene with the mesh and reconstructs one patch on it; returns the patch object."""
+    import bpy
+
+    if mesh:
+        extension.tactile_addon.command_line.open_file(Path(mesh))
+        target = next(o for o in bpy.context.scene.objects if o.type == "MESH" and len(o.data.polygons))
+        corners = np.array([target.matrix_world @ type(target.location)(c) for c in target.bound_box])
+        location, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
+        # From the front and a little above, as one would look at it.
+        ray = np.array([0.0, 2.0, -1.0]) / np.sqrt(5.0)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        hit, point, *_ = bpy.context.scene.ray_cast(depsgraph, location - 2.0 * size * ray, ray)
+        location = tuple(point) if hit else tuple(location)
+        extent = size / 8.0
+    else:
+        bpy.ops.wm.read_homefile(use_empty=True)
+        bpy.ops.mesh.primitive_monkey_add(size=2.0)
+        target = bpy.context.object
+        target.modifiers.new("Subdivision", "SUBSURF").levels = 3
+        bpy.ops.object.shade_smooth()
+        location, extent = SPOT, 0.3
+    bpy.ops.tactile.reconstruct(target=target.name, location=location, extent=extent, noise=NOISE * extent)
+    return bpy.context.view_layer.objects.active
+
+
+def compose(extension, patch, unit):
+    """Camera, light, a colour bar and labels for a picture of the patch, whose colours come out true."""
+    import bpy
+    from mathutils import Matrix, Vector
+
+    report = patch[extension.tactile_addon.patch_object.RECORD].to_dict()
+    radius, scene = report["radius"], bpy.context.scene
+    point, normal = Vector(report["frame"]["origin"]), Vector(report["frame"]["normal"])
+    upright = Vector((0, 0, 1)) if abs(normal.z) < 0.9 else Vector((0, 1, 0))
+    right = upright.cross(normal).normalized()
+    view = (normal - 0.2 * right - 0.6 * normal.cross(right)).normalized()
+    right = normal.cross(right).cross(view).normalized()
+
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 7.0 * radius
+    away = 100.0 * radius
+    camera.data.clip_end = 10.0 * away
+    axes = Matrix((right, view.cross(right), view)).transposed()
+    camera.matrix_world = Matrix.LocRotScale(point + away * view, axes, None)
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.data.angle = 2.0, 0.3
+    sun.matrix_world = camera.matrix_world @ Matrix.Rotation(-0.6, 4, "X") @ Matrix.Rotation(-0.6, 4, "Y")
+    for obj in (camera, sun):
+        scene.collection.objects.link(obj)
+    scene.camera = camera
+
+    material = extension.tactile_addon.patch_object.emission
+    ink = material("Ink", colour=(0.01, 0.01, 0.01, 1.0))
+    put = _Overlay(camera, radius, ink)
+    _colour_bar(extension, put, report["colour_limit"], unit)
+    put.text(f"{report['source']}, touched at {report['contacts']} points", -3.3, 2.25, 0.21)
+    off = 100.0 * report["vertex_distance_mean"] / radius
+    put.text(
+        f"principal curvatures {report['k1']:.3g} and {report['k2']:.3g} 1/{unit} at the point, "
+        f"{report['vertices']} mesh vertices off the patch by {off:.1f} % "
+        "of its radius in the mean",
+        -3.3,
+        -2.45,
+        0.14,
+    )
+    _look(scene, bpy.data.objects[report["source"]])
+
+
+class _Overlay:
+    """Places things in front of the camera, in units of the patch radius from the picture's centre."""
+
+    def __init__(self, camera, radius, ink):
+        self.camera, self.radius, self.ink = camera, radius, ink
+
+    def add(self, name, data, x, y):
+        import bpy
+
+        obj = bpy.data.objects.new(name, data)
+        obj.parent = self.camera
+        obj.location = (x * self.radius, y * self.radius, -self.radius)
+        obj.scale = (self.radius,) * 3
+        bpy.context.scene.collection.objects.link(obj)
+        return obj
+
+    def text(self, body, x, y, size):
+        import bpy
+
+        text = bpy.data.curves.new("Label", "FONT")
+        text.body, text.size = body, size
+        text.materials.append(self.ink)
+        self.add("Label", text, x, y)
+
+
+def _colour_bar(extension, put, limit, unit):
+    """A strip with the patch's own material from -limit to limit, ticks and a title."""
+    import bpy
+
+    module = extension.tactile_addon
+    at = np.linspace(-1.0, 1.0, BAR_STEPS + 1)
+    points = np.array([(x, BAR_REACH * y, 0.0) for y in at for x in (0.0, 0.2)])
+    corners = 2 * np.arange(BAR_STEPS)[:, None]
+    triangles = np.vstack([corners + corner for corner in ((0, 1, 3), (0, 3, 2))])
+    colours = module.colours.diverging(np.repeat(at, 2), 1.0)
+    attributes = [(module.patch_object.COLOUR, "FLOAT_COLOR", colours)]
+    strip = module.patch_object.triangle_mesh("Colour Bar", points, triangles, attributes)
+    strip.materials.append(bpy.data.materials["Tactile Curvature"])
+    put.add("Colour Bar", strip, 2.35, 0.0)
+    put.text("Gaussian curvature", 1.6, BAR_REACH + 0.45, 0.18)
+    put.text(f"in 1/{unit}²", 2.25, BAR_REACH + 0.2, 0.18)
+    for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
+        put.text(f"{share * limit:+.3g}" if share else "0", 2.62, BAR_REACH * share - 0.05, 0.15)
+
+
+def _look(scene, source):
+    """Clay for the mesh, a light background, and colours that reach the file as they are."""
+    import bpy
+
+    if not any(slot.material for slot in source.material_slots):
+        clay = bpy.data.materials.new("Clay")
+        if clay.node_tree is None:
+            clay.use_nodes = True
+        clay.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.35, 0.35, 0.34, 1.0)
+        clay.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.8
+        source.data.materials.append(clay)
+    world = bpy.data.worlds.new("Light")
+    if world.node_tree is None:
+        world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.8, 0.82, 0.85, 1.0)
+    scene.world = world
+    scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
+    scene.render.dither_intensity = 0.0
+
+
+def render(patch, path):
+    """Draws the scene with Cycles; patch and contours, which lie in the mesh, come nearer for that.
+
+    The camera is orthographic, so the move does not show.
+    """
+    import bpy
+
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+    scene.cycles.samples, scene.cycles.use_denoising = 32, False
+    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
+    scene.render.image_settings.file_format, scene.render.filepath = "PNG", str(path)
+    towards = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
+    (lines,) = patch.children
+    patch.delta_location, lines.delta_location = towards, patch.matrix_world.to_3x3().inverted() @ towards
+    bpy.ops.render.render(write_still=True)
+    patch.delta_location = lines.delta_location = (0.0, 0.0, 0.0)
+
+
+if __name__ == "__main__":
+    main()
