@@ -17,8 +17,11 @@ import json
 import random
 import sys
 
-import addon_utils
 import bpy
+
+# isort: split
+# Blender's own modules can be found once bpy is there.
+import addon_utils
 
 # A no-op where the extension is enabled already, as it is in an installed Blender.
 addon_utils.enable("bl_ext.user_default.tactile_patch", default_set=False)

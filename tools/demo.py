@@ -174,7 +174,7 @@ def _look(scene, source):
     scene.render.dither_intensity = 0.0
 
 
-def render(patch, path):
+def render(patch, path, samples=32):
     """Draws the scene with Cycles; patch and contours, which lie in the mesh, come nearer for that.
 
     The camera is orthographic, so the move does not show.
@@ -183,7 +183,7 @@ def render(patch, path):
 
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
-    scene.cycles.samples, scene.cycles.use_denoising = 32, False
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
     scene.render.image_settings.file_format, scene.render.filepath = "PNG", str(path)
     towards = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05

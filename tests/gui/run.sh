@@ -1,0 +1,54 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+
+# run.sh ZIP: what only a real Blender can show, with the zip without wheels installed in it: the
+# command line, the example script, and the menu entry, mouse and keyboard in a window. The pictures
+# are in build/gui, to be looked at.
+set -euo pipefail
+[ $# = 1 ] || { echo "usage: run.sh ZIP" >&2; exit 2; }
+zip=$(readlink -f "$1")
+[ -f "$zip" ] || { echo "run.sh: there is no file $1" >&2; exit 2; }
+cd "$(dirname "$0")/../.."
+
+gui=../shared/blender/gui.sh
+out=build/gui
+log=$out/log.txt
+export BLENDER_USER_RESOURCES=build/gui-user
+rm -rf "$out" "$BLENDER_USER_RESOURCES"
+mkdir -p "$out"
+cp "$zip" "$out/tactile_patch.zip"
+
+# step WHAT COMMAND...: the command prints its checks; it fails as a whole where it ends otherwise than with 0.
+step() {
+  local what=$1 code=0
+  shift
+  "$@" >"$out/step.txt" 2>&1 || code=$?
+  cat "$out/step.txt" >>"$log"
+  grep -E '^(ok|FAILED|skipped): ' "$out/step.txt" || true
+  if [ "$code" != 0 ]; then
+    tail -n 30 "$out/step.txt" >&2
+    echo "FAILED: $what ended with $code" | tee -a "$log"
+  elif ! grep -qE '^(ok|FAILED|skipped): ' "$out/step.txt"; then
+    echo "ok: $what" | tee -a "$log"
+  fi
+}
+
+step "the zip installs as an extension" \
+  $gui run --command extension install-file "$out/tactile_patch.zip" -r user_default -e
+step "a scene to touch is made" \
+  $gui run --python-exit-code 4 --python tests/gui/make_scene.py -- "$out"
+step "the shell's checks" $gui sh python3 tests/gui/shell.py "$out"
+GUI_ARGS="$out/scene.blend" step "the window's checks" \
+  $gui shot tests/gui/window.py "$out/window.png"
+if [ -e ../shared/data/meshes/pear.ply ]; then
+  GUI_BIND=$(readlink -f ../shared/data) step "the pear's checks" \
+    $gui shot tests/gui/pear.py "$out/pear.png"
+else
+  echo "skipped: the scan of a pear, there is no ../shared/data."
+fi
+
+passed=$(grep -c '^ok: ' "$log" || true)
+failed=$(grep -c '^FAILED: ' "$log" || true)
+echo "$passed passed, $failed failed"
+[ "$failed" = 0 ]

@@ -1,0 +1,8 @@
+import gui
+
+
+def s():
+    yield 1
+
+
+gui.play(s())

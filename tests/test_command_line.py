@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line, called as Blender calls it; a real `blender -c` is in tests/gui."""
+
+import json
+
+import pytest
+
+PLACE = ["--location", "0.3", "-2e-1", "1.9", "--extent", "0.6"]
+
+
+@pytest.fixture
+def command(extension, capfd):
+    """Runs the command with these words: exit code, standard output, standard error."""
+
+    def run(*words):
+        try:
+            code = extension.tactile_addon.command_line.main([str(word) for word in words])
+        except SystemExit as ended:
+            code = ended.code
+        return code, *capfd.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def files(empty, tmp_path):
+    """One ball as a .ply, .stl, .obj and .blend."""
+    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
+    empty.ops.wm.ply_export(filepath=str(tmp_path / "ball.ply"))
+    empty.ops.wm.stl_export(filepath=str(tmp_path / "ball.stl"))
+    empty.ops.wm.obj_export(filepath=str(tmp_path / "ball.obj"), forward_axis="Y", up_axis="Z")
+    empty.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ball.blend"))
+    return tmp_path
+
+
+def test_a_patch_from_every_kind_of_file(command, files):
+    reports = []
+    for kind in ("ply", "stl", "obj", "blend"):
+        code, out, _ = command("reconstruct", files / f"ball.{kind}", *PLACE, "--json", "-")
+        assert code == 0
+        (line,) = [line for line in out.splitlines() if line.startswith("{")]
+        reports.append(json.loads(line))
+    for report in reports:
+        assert report["status"] == "ok"
+        assert report["k1"] == pytest.approx(-0.5, rel=0.05)
+        assert report["frame"]["origin"] == pytest.approx(reports[0]["frame"]["origin"], abs=1e-5)
+
+
+def test_every_option_arrives(command, files):
+    options = ["--target", "Sphere", "--normal", "0.1", "-0.1", "1", "--step", "0.05", "--noise", "1e-3"]
+    options += ["--seed", "4", "--azimuths", "-10", "40", "85", "130", "--tilts", "5", "0", "-5", "0"]
+    options += ["--method", "quadratic-variation", "--degree", "5", "--weight", "500", "--solver", "fast"]
+    path, output = files / "report.json", files / "out.blend"
+    arguments = (*PLACE, *options, "--json", path, "--output", output)
+    code, out, err = command("reconstruct", files / "ball.blend", *arguments)
+    assert (code, err) == (0, "")
+    assert "kappa1, kappa2" in out
+    report = json.loads(path.read_text())
+    assert [report[key] for key in ("method", "degree", "seed")] == ["quadratic-variation", 5, 4]
+    assert report["step"] == pytest.approx(0.05)
+    assert report["noise"] == pytest.approx(1e-3)
+    assert [angle for plane in report["planes"] for angle in plane] == pytest.approx(
+        [-10, 5, 40, 0, 85, -5, 130, 0], abs=1e-4
+    )
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(output))
+    assert bpy.data.objects["Sphere Patch"]["tactile"]["degree"] == 5
+
+
+def test_the_open_scene_is_touched_without_a_file(command, files):
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(files / "ball.blend"))
+    bpy.context.view_layer.objects.active = None
+    code, out, _ = command("reconstruct", *PLACE)
+    assert code == 0
+    assert "touched" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["missing.ply", *PLACE], 'there is no file "missing.ply"'),
+        (["{folder}/ball.txt", *PLACE], "wanted a .blend, .ply, .stl or .obj file"),
+        (["{folder}/cut.ply", *PLACE], ""),
+        (["{folder}/cut.blend", *PLACE], ""),
+        (["{folder}/text.obj", *PLACE], "no mesh could be read"),
+        (["{folder}/ball.ply", "--location", "9", "9", "9"], "The location is"),
+        (["{folder}/ball.ply", *PLACE, "--target", "Nobody"], 'There is no object "Nobody"'),
+        (["{folder}/ball.ply", *PLACE, "--json", "{folder}/no/such/report.json"], "No such file"),
+        (["{folder}/ball.ply", *PLACE, "--output", "{folder}/no/such/out.blend"], ""),
+    ],
+)
+def test_what_cannot_be_done_exits_with_1_and_a_sentence(command, files, words, sentence):
+    (files / "ball.txt").write_text("a ball")
+    (files / "text.obj").write_text("a ball")
+    for kind in ("ply", "blend"):
+        (files / f"cut.{kind}").write_bytes((files / f"ball.{kind}").read_bytes()[:2000])
+    code, out, err = command("reconstruct", *(str(word).format(folder=files) for word in words))
+    assert code == 1
+    assert err.splitlines()[-1].startswith("tactile: ")
+    assert sentence in err.splitlines()[-1]
+    assert "Traceback" not in out + err
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([], "COMMAND"),
+        (["reconstruct", "--degree", "9"], "--degree"),
+        (["reconstruct", "--method", "magic"], "--method"),
+        (["reconstruct", "--location", "1", "2"], "--location"),
+        (["reconstruct", "--azimuths", "0", "60"], "--azimuths: wanted three to six, got 2"),
+        (["reconstruct", "--tilts", "0", "60"], "--tilts: wanted as many as there are planes"),
+        (["reconstruct", "--nonsense"], "--nonsense"),
+    ],
+)
+def test_bad_arguments_exit_with_2(command, empty, words, sentence):
+    code, out, err = command(*words)
+    assert code == 2
+    assert sentence in err
+    assert "{" not in out
+
+
+def test_help(command):
+    code, out, _ = command("reconstruct", "--help")
+    assert code == 0
+    assert "--azimuths" in out
