@@ -124,10 +124,15 @@ def open_file(path):
     if path.suffix.lower() not in imports:
         raise OSError(f'cannot read "{path.name}": wanted a .blend, .ply, .stl or .obj file')
     bpy.ops.wm.read_homefile(use_empty=True)
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        imports[path.suffix.lower()]()
+    unreadable = f'no mesh could be read from "{path.name}": is the file whole?'
+    try:
+        # Importers ask for a window, which is not the current one after `blender -b`.
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            imports[path.suffix.lower()]()
+    except RuntimeError as error:
+        raise OSError(unreadable) from error
     if not any(len(mesh.polygons) for mesh in bpy.data.meshes):
-        raise OSError(f'no mesh could be read from "{path.name}": is the file whole?')
+        raise OSError(unreadable)
 
 
 def _default_target():
