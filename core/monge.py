@@ -73,8 +73,7 @@ class MongePatch:
         """Height, slopes and second derivatives at (x, y)."""
         x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         flat = x_array.ravel(), y_array.ravel()
-        terms = exponents(2, self.degree)
-        a = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
+        terms, a = self._terms()
         orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
         return Derivatives(
             *((monomials(*flat, terms, dx, dy) @ a).reshape(x_array.shape) for dx, dy in orders)
@@ -82,7 +81,14 @@ class MongePatch:
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """z(x, y)."""
-        return self.derivatives(x, y).z
+        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        terms, a = self._terms()
+        return (monomials(x_array.ravel(), y_array.ravel(), terms) @ a).reshape(x_array.shape)
+
+    def _terms(self) -> tuple[list[tuple[int, int]], Array]:
+        """All terms of (1) and their coefficients, the quadric's among them."""
+        quadric = [self.k1 / 2.0, 0.0, self.k2 / 2.0]
+        return exponents(2, self.degree), np.concatenate([quadric, self.coefficients])
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Unit normal on the side of +z, shape (..., 3)."""
@@ -125,26 +131,27 @@ class MongePatch:
         a step that does not shorten the distance is halved.
         """
         q = np.asarray(points, dtype=float)
-        foot = q[:, :2].copy()
-        damping = np.ones(len(q))
-        d = self.derivatives(foot[:, 0], foot[:, 1])
-        squared = (d.z - q[:, 2]) ** 2
+        foot, damping = q[:, :2].copy(), np.ones(len(q))
+        nearest = np.abs(self.height(*foot.T) - q[:, 2])
+        close_enough = 1e-11 * np.abs(q).max(initial=0.0)
+        active = np.arange(len(q))
         for _ in range(50):
-            step = damping[:, None] * _newton_step(d, foot, q)
-            trial = foot + step
-            d_trial = self.derivatives(trial[:, 0], trial[:, 1])
-            squared_trial = ((trial - q[:, :2]) ** 2).sum(axis=1) + (d_trial.z - q[:, 2]) ** 2
-            nearer = squared_trial <= squared
-            foot[nearer], squared[nearer] = trial[nearer], squared_trial[nearer]
-            d = Derivatives(*(np.where(nearer, new, old) for new, old in zip(d_trial, d, strict=True)))
-            damping = np.where(nearer, np.minimum(2.0 * damping, 1.0), 0.5 * damping)
-            if np.all(np.abs(step) <= 1e-12 * (np.abs(q[:, :2]) + np.abs(step).max(initial=0.0))):
+            step = damping[active, None] * _newton_step(self, foot[active], q[active])
+            trial = foot[active] + step
+            lifted = np.column_stack([trial, self.height(*trial.T)])
+            distance = np.linalg.norm(lifted - q[active], axis=1)
+            nearer = distance <= nearest[active]
+            foot[active[nearer]], nearest[active[nearer]] = trial[nearer], distance[nearer]
+            damping[active] = np.where(nearer, np.minimum(2.0 * damping[active], 1.0), 0.5 * damping[active])
+            active = active[np.abs(step).max(axis=1, initial=0.0) > close_enough]
+            if not len(active):
                 break
-        return np.column_stack([foot, d.z])
+        return np.column_stack([foot, self.height(*foot.T)])
 
 
-def _newton_step(d: Derivatives, foot: Array, q: Array) -> Array:
+def _newton_step(patch: MongePatch, foot: Array, q: Array) -> Array:
     """-H^-1 g of half the squared distance, (n, 2); where H is not positive, without its z'' part."""
+    d = patch.derivatives(*foot.T)
     above = d.z - q[:, 2]
     gx, gy = foot[:, 0] - q[:, 0] + above * d.x, foot[:, 1] - q[:, 1] + above * d.y
     hxx, hxy, hyy = 1.0 + d.x**2 + above * d.xx, d.x * d.y + above * d.xy, 1.0 + d.y**2 + above * d.yy

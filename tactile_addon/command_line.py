@@ -101,8 +101,11 @@ def _reconstruct(options):
         arguments["tilts"] = _six_radians(options.tilts)
     if options.file is not None:
         open_file(options.file)
+    before = set(bpy.data.objects)
     bpy.ops.tactile.reconstruct(target=options.target or _default_target(), **arguments)
-    report = bpy.context.view_layer.objects.active[patch_object.RECORD].to_dict()
+    # By name it may be another, and it is not active where the scene was saved in edit mode.
+    (patch,) = (obj for obj in set(bpy.data.objects) - before if patch_object.RECORD in obj)
+    report = patch[patch_object.RECORD].to_dict()
     if options.output is not None:
         bpy.ops.wm.save_as_mainfile(filepath=str(options.output.absolute()))
     return report

@@ -13,7 +13,7 @@ from mathutils.bvhtree import BVHTree
 class MeshSurface:
     """The evaluated mesh of an object; core.track touches it through `ray_cast`.
 
-    vertices, normals : (n, 3), of all its vertices; the normals have any length
+    size : its largest extent along a world axis
 
     The transform runs in Python floats: mathutils rounds to float32, which far from the world's
     origin is coarser than the mesh.
@@ -41,15 +41,12 @@ class MeshSurface:
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
         if not len(self._mesh.polygons):
             raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
-        co, normals = (np.empty((len(self._mesh.vertices), 3), dtype=np.float32) for _ in range(2))
-        self._mesh.vertices.foreach_get("co", co.ravel())
-        if not np.isfinite(co).all():
+        self._co = _coordinates(self._mesh)
+        if not np.isfinite(self._co).all():
             raise ValueError(
                 f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers'
             )
-        self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
-        self.vertices = co @ self._linear.T + self._origin
-        self.normals = normals @ self._inverse
+        self.size = float(np.ptp(np.array(evaluated.bound_box) @ self._linear.T, axis=0).max())
 
     def ray_cast(self, origin, direction, distance):
         """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
@@ -62,6 +59,18 @@ class MeshSurface:
         )
         return (self._to_world(point), self._normal_to_world(normal)) if hit else None
 
+    def vertices_near(self, point, radius):
+        """World coordinates and normals, of any length, of the vertices within `radius` of a world point."""
+        # A sphere of the world is an ellipsoid in the object: its longest axis bounds it.
+        reach = radius * np.linalg.norm(self._inverse, ord=2)
+        local = self._co - self._to_local(point).astype(np.float32)
+        near = np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
+        normals = [self._mesh.vertex_normals[i].vector for i in near.tolist()]
+        return (
+            self._co[near] @ self._linear.T + self._origin,
+            np.array(normals).reshape(-1, 3) @ self._inverse,
+        )
+
     def project(self, location):
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""
         local = self._to_local(location)
@@ -70,7 +79,7 @@ class MeshSurface:
             # Nearest within a stretched object is not nearest in the world.
             stretched = bmesh.new()
             stretched.from_mesh(self._mesh)
-            for vertex, co in zip(stretched.verts, self.vertices - self._origin, strict=True):
+            for vertex, co in zip(stretched.verts, self._co @ self._linear.T, strict=True):
                 vertex.co = co
             nearest = BVHTree.FromBMesh(stretched).find_nearest(Vector(np.subtract(location, self._origin)))[
                 0
@@ -128,6 +137,17 @@ class MeshSurface:
         x, y, z = _product(zip(*self._inverse_rows, strict=True), normal)
         length = math.hypot(x, y, z)
         return x / length, y / length, z / length
+
+
+def _coordinates(mesh):
+    """Of all vertices in the object, (n, 3) float32; by the attribute where there is one: 30 times faster."""
+    co = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    position = mesh.attributes.get("position")  # none in edit mode
+    if position is None:
+        mesh.vertices.foreach_get("co", co.ravel())
+    else:
+        position.data.foreach_get("vector", co.ravel())
+    return co
 
 
 def _require_invertible(name, linear):

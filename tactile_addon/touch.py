@@ -36,7 +36,8 @@ def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed
     clock.append(perf_counter())
     result = core.reconstruct(point, contours, outward=outward, **fit)
     clock.append(perf_counter())
-    over = core.overlapped(result.frame, result.domain, result.radius, surface.vertices, surface.normals)
+    around = surface.vertices_near(point, 2.0 * result.radius)
+    over = core.overlapped(result.frame, result.domain, result.radius, *around)
     misses = core.distances(result.patch, over)
     clock.append(perf_counter())
     seconds = dict(zip(("prepare", "track", "fit", "verify"), np.diff(clock).tolist(), strict=True))
@@ -63,7 +64,7 @@ def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed
 
 def _lengths(name, surface, extent, step, noise):
     """Extent and step, chosen by the object's size where they are 0."""
-    size = float(np.ptp(surface.vertices, axis=0).max())
+    size = surface.size
     if min(extent, step, noise) < 0.0:
         raise ValueError(
             f"Extent, step and noise are lengths of 0 or more, got {extent:g}, {step:g} and {noise:g}"
