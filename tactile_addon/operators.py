@@ -125,6 +125,18 @@ class TACTILE_OT_reconstruct(bpy.types.Operator):
         self.report({"INFO"} if result.status == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        for name in ("target", "location", "normal", "extent", "step", "plane_count"):
+            layout.prop(self, name)
+        for i in range(self.plane_count):
+            row = layout.row(align=True)
+            row.prop(self, "azimuths", index=i, text=f"Plane {i + 1} Azimuth, Tilt")
+            row.prop(self, "tilts", index=i, text="")
+        for name in ("noise", "seed", "method", "degree", "weight", "solver"):
+            layout.prop(self, name)
+
     def _touch(self, context, obj):
         given = self.properties.is_property_set
         count = self.plane_count
