@@ -9,11 +9,26 @@ own stands in for the user's.
 import importlib
 import os
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 BUILD = Path(__file__).resolve().parents[1] / "build"
 RESOURCES = BUILD / "blender-{}.{}".format(*sys.version_info)
 os.environ["BLENDER_USER_RESOURCES"] = str(RESOURCES)
+
+
+@contextmanager
+def quiet():
+    """Keeps what Blender itself prints, a line a second and more, out of standard output."""
+    sys.stdout.flush()
+    output = os.dup(1)
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+    try:
+        yield
+    finally:
+        os.dup2(output, 1)
+        os.close(output)
 
 
 def start(extension):

@@ -29,14 +29,15 @@ def main():
     import bpy
 
     try:
-        patch = touch(extension, options.mesh)
+        with blender.quiet():
+            patch = touch(extension, options.mesh)
+            compose(extension, patch, "unit" if options.mesh else "m")
+            bpy.ops.wm.save_as_mainfile(filepath=str(blender.BUILD / "demo.blend"))
+            render(patch, blender.BUILD / "demo.png")
     except (RuntimeError, OSError) as error:
         sys.exit(f"demo: {str(error).strip()}")
     report = patch[extension.tactile_addon.patch_object.RECORD].to_dict()
     print(extension.tactile_addon.report.readable(report))
-    compose(extension, patch, "unit" if options.mesh else "m")
-    bpy.ops.wm.save_as_mainfile(filepath=str(blender.BUILD / "demo.blend"))
-    render(patch, blender.BUILD / "demo.png")
     print(f"saved {blender.BUILD / 'demo.blend'} and {blender.BUILD / 'demo.png'}")
 
 
@@ -98,13 +99,9 @@ def compose(extension, patch, unit):
     _colour_bar(extension, put, report["colour_limit"], unit)
     put.text(f"{report['source']}, touched at {report['contacts']} points", -3.3, 2.25, 0.21)
     off = 100.0 * report["vertex_distance_mean"] / radius
+    put.text(f"principal curvatures {report['k1']:.3g} and {report['k2']:.3g} 1/{unit}", -3.3, -2.25, 0.14)
     put.text(
-        f"principal curvatures {report['k1']:.3g} and {report['k2']:.3g} 1/{unit} at the point, "
-        f"{report['vertices']} mesh vertices off the patch by {off:.1f} % "
-        "of its radius in the mean",
-        -3.3,
-        -2.45,
-        0.14,
+        f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius in the mean", -3.3, -2.48, 0.14
     )
     _look(scene, bpy.data.objects[report["source"]])
 
