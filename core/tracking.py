@@ -143,13 +143,18 @@ def track(
 def _first_contact(surface: Surface, p: Vector, n: Vector, step: float) -> tuple[Vector, Vector, float]:
     """The contact at the reference point, the normal there on the side of `n`, and that side's sign."""
     reach = 0.1 * step  # shorter than a step: a wall close above the point is not the point's
-    hit = surface.ray_cast(_along(p, n, reach), _scaled(n, -1.0), 2.0 * reach)
-    if hit is None:
-        raise ValueError(
-            f"point: wanted one on the surface, got one with no surface within {reach:g} along the normal"
+    e1, _, e2 = (_vector(axis) for axis in SamplingPlane(0.0).axes(n).T)
+    # On an edge or a vertex of a mesh a ray may slip between the faces: a hair's breadth beside it does not.
+    for aside, length in ((e1, 0.0), (e1, 1e-3), (e2, 1e-3), (e1, -1e-3), (e2, -1e-3)):
+        hit = surface.ray_cast(
+            _along(_along(p, aside, length * step), n, reach), _scaled(n, -1.0), 2.0 * reach
         )
-    side = math.copysign(1.0, _dot(_vector(hit[1]), n))
-    return _vector(hit[0]), _scaled(_vector(hit[1]), side), side
+        if hit is not None:
+            side = math.copysign(1.0, _dot(_vector(hit[1]), n))
+            return _vector(hit[0]), _scaled(_vector(hit[1]), side), side
+    raise ValueError(
+        f"point: wanted one on the surface, got one with no surface within {reach:g} along the normal"
+    )
 
 
 def _half_contour(

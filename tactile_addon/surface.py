@@ -57,7 +57,8 @@ class MeshSurface:
         hit, point, normal, _ = self._object.ray_cast(
             origin, direction, distance=distance * scale, depsgraph=self._depsgraph
         )
-        return (self._to_world(point), self._normal_to_world(normal)) if hit else None
+        # A face of no area has no normal, and nothing of it can be felt.
+        return (self._to_world(point), self._normal_to_world(normal)) if hit and any(normal) else None
 
     def vertices_near(self, point, radius):
         """World coordinates and normals, of any length, of the vertices within `radius` of a world point."""
@@ -87,6 +88,8 @@ class MeshSurface:
             stretched.free()
             local = self._inverse @ nearest
         point, normal = self._nearest(local)
+        if not any(normal):
+            raise ValueError("The location is on a face of no area: move it, or dissolve degenerate faces")
         point = self._to_world(point)
         return point, self._normal_to_world(normal), math.dist(location, point)
 

@@ -168,3 +168,15 @@ def test_contours_take_lists_and_refuse_nonsense():
     for points in ([[0, 0]], [1, 2, 3], [[0, 0, np.nan]], "abc"):
         with pytest.raises(ValueError, match="points: wanted"):
             Contour(points)
+
+
+def test_a_point_where_rays_slip_between_faces_is_still_on_the_surface():
+    class Slit(Facets):
+        """Lets rays through within 1e-9 of the y axis, as the edge between two faces of a mesh may."""
+
+        def ray_cast(self, origin, direction, distance):
+            return None if abs(origin[0]) < 1e-9 else super().ray_cast(origin, direction, distance)
+
+    (contour,) = track(Slit(*FLOOR), (0, 0, 0), (0, 0, 1), [SamplingPlane(0.0)], extent=5, step=1)
+    assert contour.stops == ("extent", "extent")
+    assert np.array_equal(contour.points[5], (0, 0, 0))
