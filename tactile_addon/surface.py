@@ -82,11 +82,10 @@ class MeshSurface:
             stretched.from_mesh(self._mesh)
             for vertex, co in zip(stretched.verts, self._co @ self._linear.T, strict=True):
                 vertex.co = co
-            nearest = BVHTree.FromBMesh(stretched).find_nearest(Vector(np.subtract(location, self._origin)))[
-                0
-            ]
+            offset = Vector(np.subtract(location, self._origin))
+            nearest, *_ = BVHTree.FromBMesh(stretched).find_nearest(offset)
             stretched.free()
-            local = self._inverse @ nearest
+            local = local if nearest is None else self._inverse @ nearest
         point, normal = self._nearest(local)
         if not any(normal):
             raise ValueError("The location is on a face of no area: move it, or dissolve degenerate faces")

@@ -13,7 +13,8 @@ bpy.data.objects.remove(bpy.data.objects["Cube"])
 bpy.ops.mesh.primitive_monkey_add(rotation=(0.1, 0.2, 0.3), location=(0.3, -0.2, 0.1))
 suzanne = bpy.context.object
 suzanne.scale = (1.2, 0.8, 1.0)
-suzanne.modifiers.new("Subdivision", "SUBSURF").levels = 3
+modifier = suzanne.modifiers.new("Subdivision", "SUBSURF")
+modifier.levels = modifier.render_levels = 3  # the exports of .ply and .stl take the level of rendering
 bpy.context.view_layer.update()
 
 evaluated = suzanne.evaluated_get(bpy.context.evaluated_depsgraph_get())

@@ -15,6 +15,7 @@ scene, out = str(folder / "scene.blend"), folder / "out.blend"
 
 
 def check(what, good, detail=""):
+    detail = " | ".join(str(detail).strip().splitlines())
     print(f"ok: {what}" if good else f"FAILED: {what}: {detail}", flush=True)
 
 
@@ -52,12 +53,13 @@ def report_of(what, *args):
 
 def check_files(first):
     """The same point of the same surface, from a file of each kind."""
-    point = first["frame"]["origin"]
+    # The extent too: where none is given it follows the object's bounding box, which an import may turn.
+    same = ["--location", *first["frame"]["origin"], "--extent", first["extent"]]
     for background in ([], ["-b"]):
         for kind in ("blend", "ply", "stl", "obj"):
             what = f"blender {' '.join([*background, '-c'])} tactile reconstruct scene.{kind}"
             file = folder / f"scene.{kind}"
-            report = report_of(what, *background, "-c", "tactile", "reconstruct", file, "--location", *point)
+            report = report_of(what, *background, "-c", "tactile", "reconstruct", file, *same)
             if report is not None:
                 check(
                     f"{what}: as on the open scene",
@@ -123,16 +125,14 @@ def check_example():
     lines = [json.loads(line) for line in stdout.splitlines() if line.startswith("{")]
     good = code == 0 and "Traceback" not in stdout + stderr
     check("examples/many_patches.py runs", good, f"code {code}\n{stderr}\n{stdout}")
-    check("... and prints a line of JSON for each of 6 patches", len(lines) == 6, f"{len(lines)}\n{stderr}")
-    good = all(line["k1"] <= line["k2"] and line["status"] for line in lines)
-    check("... with k1 <= k2 and a status", good, lines)
-    names = [line.get("object", line.get("patch")) for line in lines]
+    check("... and prints a line of JSON for each of 6 places", len(lines) == 6, stdout + stderr)
+    patches = [line for line in lines if "error" not in line]
+    good = len(patches) >= 3 and all(line["k1"] <= line["k2"] and line["status"] for line in patches)
+    check(f"... {len(patches)} of them patches, with k1 <= k2 and a status", good, lines)
     probe = "import bpy; print('NAMES', sorted(o.name for o in bpy.data.objects if 'tactile' in o))"
-    found = next(
-        (s for s in blender("-b", saved, "--python-expr", probe)[1].splitlines() if "NAMES" in s), ""
-    )
-    good = len(set(names)) == 6 and all(repr(name) in found for name in names)
-    check("... and its --output holds them all", good, f"{names}, found {found}")
+    found = [line for line in blender("-b", saved, "--python-expr", probe)[1].splitlines() if "NAMES" in line]
+    good = found == [f"NAMES {sorted({line['patch'] for line in patches})}"]
+    check("... and its --output holds them", good, found)
 
 
 first = report_of(
