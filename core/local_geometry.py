@@ -71,8 +71,8 @@ def curve_through(contour: Contour, point: Array, name: str = "the curve") -> Cu
     if len(r) < LEAST_CONTACTS:
         why = f" (it ended by: {', '.join(contour.stops)})" if contour.stops else ""
         raise DegenerateCurvesError(
-            f"{name} has {len(r)} contacts besides the reference point, {LEAST_CONTACTS} are needed{why}: "
-            "move the point away from the edge, or take a shorter step"
+            f"{name} has {len(r)} of the {LEAST_CONTACTS} contacts it needs besides the reference point"
+            f"{why}: move the point away from the crease or edge there, or take a shorter step"
         )
     near = np.argsort(distance, kind="stable")[:WINDOW]
     direction = np.linalg.svd(r[near] / distance[near].max(), full_matrices=False)[2][0]

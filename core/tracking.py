@@ -119,7 +119,7 @@ def track(
         raise ValueError(f"step: wanted no more than the extent {extent:g}, got {step:g}")
     noise = number("noise", noise, least=0.0)
     generator = np.random.default_rng(rng)
-    count = math.floor(extent / step * (1.0 + 1e-9))
+    count = math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
     start, up, side = _first_contact(surface, _vector(p), _vector(n), step)
     contours = []
     for plane in planes:

@@ -26,8 +26,9 @@ def distances(patch: MongePatch, points: ArrayLike) -> Array:
 def overlapped(frame: Frame, domain: Domain, radius: float, vertices: ArrayLike, normals: ArrayLike) -> Array:
     """The mesh vertices that lie over the domain, in the local frame, (m, 3) of world (n, 3).
 
-    A closed object has another side above the same domain, and may have inner walls: a vertex
-    counts only where its normal faces the patch's and it is within the radius of the tangent plane.
+    A closed object has another side above the same domain: a vertex counts only where its normal
+    faces the patch's and it is within the radius of the tangent plane. Whether another layer of the
+    object hides it from a finger, the caller must tell.
     """
     local = frame.to_local(vertices)
     near = np.flatnonzero((np.abs(local) <= 2.0 * radius).all(axis=1) & (np.abs(local[:, 2]) <= radius))

@@ -99,6 +99,9 @@ def _reconstruct(options):
         if len(options.tilts) != arguments.get("plane_count", 3):
             options.fail("--tilts: wanted as many as there are planes")
         arguments["tilts"] = _six_radians(options.tilts)
+    for path in (options.json, options.output):
+        if path not in (None, "-") and not Path(path).absolute().parent.is_dir():
+            raise OSError(f'there is no folder "{Path(path).parent}" to write "{Path(path).name}" to')
     if options.file is not None:
         open_file(options.file)
     before = set(bpy.data.objects)

@@ -128,12 +128,16 @@ class TACTILE_OT_reconstruct(bpy.types.Operator):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        for name in ("target", "location", "normal", "extent", "step", "plane_count"):
+        layout.prop(self, "target")
+        # Where they are not set, the cursor and the surface decide: zeros would say otherwise.
+        for name in filter(self.properties.is_property_set, ("location", "normal")):
+            layout.prop(self, name)
+        for name in ("extent", "step", "plane_count"):
             layout.prop(self, name)
         for i in range(self.plane_count):
-            row = layout.row(align=True)
-            row.prop(self, "azimuths", index=i, text=f"Plane {i + 1} Azimuth, Tilt")
-            row.prop(self, "tilts", index=i, text="")
+            column = layout.column(align=True)
+            column.prop(self, "azimuths", index=i, text=f"Azimuth {i + 1}")
+            column.prop(self, "tilts", index=i, text="Tilt")
         for name in ("noise", "seed", "method", "degree", "weight", "solver"):
             layout.prop(self, name)
 
@@ -180,6 +184,7 @@ def _target(context, name):
 
 def _make_active(context, obj):
     """Selects the new object alone; unless that would leave an edit mode, or its collection is excluded."""
+    context.view_layer.update()  # after `blender -b FILE -c` it would not know the new object yet
     objects = context.view_layer.objects
     if context.mode != "OBJECT" or obj.name not in objects:
         return

@@ -20,17 +20,23 @@ def readable(report):
         ("Gaussian curvature", f"{report['gaussian_curvature']:.5g} per unit of area"),
         ("mean curvature", f"{report['mean_curvature']:.5g} per unit of length"),
         ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
-        (
-            "mesh to patch",
-            f"mean {report['vertex_distance_mean']:.4g}, {_share(report, 'vertex_distance_mean')} of "
-            f"the radius; max {report['vertex_distance_max']:.4g}; {report['vertices']} vertices",
-        ),
+        ("mesh to patch", _verification(report)),
         ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
+
+
+def _verification(report):
+    if not report["vertices"]:
+        return "no vertex of the mesh lies over the patch"
+    share = _share(report, "vertex_distance_mean")
+    return (
+        f"mean {report['vertex_distance_mean']:.4g}, {share} of the radius; "
+        f"max {report['vertex_distance_max']:.4g}; {report['vertices']} vertices"
+    )
 
 
 def _vector(v):

@@ -13,7 +13,7 @@ from mathutils.bvhtree import BVHTree
 class MeshSurface:
     """The evaluated mesh of an object; core.track touches it through `ray_cast`.
 
-    size : its largest extent along a world axis
+    size : the longest edge of its bounding box, in the world
 
     The transform runs in Python floats: mathutils rounds to float32, which far from the world's
     origin is coarser than the mesh.
@@ -46,7 +46,8 @@ class MeshSurface:
             raise ValueError(
                 f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers'
             )
-        self.size = float(np.ptp(np.array(evaluated.bound_box) @ self._linear.T, axis=0).max())
+        edges = np.ptp(np.array(evaluated.bound_box), axis=0)
+        self.size = float((edges * np.linalg.norm(self._linear, axis=0)).max())
 
     def ray_cast(self, origin, direction, distance):
         """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
@@ -71,6 +72,11 @@ class MeshSurface:
             self._co[near] @ self._linear.T + self._origin,
             np.array(normals).reshape(-1, 3) @ self._inverse,
         )
+
+    def is_hidden(self, point, direction, reach):
+        """Whether something of the mesh is above the world point within `reach` along the unit direction."""
+        start = [a + 1e-3 * reach * b for a, b in zip(point, direction, strict=True)]
+        return self.ray_cast(start, direction, reach) is not None
 
     def project(self, location):
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""

@@ -36,9 +36,7 @@ def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed
     clock.append(perf_counter())
     result = core.reconstruct(point, contours, outward=outward, **fit)
     clock.append(perf_counter())
-    around = surface.vertices_near(point, 2.0 * result.radius)
-    over = core.overlapped(result.frame, result.domain, result.radius, *around)
-    misses = core.distances(result.patch, over)
+    verification = _verification_report(surface, result)
     clock.append(perf_counter())
     seconds = dict(zip(("prepare", "track", "fit", "verify"), np.diff(clock).tolist(), strict=True))
     report = {
@@ -54,9 +52,7 @@ def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed
         **_reconstruction_report(result),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
         "stops": [list(contour.stops) for contour in contours],
-        "vertices": len(over),
-        "vertex_distance_mean": float(misses.mean()) if len(over) else 0.0,
-        "vertex_distance_max": float(misses.max(initial=0.0)),
+        **verification,
         "seconds": seconds,
     }
     return surface, result, contours, report
@@ -93,6 +89,23 @@ def _reference_point(name, surface, location, extent, step):
             f"for a step of {step:g}: move the object nearer to the origin of the world or of its own mesh"
         )
     return point, normal
+
+
+def _verification_report(surface, result):
+    """Distances to the patch of the vertices over it that a finger can reach; none where there are none."""
+    frame, radius = result.frame, result.radius
+    around = surface.vertices_near(frame.origin, 2.0 * radius)
+    over = core.overlapped(frame, result.domain, radius, *around)
+    up = frame.axes[:, 2].tolist()
+    hidden = [surface.is_hidden(vertex, up, 2.0 * radius) for vertex in frame.to_world(over).tolist()]
+    misses = core.distances(result.patch, over[~np.array(hidden, dtype=bool)])
+    if not len(misses):
+        return {"vertices": 0}
+    return {
+        "vertices": len(misses),
+        "vertex_distance_mean": float(misses.mean()),
+        "vertex_distance_max": float(misses.max()),
+    }
 
 
 def _reconstruction_report(result):

@@ -89,8 +89,8 @@ def test_the_open_scene_is_touched_without_a_file(command, files):
         (["{folder}/text.obj", *PLACE], "no mesh could be read"),
         (["{folder}/ball.ply", "--location", "9", "9", "9"], "The location is"),
         (["{folder}/ball.ply", *PLACE, "--target", "Nobody"], 'There is no object "Nobody"'),
-        (["{folder}/ball.ply", *PLACE, "--json", "{folder}/no/such/report.json"], "No such file"),
-        (["{folder}/ball.ply", *PLACE, "--output", "{folder}/no/such/out.blend"], ""),
+        (["{folder}/ball.ply", *PLACE, "--json", "{folder}/no/report.json"], 'to write "report.json" to'),
+        (["{folder}/ball.ply", *PLACE, "--output", "{folder}/no/out.blend"], 'to write "out.blend" to'),
     ],
 )
 def test_what_cannot_be_done_exits_with_1_and_a_sentence(command, files, words, sentence):

@@ -161,9 +161,12 @@ def line(angle, contacts=9):
         ([line(0), line(1)], "three curves are needed, got 2"),
         ([line(0), line(1), line(1.001)], "curves 2 and 3 run in one direction"),
         ([line(0), line(0), line(np.pi)], "leaves 1 distinct ones of the three needed"),
-        ([line(0), line(1), line(2, 3)], "curve 3 has 2 contacts besides the reference point, 3 are needed"),
+        (
+            [line(0), line(1), line(2, 3)],
+            "curve 3 has 2 of the 3 contacts it needs besides the reference point",
+        ),
         ([line(0), line(1), Contour([[0, 0, 0]], stops=("crease", "no contact"))], "crease, no contact"),
-        ([line(0), line(1), Contour(np.empty((0, 3)))], "curve 3 has 0 contacts"),
+        ([line(0), line(1), Contour(np.empty((0, 3)))], "curve 3 has 0 of the 3 contacts"),
     ],
 )
 def test_degenerate_curves_say_what_to_move(contours, message):

@@ -165,6 +165,27 @@ def test_the_contours_are_an_object_of_their_own(empty, ball):
     assert 0.005 < off.std() < 0.02
 
 
+def test_vertices_under_another_layer_are_no_part_of_the_verification(empty, ball):
+    """Balls within the ball, all facing outward: only the outer one can be felt."""
+    _, alone = reconstruct(empty, **TOUCH)
+    shells = bmesh.new()
+    for radius in (RADIUS, 0.9 * RADIUS, 0.8 * RADIUS):
+        shells.from_mesh(ball.data)
+        bmesh.ops.scale(shells, vec=[radius / RADIUS] * 3, verts=shells.verts[-len(ball.data.vertices) :])
+    shells.to_mesh(ball.data)
+    _, nested = reconstruct(empty, target="Sphere", **TOUCH)
+    assert nested["vertices"] == alone["vertices"]
+    assert nested["vertex_distance_max"] == pytest.approx(alone["vertex_distance_max"])
+
+
+def test_a_mesh_without_vertices_over_the_patch_says_so(empty, extension):
+    empty.ops.mesh.primitive_plane_add(size=10.0)
+    _, report = reconstruct(empty, location=(0.0, 0.0, 0.0))
+    assert report["vertices"] == 0
+    assert "vertex_distance_mean" not in report
+    assert "no vertex of the mesh lies over the patch" in extension.tactile_addon.report.readable(report)
+
+
 def test_the_same_seed_gives_the_same_patch_and_another_does_not(empty, ball):
     reports = [reconstruct(empty, target="Sphere", **TOUCH, noise=0.01, seed=seed)[1] for seed in (1, 1, 2)]
     assert reports[0]["coefficients"] == reports[1]["coefficients"]
@@ -195,6 +216,17 @@ def test_extent_and_step_suit_the_object_where_they_are_not_given(empty, ball):
     _, report = reconstruct(empty, location=TOP)
     assert report["extent"] == pytest.approx(4.0 / 8.0, rel=1e-3)
     assert report["step"] == pytest.approx(report["extent"] / 12.0)
+
+
+def test_the_chosen_extent_does_not_depend_on_how_the_object_is_turned(empty, ball):
+    ball.scale = (1.0, 2.0, 0.5)
+    extents = []
+    for angle in (0.0, 0.7):
+        ball.rotation_euler = (angle, 0.3 * angle, angle)
+        empty.context.view_layer.update()
+        place = ball.matrix_world @ Vector(TOP)
+        extents.append(reconstruct(empty, target="Sphere", location=place)[1]["extent"])
+    assert extents == pytest.approx([8.0 / 8.0] * 2, rel=1e-3)
 
 
 def test_all_inputs_reach_the_core(empty, ball):
@@ -399,7 +431,7 @@ def nothing(bpy):
         (nothing, {"step": -0.1}, "lengths of 0 or more"),
         (nothing, {"noise": -0.1}, "lengths of 0 or more"),
         (nothing, {"weight": -1.0}, "Weight: wanted a finite number above 0"),
-        (nothing, {"step": 0.6}, "Curve 1 has 2 contacts"),
+        (nothing, {"step": 0.6}, "Curve 1 has 2 of the 3 contacts"),
         (nothing, {"azimuths": [0.0] * 6}, "run in one direction"),
         (nothing, {"azimuths": [0.0, 1.0, 1.001, 0, 0, 0]}, "Curves 2 and 3 run in one direction"),
         (nothing, {"tilts": [1.6, 0, 0, 0, 0, 0]}, "Tilt: wanted less than 90 degrees"),
@@ -427,7 +459,7 @@ def test_all_curves_ending_at_once_leave_nothing(empty):
     empty.ops.mesh.primitive_cone_add(radius1=0.2, depth=4.0)
     before = datablocks(empty)
     with pytest.raises(
-        RuntimeError, match=r"contacts besides the reference point, 3 are needed \(it ended by"
+        RuntimeError, match=r"of the 3 contacts it needs besides the reference point \(it ended by"
     ):
         empty.ops.tactile.reconstruct(location=(0.0, 0.0, 2.0), extent=0.5, normal=(0.0, 0.0, 1.0))
     assert datablocks(empty) == before
@@ -448,6 +480,13 @@ def test_a_doubtful_patch_finishes_with_a_warning(empty, capfd):
     assert report["status"] == "uncertain"
     assert "take a shorter extent" in report["message"]
     assert "Warning: The patch misses its own contacts" in capfd.readouterr().out
+
+
+def test_half_a_contour_has_all_contacts_that_the_extent_has_room_for(empty):
+    """1 / 0.1 is 9.99999985 in the float32 of operator properties."""
+    empty.ops.mesh.primitive_plane_add(size=10.0)
+    _, report = reconstruct(empty, location=(0.3, 0.2, 0.0), extent=1.0, step=0.1)
+    assert report["contacts"] == 60
 
 
 def test_undo_takes_the_patch_away_and_redo_brings_it_back(empty, ball):
