@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The whole way from contours to a patch: exactness, equivariance, and what is refused."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import surfaces
@@ -231,3 +235,10 @@ def test_no_numbers_but_finite_ones_come_out_of_random_curves():
             r.radius,
         ]
         assert np.isfinite([*numbers, *r.patch.coefficients, r.domain.area]).all()
+
+
+def test_importing_core_imports_neither_blender_nor_scipy():
+    """scipy would make enabling the extension slow, and nothing in core may need Blender."""
+    code = "import sys, core; sys.exit(bool({'bpy', 'mathutils', 'scipy'} & set(sys.modules)))"
+    root = Path(__file__).resolve().parents[1]
+    assert subprocess.run([sys.executable, "-c", code], cwd=root).returncode == 0
