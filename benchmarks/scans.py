@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Patches on scans of real objects, beside the paper's on its own objects (Table II, Figures 3 and 4).
 
-`python -m benchmarks.scans ZIP [--data FOLDER]`, from the root of a checkout; ZIP is the built extension.
+`python -m benchmarks.scans ZIP`, from the root of a checkout; ZIP is the built extension.
 
 At one fixed point of each scan the extension tracks three curves 60 degrees apart, with a simulated
 sensor's noise, and fits a patch by each method. The Markdown table says how far the patch is from the
@@ -71,13 +71,17 @@ def main():
     parser.add_argument(
         "--data", type=Path, default=DATA, metavar="FOLDER", help="of the scans (%(default)s)"
     )
+    parser.add_argument(
+        "--share", type=float, default=1.0, help="of the extents, to touch less (%(default)s)"
+    )
     options = parser.parse_args()
     for path in (options.zip, *(options.data / scan.file for scan in SCANS)):
         if not path.is_file():
             sys.exit(f"scans: there is no file {path}")
+    scans = [scan._replace(extent=options.share * scan.extent) for scan in SCANS]
     with blender.quiet():
         extension = blender.start(options.zip)
-        rows = [row for scan in SCANS for row in _rows(extension, scan, options.data)]
+        rows = [row for scan in scans for row in _rows(extension, scan, options.data)]
     print("| object, extent | method | contacts | fit error (6) | vertices | mean distance | max | ms |")
     print("|---|---|--:|--:|--:|--:|--:|--:|")
     print(*rows, "", _caption(), sep="\n")
