@@ -14,7 +14,7 @@ from .touch import touch
 METHODS = [
     (
         "tagc",
-        "Total Absolute Gaussian Curvature",
+        "Total Curvature",
         "The paper's fit: close to the contacts, with as little folding as possible",
     ),
     (
