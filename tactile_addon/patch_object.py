@@ -86,7 +86,7 @@ def _contour_mesh(name, reconstruction, contours):
         across = reconstruction.frame.axes.T @ contour.plane_normal
         for mesh_points, mesh_triangles, contact in (
             (*_tube(path, across, thickness), np.full(4 * len(path), -1)),
-            (*_octahedra(path, 3.0 * thickness), np.repeat(np.arange(len(path)), 6)),
+            (*_octahedra(path, 3.6 * thickness), np.repeat(np.arange(len(path)), 6)),
         ):
             points.append(mesh_points)
             triangles.append(mesh_triangles + count)
