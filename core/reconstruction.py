@@ -75,7 +75,7 @@ def reconstruct(
     p, up = finite_array("point", point, (3,)), unit_vector("outward", outward)
     _require_choice("method", method, METHODS)
     _require_choice("solver", solver, SOLVERS)
-    if degree not in range(2, 7):
+    if not isinstance(degree, int) or degree not in range(2, 7):
         raise ValueError(f"degree: wanted a whole number from 2 to 6, got {degree!r}")
     weight = DEFAULT_WEIGHT if weight is None else number("weight", weight, above=0.0)
     if sensor_std is None:

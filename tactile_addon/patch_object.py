@@ -43,7 +43,9 @@ def _matrix(frame):
 
 
 def _collection(scene):
-    found = next((c for c in scene.collection.children_recursive if c.name == COLLECTION), None)
+    # In a second scene of the file it is "Tactile Patches.001".
+    named = (c for c in scene.collection.children_recursive if c.name.partition(".")[0] == COLLECTION)
+    found = next(named, None)
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
         scene.collection.children.link(found)

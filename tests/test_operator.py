@@ -200,6 +200,16 @@ def test_several_patches_share_collection_and_materials(empty, ball):
     assert sum("tactile" in obj for obj in empty.data.objects) == 3
 
 
+def test_every_scene_has_one_collection_of_patches(empty, ball):
+    reconstruct(empty, **TOUCH)
+    other = empty.data.scenes.new("Other")
+    other.collection.objects.link(ball)
+    with empty.context.temp_override(scene=other, view_layer=other.view_layers[0]):
+        for _ in range(2):
+            reconstruct(empty, target="Sphere", **TOUCH)
+    assert [len(c.objects) for c in empty.data.collections] == [2, 4]
+
+
 def test_an_active_patch_stands_for_its_source(empty, ball):
     reconstruct(empty, **TOUCH)
     _, report = reconstruct(empty, **TOUCH)

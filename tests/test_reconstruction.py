@@ -197,6 +197,7 @@ GOOD = track(
         ({"solver": "slow"}, "solver: wanted one of fast, descent, got 'slow'"),
         ({"degree": 7}, "degree: wanted a whole number from 2 to 6, got 7"),
         ({"degree": 3.5}, "degree: wanted a whole number from 2 to 6, got 3.5"),
+        ({"degree": 4.0}, "degree: wanted a whole number from 2 to 6, got 4.0"),
         ({"weight": 0}, "weight: wanted a finite number above 0, got 0"),
         ({"sensor_std": -1}, "sensor_std: wanted a finite number of 0 or more, got -1"),
         ({"outward": (0, 0, 0)}, "outward: wanted a vector with a direction"),
