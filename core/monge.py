@@ -71,24 +71,18 @@ class MongePatch:
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives at (x, y)."""
-        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        flat = x_array.ravel(), y_array.ravel()
-        terms, a = self._terms()
         orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
-        return Derivatives(
-            *((monomials(*flat, terms, dx, dy) @ a).reshape(x_array.shape) for dx, dy in orders)
-        )
+        return Derivatives(*(self._derivative(x, y, dx, dy) for dx, dy in orders))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """z(x, y)."""
-        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        terms, a = self._terms()
-        return (monomials(x_array.ravel(), y_array.ravel(), terms) @ a).reshape(x_array.shape)
+        return self._derivative(x, y, 0, 0)
 
-    def _terms(self) -> tuple[list[tuple[int, int]], Array]:
-        """All terms of (1) and their coefficients, the quadric's among them."""
-        quadric = [self.k1 / 2.0, 0.0, self.k2 / 2.0]
-        return exponents(2, self.degree), np.concatenate([quadric, self.coefficients])
+    def _derivative(self, x: ArrayLike, y: ArrayLike, dx: int, dy: int) -> Array:
+        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        a = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
+        basis = monomials(x_array.ravel(), y_array.ravel(), exponents(2, self.degree), dx, dy)
+        return (basis @ a).reshape(x_array.shape)
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Unit normal on the side of +z, shape (..., 3)."""

@@ -72,33 +72,24 @@ def _parser():
     return parser
 
 
-def _reconstruct(options):
-    """Opens the file, runs the operator, saves; returns the report."""
-    arguments = {
-        name: value
-        for name in (
-            "location",
-            "normal",
-            "extent",
-            "step",
-            "noise",
-            "seed",
-            "method",
-            "degree",
-            "weight",
-            "solver",
-        )
-        if (value := getattr(options, name)) is not None
-    }
+def _arguments(options):
+    """What was given on the command line as the operator's arguments."""
+    names = ["location", "normal", "extent", "step", "noise", "seed", "method", "degree", "weight", "solver"]
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
             options.fail(f"--azimuths: wanted three to six, got {len(options.azimuths)}")
-        arguments["plane_count"] = len(options.azimuths)
-        arguments["azimuths"] = _six_radians(options.azimuths)
+        given |= {"plane_count": len(options.azimuths), "azimuths": _six_radians(options.azimuths)}
     if options.tilts is not None:
-        if len(options.tilts) != arguments.get("plane_count", 3):
+        if len(options.tilts) != given.get("plane_count", 3):
             options.fail("--tilts: wanted as many as there are planes")
-        arguments["tilts"] = _six_radians(options.tilts)
+        given["tilts"] = _six_radians(options.tilts)
+    return given
+
+
+def _reconstruct(options):
+    """Opens the file, runs the operator, saves; returns the report."""
+    arguments = _arguments(options)
     for path in (options.json, options.output):
         if path not in (None, "-") and not Path(path).absolute().parent.is_dir():
             raise OSError(f'there is no folder "{Path(path).parent}" to write "{Path(path).name}" to')

@@ -65,7 +65,6 @@ def ellipsoid(a, b, c, u=0.0, v=0.0):
     p = np.array([a * np.cos(u) * np.cos(v), b * np.sin(u) * np.cos(v), c * np.sin(v)])
     s = np.sum((p / axes2) ** 2)
     gaussian = 1.0 / (np.prod(axes2) * s**2)
-    mean = -(axes2.sum() - p @ p) / (2.0 * np.prod(axes2) * s**1.5) * -1.0
     mean = (p @ p - axes2.sum()) / (2.0 * np.prod(axes2) * s**1.5)
     half = np.sqrt(max(mean**2 - gaussian, 0.0))
     return Exact(

@@ -86,9 +86,7 @@ class Facets:
                 continue
             t = n @ (a - origin) / slope
             p = np.asarray(origin) + t * np.asarray(direction)
-            inside = all(
-                n @ np.cross(q - p, r - p) >= -1e-9 for p_, q, r in ((p, a, b), (p, b, c), (p, c, a))
-            )
+            inside = all(n @ np.cross(q - p, r - p) >= -1e-9 for q, r in ((a, b), (b, c), (c, a)))
             if 0 <= t <= distance and inside and (best is None or t < best[0]):
                 best = t, p, n / np.linalg.norm(n)
         return best and best[1:]
