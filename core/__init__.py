@@ -9,6 +9,7 @@ convex body has negative curvatures under its outward normal.
 from .domain import Domain
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
+from .next_plane import suggest_plane
 from .reconstruction import METHODS, SOLVERS, Reconstruction, reconstruct
 from .tracking import Contour, SamplingPlane, Surface, track
 from .verification import distances, fit_error, overlapped
@@ -28,5 +29,6 @@ __all__ = [
     "fit_error",
     "overlapped",
     "reconstruct",
+    "suggest_plane",
     "track",
 ]

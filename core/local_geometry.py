@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import Array
-from .tracking import Contour
+from .tracking import Contour, cross
 
 WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
 LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
 LEAST_ANGLE = math.radians(1.0)  # between tangents that count as distinct
+UMBILIC = 1e-9  # the difference of curvatures, in unit radius, that is none
 
 
 class DegenerateCurvesError(ValueError):
@@ -64,7 +65,7 @@ def curve_through(contour: Contour, point: Array, name: str = "the curve") -> Cu
     the contour has too few contacts.
     """
     r = contour.points - point
-    distance = np.linalg.norm(r, axis=1)
+    distance = np.sqrt(np.einsum("ij,ij->i", r, r))
     largest = distance.max(initial=0.0)
     kept = distance > 1e-9 * largest
     r, distance = r[kept], distance[kept]
@@ -75,12 +76,11 @@ def curve_through(contour: Contour, point: Array, name: str = "the curve") -> Cu
             f"{why}: move the point away from the crease or edge there, or take a shorter step"
         )
     near = np.argsort(distance, kind="stable")[:WINDOW]
-    direction = np.linalg.svd(r[near] / distance[near].max(), full_matrices=False)[2][0]
-    along = np.copysign(distance, r @ direction)
+    along = np.copysign(distance, r @ r[near[-1]])
     given = np.arange(len(along)) - (len(along) - 1) / 2.0
     if given @ along < 0.0:
         along = -along
-    scale = distance[near].max()
+    scale = distance[near[-1]]
     s = along[near] / scale
     (t, c), *_ = np.linalg.lstsq(np.column_stack([s, 0.5 * s**2]), r[near] / scale, rcond=None)
     speed = np.linalg.norm(t)
@@ -105,7 +105,7 @@ def principal_curvatures(angles: ArrayLike, curvatures: ArrayLike) -> tuple[floa
     system = np.column_stack([np.ones_like(phi), np.cos(2.0 * phi), np.sin(2.0 * phi)])
     (mean, a, b), *_ = np.linalg.lstsq(system, kappa, rcond=None)
     half = math.hypot(a, b)
-    umbilic = half <= 1e-9 * max(1.0, float(np.abs(kappa).max()))
+    umbilic = half <= UMBILIC * max(1.0, float(np.abs(kappa).max()))
     theta = 0.0 if umbilic else 0.5 * math.atan2(-b, -a)
     return float(mean - half), float(mean + half), theta
 
@@ -128,21 +128,20 @@ def darboux_frame(
     n = surface_normal(tangents, outward)
     e1 = tangents[0] - (tangents[0] @ n) * n
     e1 /= np.linalg.norm(e1)
-    e2 = np.cross(n, e1)
-    radius = float(
-        max(np.linalg.norm(curve.points - np.outer(curve.points @ n, n), axis=1).max() for curve in curves)
-    )
+    e2 = np.array(cross(n, e1))
+    points = np.vstack([curve.points for curve in curves])
+    radius = float(np.hypot(points @ e1, points @ e2).max())
     # Meusnier with its sign: the normal curvature is the normal part of the curvature vector,
     # kappa' cos(theta) in the paper's words.
     kappas = [radius * float(curve.curvature @ n) for curve in curves]
     k1, k2, theta = principal_curvatures(np.arctan2(tangents @ e2, tangents @ e1), kappas)
     d1 = math.cos(theta) * e1 + math.sin(theta) * e2
-    return Frame(point, np.column_stack([d1, np.cross(n, d1), n])), k1 / radius, k2 / radius, radius
+    return Frame(point, np.column_stack([d1, cross(n, d1), n])), k1 / radius, k2 / radius, radius
 
 
 def _require_distinct(tangents: Array) -> None:
     """Three tangents that differ as lines by LEAST_ANGLE; or an error that names two that do not."""
-    sines = np.linalg.norm(np.cross(tangents[:, None], tangents[None, :]), axis=2)
+    sines = np.sqrt(np.maximum(1.0 - (tangents @ tangents.T) ** 2, 0.0))
     distinct: list[int] = []
     for i in range(len(tangents)):
         if all(sines[i, j] >= math.sin(LEAST_ANGLE) for j in distinct):

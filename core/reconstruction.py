@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From contours to a patch: the paper's sections III and IV in one call."""
+"""From contours to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,14 +14,16 @@ from .arguments import Array, finite_array, number, unit_vector
 from .domain import Domain, closed_spline_domain
 from .local_geometry import Curve, DegenerateCurvesError, Frame, curve_through, darboux_frame
 from .monge import MongePatch
+from .posterior import Posterior, joint_fit, posterior_of, terms_to
 from .tracking import Contour
 from .verification import fit_error
 
-METHODS = ("tagc", "quadratic-variation", "least-squares")
+METHODS = ("bayes", "tagc", "quadratic-variation", "least-squares")
 SOLVERS = ("fast", "descent")
 DEFAULT_WEIGHT = 1000.0  # lambda L^2: the paper's 9.99/mm^2 at L = 10 mm
-DOUBTFUL_MISS = 0.01  # of the radius: a patch that misses its own contacts by more is no description
+DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
+DOMAIN_POINTS = 150  # of a mean over the domain
 
 
 @dataclass(frozen=True)
@@ -31,10 +34,11 @@ class Reconstruction:
     radius : L, the largest distance of a contact from the point in the tangent plane
     patch, domain : the surface (1) and the part of the tangent plane it is meant for
     contacts : (n, 3), what was fitted, in the frame
-    fit_error : (6) on these contacts
-    total_absolute_curvature : (8), the integral of |K| over the patch
-    condition_number : of the least-squares system of the coefficients, in unit radius
-    status, message : "ok", "uncertain" or "not_converged", and a sentence about it
+    posterior : what the contacts leave open, in the frame and in units of L
+    method : of the fit
+    converged : whether its solver did
+
+    All else follows from these, once it is asked for.
     """
 
     frame: Frame
@@ -42,11 +46,85 @@ class Reconstruction:
     patch: MongePatch
     domain: Domain
     contacts: Array
-    fit_error: float
-    total_absolute_curvature: float
-    condition_number: float
-    status: str
-    message: str
+    posterior: Posterior
+    method: str
+    converged: bool = True
+
+    def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
+        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        u, v = x_array.ravel() / self.radius, y_array.ravel() / self.radius
+        # A patch of lower degree than the posterior departs from its mean as well.
+        off = self.posterior.height(u, v) - self.patch.height(x_array, y_array).ravel() / self.radius
+        return (self.radius * np.hypot(self.posterior.height_std(u, v), off)).reshape(x_array.shape)
+
+    @cached_property
+    def mean_height_std(self) -> float:
+        """The mean of height_std over the domain."""
+        points, _ = self.domain.grid(DOMAIN_POINTS)
+        return float(np.mean(self.height_std(*points.T)))
+
+    @cached_property
+    def fit_error(self) -> float:
+        """(6), the mean of |dz| over the contacts."""
+        return fit_error(self.patch, self.contacts)
+
+    @cached_property
+    def total_absolute_curvature(self) -> float:
+        """(8), the integral of |K| over the patch."""
+        a = self.patch.scaled(1.0 / self.radius).coefficients
+        unit_domain = Domain(self.domain.ends / self.radius)
+        return fitting.total_absolute_curvature(self._problem, unit_domain)(a)[0]
+
+    @cached_property
+    def condition_number(self) -> float:
+        """Of the least-squares system of the coefficients, in unit radius."""
+        return self._problem.condition_number
+
+    @cached_property
+    def _problem(self) -> fitting.Problem:
+        unit = self.patch.scaled(1.0 / self.radius)
+        return fitting.problem(unit.k1, unit.k2, unit.degree, self.contacts / self.radius)
+
+    @property
+    def status(self) -> str:
+        """ "ok", "uncertain" or "not_converged"."""
+        return self._judgement[0]
+
+    @property
+    def message(self) -> str:
+        """The status in a sentence, with advice; and the blind directions."""
+        return self._judgement[1]
+
+    @cached_property
+    def _judgement(self) -> tuple[str, str]:
+        blind = self.posterior.blind(self.patch.degree)
+        status, message = self._doubt or ("ok", "The patch describes its contacts.")
+        if blind:
+            verb = "is" if blind == 1 else "are"
+            terms = terms_to(self.patch.degree)
+            message += f" {blind} of {terms} coefficients {verb} invisible to these planes."
+        return status, message
+
+    @property
+    def _doubt(self) -> tuple[str, str] | None:
+        if not self.converged:
+            return "not_converged", (
+                "The minimisation stopped at its step limit, the patch is its best so far: use the fast "
+                "solver, or a smaller weight."
+            )
+        if self.method == "least-squares" and self.condition_number > DOUBTFUL_CONDITION:
+            return "uncertain", (
+                "The contacts alone do not determine the surface between the curves (condition number "
+                f"{self.condition_number:.1e}): take another method, or add sampling planes."
+            )
+        share = self.mean_height_std / self.radius
+        if share > DOUBTFUL_STD:
+            return "uncertain", (
+                f"Heights are good to {100.0 * share:.1f} % of the radius in the mean: take a shorter "
+                "extent, or add sampling planes."
+            )
+        return None
 
 
 def reconstruct(
@@ -54,8 +132,8 @@ def reconstruct(
     contours: Sequence[Contour],
     *,
     outward: ArrayLike,
-    method: str = "tagc",
-    degree: int = 4,
+    method: str = "bayes",
+    degree: int | str = 4,
     sensor_std: float | None = None,
     weight: float | None = None,
     solver: str = "fast",
@@ -63,10 +141,11 @@ def reconstruct(
     """The surface patch around `point` from three or more contours through it.
 
     point : (3,), exact; outward : (3,), on the outer side of the surface
-    method : "tagc" (9), "quadratic-variation" or "least-squares" (5)
-    degree : d of (1), 2 to 6
-    sensor_std : accuracy of a contact; misses of that size cast no doubt. None: the contours' noise
-    weight : lambda L^2 of the first two methods, None for 1000
+    method : "bayes" (posterior.py), or one of the paper's: "tagc" (9), "quadratic-variation",
+        "least-squares" (5)
+    degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
+    sensor_std : accuracy of a contact; noise is taken for no less. None: the contours' own
+    weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000
     solver : of "tagc", "fast" (L-BFGS) or "descent" (the paper's)
 
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
@@ -75,8 +154,8 @@ def reconstruct(
     p, up = finite_array("point", point, (3,)), unit_vector("outward", outward)
     _require_choice("method", method, METHODS)
     _require_choice("solver", solver, SOLVERS)
-    if not isinstance(degree, int) or degree not in range(2, 7):
-        raise ValueError(f"degree: wanted a whole number from 2 to 6, got {degree!r}")
+    if degree != "auto" and (not isinstance(degree, int) or degree not in range(2, 7)):
+        raise ValueError(f'degree: wanted a whole number from 2 to 6 or "auto", got {degree!r}')
     weight = DEFAULT_WEIGHT if weight is None else number("weight", weight, above=0.0)
     if sensor_std is None:
         sensor_std = max((contour.noise or 0.0 for contour in contours), default=0.0)
@@ -85,24 +164,35 @@ def reconstruct(
     curves = [curve_through(contour, p, f"curve {i}") for i, contour in enumerate(contours, 1)]
     frame, k1, k2, radius = darboux_frame(p, curves, up)
     contacts = np.vstack([curve.points for curve in curves]) @ frame.axes / radius
+    accuracy, converged = sensor_std / radius, True
+    if method == "bayes" or degree == "auto":
+        tangent = curves[0].tangent @ frame.axes
+        turn, posterior = joint_fit(contacts, k1 * radius, k2 * radius, tangent, accuracy)
+        if degree == "auto":
+            degree = posterior.degree_shown(contacts @ turn)
+    d = int(degree)
+    if method == "bayes":
+        frame, contacts = Frame(p, frame.axes @ turn), contacts @ turn
+        farthest = float(np.hypot(contacts[:, 0], contacts[:, 1]).max())
+        radius, contacts, posterior = radius * farthest, contacts / farthest, posterior.scaled(1.0 / farthest)
     half_curves = _half_curves(curves, frame, radius)
     domain = _domain(half_curves)
-    data = fitting.problem(k1 * radius, k2 * radius, degree, contacts)
-    a, converged = _coefficients(data, domain, half_curves, method, weight, solver)
-    patch = MongePatch(k1 * radius, k2 * radius, a)
-    miss = fit_error(patch, contacts)
-    status, message = _judge(method, miss, sensor_std / radius, data.condition_number, converged)
+    if method == "bayes":
+        patch = posterior.patch(d)
+    else:
+        data = fitting.problem(k1 * radius, k2 * radius, d, contacts)
+        a, converged = _coefficients(data, domain, half_curves, method, weight, solver)
+        patch = MongePatch(k1 * radius, k2 * radius, a)
+        posterior = posterior_of(patch, contacts, accuracy)
     return Reconstruction(
         frame=frame,
         radius=radius,
         patch=patch.scaled(radius),
         domain=Domain(domain.ends * radius),
         contacts=contacts * radius,
-        fit_error=miss * radius,
-        total_absolute_curvature=fitting.total_absolute_curvature(data, domain)(a)[0],
-        condition_number=data.condition_number,
-        status=status,
-        message=message,
+        posterior=posterior,
+        method=method,
+        converged=converged,
     )
 
 
@@ -148,23 +238,3 @@ def _coefficients(
     start = fitting.tagc_start(data, half_curves)
     minimum = fitting.quick_minimum if solver == "fast" else fitting.descent_minimum
     return minimum(fitting.tagc_objective(data, domain, weight), start)
-
-
-def _judge(method: str, miss: float, sensor_std: float, condition: float, converged: bool) -> tuple[str, str]:
-    """Status and message of a fit whose numbers are in unit radius."""
-    if not converged:
-        return "not_converged", (
-            "The minimisation stopped at its step limit, the patch is its best so far: use the fast solver, "
-            "or a smaller weight."
-        )
-    if method == "least-squares" and condition > DOUBTFUL_CONDITION:
-        return "uncertain", (
-            "The contacts alone do not determine the surface between the curves "
-            f"(condition number {condition:.1e}): take another method, or add sampling planes."
-        )
-    if miss > DOUBTFUL_MISS + sensor_std:
-        return "uncertain", (
-            f"The patch misses its own contacts by {100.0 * miss:.1f} % of its radius in the mean: "
-            "take a shorter extent, or a higher degree."
-        )
-    return "ok", "The patch describes its contacts."

@@ -13,6 +13,11 @@ from .touch import touch
 
 METHODS = [
     (
+        "bayes",
+        "Bayesian",
+        "All coefficients and the frame at once, with what the contacts leave open: the most accurate",
+    ),
+    (
         "tagc",
         "Total Curvature",
         "The paper's fit: close to the contacts, with as little folding as possible",

@@ -152,3 +152,44 @@ def quartic():
         (2, 0): -0.02, (0, 2): 0.0075, (3, 0): 2e-4, (2, 1): -3e-4, (1, 2): 1e-4, (0, 3): 2e-4,
         (4, 0): -8e-6, (3, 1): 5e-6, (2, 2): 1e-5, (1, 3): -6e-6, (0, 4): 4e-6,
     })  # fmt: skip
+
+
+def revolution(radius, slope, height, longitude=0.4):
+    """x^2 + y^2 = radius(z)^2, slope its derivative, touched at a height."""
+    r, h = radius(height), 1e-4
+    bend = (slope(height + h) - slope(height - h)) / (2.0 * h)
+    steep = np.sqrt(1.0 + slope(height) ** 2)
+    return Exact(
+        lambda x, y, z: x**2 + y**2 - radius(z) ** 2,
+        lambda p: np.array([2.0 * p[0], 2.0 * p[1], -2.0 * radius(p[2]) * slope(p[2])]),
+        np.array([r * np.cos(longitude), r * np.sin(longitude), height]),
+        *sorted([-1.0 / (r * steep), bend / steep**3]),
+    )
+
+
+def pear():
+    """A body of revolution with a waist, as a pear's, touched at the belly."""
+    return revolution(
+        lambda z: 24.0 - 0.15 * z - 5e-3 * z**2 - 1.6e-4 * z**3,
+        lambda z: -0.15 - 1e-2 * z - 4.8e-4 * z**2,
+        -3.0,
+    )
+
+
+def sine():
+    """z = 0.8 sin(0.22 x + 0.7) cos(0.09 y), touched above the origin, away from its crests."""
+    a, p, q, phase = 0.8, 0.22, 0.09, 0.7
+    steep = np.sqrt(1.0 + (a * p * np.cos(phase)) ** 2)
+    return Exact(
+        lambda x, y, z: z - a * np.sin(p * x + phase) * np.cos(q * y),
+        lambda r: np.array(
+            [
+                -a * p * np.cos(p * r[0] + phase) * np.cos(q * r[1]),
+                a * q * np.sin(p * r[0] + phase) * np.sin(q * r[1]),
+                1.0,
+            ]
+        ),
+        np.array([0.0, 0.0, a * np.sin(phase)]),
+        # z_xy and z_y are 0 there.
+        *sorted([-a * p**2 * np.sin(phase) / steep**3, -a * q**2 * np.sin(phase) / steep]),
+    )

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where to touch next: the sampling plane whose contour would tell most."""
+
+import numpy as np
+
+from .monge import monomials
+from .posterior import TERMS
+from .reconstruction import DOMAIN_POINTS, Reconstruction
+from .tracking import SamplingPlane
+
+AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))
+
+
+def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
+    """The plane that would lower the mean variance of the height over the domain most.
+
+    Also the mean height_std that is expected after it, in the caller's unit. The plane holds the
+    normal: leaning it by 20 degrees gains 1.5 % at most on random shapes. It is measured from d1
+    about n of `r.frame`: track it with normal=r.frame.axes[:, 2], tangent=r.frame.axes[:, 0].
+
+    The contour is taken to reach as far and to have as many contacts as those before, with their
+    noise. What it will show follows from where it runs, not from the heights found there.
+    """
+    x, y = r.domain.grid(DOMAIN_POINTS)[0].T
+    over = monomials(x / r.radius, y / r.radius, TERMS)
+    count = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
+    along = np.linspace(-1.0, 1.0, count)
+    u, v = np.outer(np.cos(AZIMUTHS), along), np.outer(np.sin(AZIMUTHS), along)
+    contours = monomials(u.ravel(), v.ravel(), TERMS).reshape(*u.shape, len(TERMS))
+    # A contour's heights have the covariance `seen`, and `shared` with the coefficients; it takes
+    # shared' seen^-1 shared off the coefficients' covariance.
+    shared = contours @ r.posterior.covariance
+    seen = shared @ np.swapaxes(contours, 1, 2) + r.posterior.noise**2 * np.eye(count)
+    taken = np.swapaxes(shared, 1, 2) @ np.linalg.solve(seen, shared)
+    best = int(np.argmax(np.einsum("kij,ij->k", taken, over.T @ over)))
+    lost = np.einsum("ni,ij,nj->n", over, taken[best], over)
+    variance = np.maximum((r.height_std(x, y) / r.radius) ** 2 - lost, 0.0)
+    return SamplingPlane(float(AZIMUTHS[best])), r.radius * float(np.mean(np.sqrt(variance)))

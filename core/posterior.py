@@ -1,0 +1,304 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The accurate fit: one Bayesian linear solve for everything at once, which knows what it cannot see.
+
+Beside the paper. Near the reference point the surface is taken for a polynomial of degree 6, in unit
+radius and in its Darboux frame. Slopes and second derivatives are free. The coefficient a_ij of a
+higher degree is a length^(1 - i - j): where the curvature changes over a length l it has the size
+l^(1 - i - j), so its prior is
+
+    a_ij ~ N(m_ij, (waviness^(i + j - 1) / 10)^2)    with waviness = L / l.
+
+m is the quartic of a surface that goes on with the curvatures it has at the point. The waviness and
+the noise of the contacts follow from their marginal likelihood on a grid.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from .arguments import Array
+from .local_geometry import UMBILIC
+from .monge import MongePatch, exponents, monomials
+from .tracking import cross
+
+DEGREE = 6
+TERMS = exponents(1, DEGREE)
+ORDERS = np.array([i + j for i, j in TERMS], dtype=float)
+FREE = 5  # x, y, x^2, xy, y^2 have no prior
+POWERS = ORDERS[FREE:] - 1.0  # of the waviness
+SCALE = 0.1
+WAVINESS = np.geomspace(0.2, 1.3, 6)
+USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
+MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
+NOISES = 8  # grid points, from the floor up
+PASSES = 8  # at most: two that turn the frame to what they found, and more for what is outlying
+SETTLED = 0.1  # of a weight, between passes
+LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
+OUTLYING = 5.0  # standard deviations
+STUDENT = 4.0  # degrees of freedom
+INVISIBLE = 0.9  # of the prior's variance, left over
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """A Gaussian over the heights sum b_ij x^i y^j, degree 1 to 6, in unit radius.
+
+    mean : (27,), b_10 b_01 b_20 b_11 b_02 b_30 ...
+    covariance : (27, 27)
+    noise : standard deviation of a contact
+    shown : (22, 22), upper triangular: its singular values are what the contacts show of directions
+        among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1; those of a
+        leading block, of the terms to a lower degree
+    """
+
+    mean: Array
+    covariance: Array
+    noise: float
+    shown: Array
+
+    def height_std(self, x: Array, y: Array) -> Array:
+        """Of the height at n points, (n,)."""
+        basis = monomials(x, y, TERMS)
+        return np.sqrt(np.maximum(np.einsum("ni,ni->n", basis @ self.covariance, basis), 0.0))
+
+    def height(self, x: Array, y: Array) -> Array:
+        """The mean height at n points, (n,)."""
+        return monomials(x, y, TERMS) @ self.mean
+
+    def scaled(self, factor: float) -> "Posterior":
+        """The same surfaces with every length multiplied by `factor`."""
+        factors = factor ** (1.0 - ORDERS)
+        covariance = np.outer(factors, factors) * self.covariance
+        return replace(self, mean=factors * self.mean, covariance=covariance, noise=factor * self.noise)
+
+    def patch(self, degree: int) -> MongePatch:
+        """The patch (1) of this degree nearest to the mean over the unit disk, with its curvatures."""
+        a = _truncation(degree) @ self.mean[FREE:]
+        return MongePatch(2.0 * float(self.mean[2]), 2.0 * float(self.mean[4]), a)
+
+    def degree_shown(self, contacts: Array) -> int:
+        """The least whose patch departs from the mean by half its deviation at most, at contacts (n, 3)."""
+        x, y, _ = contacts.T
+        variance = np.mean(self.height_std(x, y) ** 2)
+        for degree in range(2, DEGREE):
+            if np.mean((self.patch(degree).height(x, y) - self.height(x, y)) ** 2) <= 0.25 * variance:
+                return degree
+        return DEGREE
+
+    def blind(self, degree: int) -> int:
+        """Of the terms of degree 1 to `degree`, the directions that keep 90 % of the variance they had."""
+        last = terms_to(degree) - FREE
+        singular = np.linalg.svd(self.shown[:last, :last], compute_uv=False)
+        return int(np.count_nonzero(INVISIBLE * (1.0 + singular**2) < 1.0))
+
+
+class _System(NamedTuple):
+    """Heights (n,) ~ basis (n, 27) @ b, less the usual quartic; and the same after QR with weights.
+
+    triangle (27, 27) @ b ~ target (27,) in the sense of least squares, which leaves `square` over.
+    """
+
+    basis: Array
+    heights: Array
+    triangle: Array
+    target: Array
+    square: float
+
+
+def joint_fit(
+    contacts: Array, k1: float, k2: float, tangent: Array, accuracy: float
+) -> tuple[Array, Posterior]:
+    """The Darboux frame and the surface that the contacts show, and how well they show it.
+
+    contacts : (n, 3), in unit radius, in a frame near to the Darboux frame
+    k1, k2 : a first guess of the curvatures along its axes
+    tangent : (3,), in that frame, which d1 is to follow
+    accuracy : standard deviation of a contact, at least
+
+    Returns the columns d1, d2, n (3, 3) in the frame given, and the posterior in the new one, where
+    the means of the slopes and of the mixed second derivative are 0. Where a residual is beyond
+    OUTLYING standard deviations, contacts weigh as under a Student t distribution.
+    """
+    floor = max(accuracy, MISFIT)
+    axes, weights = np.eye(3), np.ones(len(contacts))
+    belief = _Belief(USUAL_WAVINESS, (SCALE * USUAL_WAVINESS**POWERS) ** 2, floor)
+    for step in range(PASSES):
+        usual = _usual(k1, k2)
+        system = _system(contacts @ axes, usual, weights)
+        if step > 0:
+            belief = _belief(system, _noises(system, floor))
+        precise = (SCALE * belief.waviness**POWERS) ** 2
+        solution = _covariance(system, precise, belief.noise) @ (system.triangle.T @ system.target)
+        solution /= belief.noise**2
+        mean = usual + solution
+        axes, k1, k2, angle = _turned(axes, mean, tangent)
+        if step > 1 or (step == 1 and math.hypot(mean[0], mean[1]) <= LEVEL):
+            before, weights = weights, _student_weights(system.heights - system.basis @ solution, floor)
+            if np.abs(weights - before).max() <= SETTLED:
+                break
+    turn = _turn(angle)
+    mean, covariance = turn @ mean, turn @ _covariance(system, belief.variances, belief.noise) @ turn.T
+    mean[[0, 1, 3]] = 0.0
+    return axes, Posterior(
+        mean, covariance, belief.noise, system.triangle[FREE:, FREE:] * (SCALE / belief.noise)
+    )
+
+
+def posterior_of(patch: MongePatch, contacts: Array, accuracy: float) -> Posterior:
+    """What contacts (n, 3) leave open, in the frame of a patch, where the patch is the mean.
+
+    All in unit radius. The noise is what the patch leaves over at the contacts, or `accuracy`.
+    """
+    system = _system(contacts, np.zeros(len(TERMS)), np.ones(len(contacts)))
+    x, y, z = contacts.T
+    residual = math.sqrt(np.mean((z - patch.height(x, y)) ** 2))
+    belief = _belief(system, np.array([max(residual, accuracy, MISFIT)]))
+    mean = np.zeros(len(TERMS))
+    mean[[2, 4]] = patch.k1 / 2.0, patch.k2 / 2.0
+    mean[FREE : FREE + len(patch.coefficients)] = patch.coefficients
+    covariance = _covariance(system, belief.variances, belief.noise)
+    return Posterior(mean, covariance, belief.noise, system.triangle[FREE:, FREE:] * (SCALE / belief.noise))
+
+
+def terms_to(degree: int) -> int:
+    """The number of terms of degree 1 to `degree`."""
+    return (degree + 1) * (degree + 2) // 2 - 1
+
+
+class _Belief(NamedTuple):
+    """The waviness (its geometric mean), the prior variances (22,) averaged over it, and the noise."""
+
+    waviness: float
+    variances: Array
+    noise: float
+
+
+def _usual(k1: float, k2: float) -> Array:
+    """The prior's mean, (27,): x^4, x^2 y^2 and y^4 of a surface with constant curvature along its geodesics.
+
+    Where k2 is the curvature of a parallel and k1 is constant along the meridian, the torus for one,
+    x^2 y^2 has k1 k2^2 / 4; here is the mean of that and of the other case. On a sphere and a
+    cylinder both are right.
+    """
+    # Where the radius of curvature is less than L no surface goes on like that.
+    k1, k2 = (min(max(k, -1.0), 1.0) for k in (k1, k2))
+    usual = np.zeros(len(TERMS))
+    usual[9], usual[11], usual[13] = k1**3 / 8.0, k1 * k2 * (k1 + k2) / 8.0, k2**3 / 8.0
+    return usual
+
+
+def _system(local: Array, usual: Array, weights: Array) -> _System:
+    x, y, z = local.T
+    basis = monomials(x, y, TERMS)
+    heights = z - basis @ usual
+    size = len(TERMS) + 1
+    rows = np.zeros((max(len(z), size), size))  # as many as QR needs for a whole triangle
+    rows[: len(z), :-1], rows[: len(z), -1] = basis, heights
+    rows[: len(z)] *= np.sqrt(weights)[:, None]
+    triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
+    return _System(basis, heights, triangle[:-1, :-1], triangle[:-1, -1], float(triangle[-1, -1] ** 2))
+
+
+def _noises(system: _System, floor: float) -> Array:
+    """A grid of the noise, from the floor to beyond what the quadric leaves over."""
+    left = float(system.target[FREE:] @ system.target[FREE:]) + system.square
+    largest = 2.0 * floor + 3.0 * math.sqrt(left / len(system.basis))
+    return floor * (largest / floor) ** (np.arange(NOISES) / (NOISES - 1.0))
+
+
+def _belief(system: _System, noises: Array) -> _Belief:
+    """Waviness and noise by their marginal likelihood, the free terms projected out (REML)."""
+    triangle, target = system.triangle[FREE:, FREE:], system.target[FREE:]
+    deviations = SCALE * WAVINESS[:, None] ** POWERS
+    spread = triangle * deviations[:, None, :]
+    powers, vectors = np.linalg.eigh(spread @ np.swapaxes(spread, 1, 2))
+    squares = (target @ vectors)[:, None, :] ** 2
+    variances = np.maximum(powers, 0.0)[:, None, :] + noises[:, None] ** 2
+    others = len(system.basis) - len(TERMS)  # directions no term explains
+    likelihood = -0.5 * (
+        np.sum(np.log(variances) + squares / variances, axis=2)
+        + others * np.log(noises**2)
+        + system.square / noises**2
+        + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2
+    )
+    weights = np.exp(likelihood - likelihood.max())
+    weights /= weights.sum()
+    by_waviness = weights.sum(axis=1)
+    return _Belief(
+        float(np.exp(by_waviness @ np.log(WAVINESS))),
+        by_waviness @ deviations**2,
+        float(np.sqrt(weights.sum(axis=0) @ noises**2)),
+    )
+
+
+def _covariance(system: _System, variances: Array, noise: float) -> Array:
+    precision = system.triangle.T @ system.triangle / noise**2
+    # A slope or second derivative of 100 is no surface; and with that no contacts make it singular.
+    precision[np.diag_indices(len(TERMS))] += np.concatenate([np.full(FREE, 1e-4), 1.0 / variances])
+    return np.linalg.inv(precision)
+
+
+def _student_weights(residuals: Array, floor: float) -> Array:
+    """Weights of the contacts, (n,): all 1 where no residual is outlying."""
+    deviation = max(floor, 1.4826 * float(np.median(np.abs(residuals))))
+    ratios = np.abs(residuals) / deviation
+    if ratios.max() <= OUTLYING:
+        return np.ones(len(residuals))
+    return (STUDENT + 1.0) / (STUDENT + ratios**2)
+
+
+def _turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:
+    """The axes tilted to a surface's normal and turned to its principal directions; k1, k2; that angle."""
+    sx, sy, xx, xy, yy = mean[:FREE].tolist()
+    n = axes @ np.array([-sx, -sy, 1.0]) / math.sqrt(1.0 + sx**2 + sy**2)
+    tx, ty, _ = (tangent @ axes).tolist()
+    half = math.hypot(xx - yy, xy)
+    umbilic = half <= UMBILIC * max(1.0, abs(xx), abs(yy))
+    angle = math.atan2(ty, tx) if umbilic else 0.5 * math.atan2(-xy, yy - xx)
+    if math.cos(angle) * tx + math.sin(angle) * ty < 0.0:
+        angle += math.pi
+    d1 = math.cos(angle) * axes[:, 0] + math.sin(angle) * axes[:, 1]
+    d1 -= (d1 @ n) * n
+    d1 /= math.sqrt(d1 @ d1)
+    return np.column_stack([d1, cross(n, d1), n]), xx + yy - half, xx + yy + half, angle
+
+
+def _turn(angle: float) -> Array:
+    """(27, 27): coefficients in axes turned by `angle` about the normal, from what both say at nodes."""
+    (x, y), from_heights = _nodes()
+    c, s = math.cos(angle), math.sin(angle)
+    return from_heights @ monomials(c * x - s * y, s * x + c * y, TERMS)
+
+
+@cache
+def _nodes() -> tuple[Array, Array]:
+    """Points (2, 52) on four circles, and (27, 52): coefficients from heights there."""
+    azimuths = 2.0 * np.pi * np.arange(13) / 13
+    radii = np.array([0.3, 0.6, 0.9, 1.2])
+    x, y = np.outer(radii, np.cos(azimuths)).ravel(), np.outer(radii, np.sin(azimuths)).ravel()
+    return np.stack([x, y]), np.asarray(np.linalg.pinv(monomials(x, y, TERMS)))
+
+
+@cache
+def _truncation(degree: int) -> Array:
+    """(m, 22): least squares over the unit disk of the terms of degree 3 to 6 by those to `degree`."""
+    moments = disk_moments()[FREE:, FREE:]
+    last = terms_to(degree) - FREE
+    return np.linalg.solve(moments[:last, :last], moments[:last])
+
+
+@cache
+def disk_moments() -> Array:
+    """(27, 27): the means over the unit disk of the products of two terms."""
+
+    def mean(i: int, j: int) -> float:
+        if i % 2 or j % 2:
+            return 0.0
+        around = math.gamma((i + 1) / 2) * math.gamma((j + 1) / 2) / (math.pi * math.gamma((i + j) / 2 + 1))
+        return 2.0 / (i + j + 2) * around
+
+    return np.array([[mean(i + k, j + m) for k, m in TERMS] for i, j in TERMS])
