@@ -11,7 +11,7 @@ from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import suggest_plane
 from .reconstruction import METHODS, SOLVERS, Reconstruction, reconstruct
-from .tracking import Contour, SamplingPlane, Surface, track
+from .tracking import Contour, SamplingPlane, Surface, azimuth_of, track
 from .verification import distances, fit_error, overlapped
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "Reconstruction",
     "SamplingPlane",
     "Surface",
+    "azimuth_of",
     "distances",
     "fit_error",
     "overlapped",

@@ -65,6 +65,11 @@ class Reconstruction:
         return float(np.mean(self.height_std(*points.T)))
 
     @cached_property
+    def blind(self) -> int:
+        """How many of the coefficients of degree 1 to d, as directions, the contacts say nothing of."""
+        return self.posterior.blind(self.patch.degree)
+
+    @cached_property
     def fit_error(self) -> float:
         """(6), the mean of |dz| over the contacts."""
         return fit_error(self.patch, self.contacts)
@@ -98,12 +103,11 @@ class Reconstruction:
 
     @cached_property
     def _judgement(self) -> tuple[str, str]:
-        blind = self.posterior.blind(self.patch.degree)
         status, message = self._doubt or ("ok", "The patch describes its contacts.")
-        if blind:
-            verb = "is" if blind == 1 else "are"
+        if self.blind:
+            verb = "is" if self.blind == 1 else "are"
             terms = terms_to(self.patch.degree)
-            message += f" {blind} of {terms} coefficients {verb} invisible to these planes."
+            message += f" {self.blind} of {terms} coefficients {verb} invisible to these planes."
         return status, message
 
     @property

@@ -58,6 +58,13 @@ class SamplingPlane:
         return np.column_stack([t, u, np.cross(t, u)])
 
 
+def azimuth_of(direction: ArrayLike, normal: ArrayLike, tangent: ArrayLike | None = None) -> float:
+    """The azimuth, from 0 up to pi, of the sampling plane that holds `direction`; see SamplingPlane.axes."""
+    e1, _, across = SamplingPlane(0.0).axes(normal, tangent).T  # across is e1 x n, -e2
+    d = unit_vector("direction", direction)
+    return math.atan2(-(d @ across), d @ e1) % math.pi
+
+
 @dataclass(frozen=True)
 class Contour:
     """A tracked contour: the contacts along one curve through the reference point.

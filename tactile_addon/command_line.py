@@ -62,8 +62,13 @@ def _parser():
     add("--step", type=float, help="distance between contacts (a twelfth of the extent)")
     add("--noise", type=float, help="standard deviation of the simulated sensor (0)")
     add("--seed", type=int, help="of the noise (0)")
-    add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (tagc)")
-    add("--degree", type=int, choices=range(2, 7), help="of the polynomial (4)")
+    add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (bayes)")
+    add(
+        "--degree",
+        type=str.strip,
+        choices=["auto", *"23456"],
+        help="of the polynomial; auto: the least that says what the contacts show (4)",
+    )
     add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000)")
     add("--solver", choices=[name for name, _, _ in SOLVERS], help="of tagc (fast)")
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
@@ -74,8 +79,10 @@ def _parser():
 
 def _arguments(options):
     """What was given on the command line as the operator's arguments."""
-    names = ["location", "normal", "extent", "step", "noise", "seed", "method", "degree", "weight", "solver"]
+    names = ["location", "normal", "extent", "step", "noise", "seed", "method", "weight", "solver"]
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    if options.degree is not None:
+        given["degree"] = 0 if options.degree == "auto" else int(options.degree)
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
             options.fail(f"--azimuths: wanted three to six, got {len(options.azimuths)}")

@@ -94,11 +94,16 @@ class TACTILE_OT_reconstruct(bpy.types.Operator):
     seed: IntProperty(name="Seed", description="Of the noise: the same seed gives the same contacts", min=0)
     method: EnumProperty(name="Method", description="How to fit the patch", items=METHODS)
     degree: IntProperty(
-        name="Degree", description="Of the polynomial that describes the patch", default=4, min=2, max=6
+        name="Degree",
+        description="Of the polynomial that describes the patch, 2 to 6; 0 for the least that says what "
+        "the contacts show",
+        default=4,
+        min=0,
+        max=6,
     )
     weight: FloatProperty(
         name="Weight",
-        description="Of the contacts against the smoothness; larger follows the contacts more closely",
+        description="Of the contacts against the smoothness, in the two fits by curvature",
         default=1000.0,
         soft_min=1.0,
         soft_max=1e5,
@@ -143,8 +148,12 @@ class TACTILE_OT_reconstruct(bpy.types.Operator):
             column = layout.column(align=True)
             column.prop(self, "azimuths", index=i, text=f"Azimuth {i + 1}")
             column.prop(self, "tilts", index=i, text="Tilt")
-        for name in ("noise", "seed", "method", "degree", "weight", "solver"):
+        for name in ("noise", "seed", "method", "degree"):
             layout.prop(self, name)
+        if self.method in ("tagc", "quadratic-variation"):
+            layout.prop(self, "weight")
+        if self.method == "tagc":
+            layout.prop(self, "solver")
 
     def _touch(self, context, obj):
         given = self.properties.is_property_set
@@ -163,7 +172,7 @@ class TACTILE_OT_reconstruct(bpy.types.Operator):
             noise=self.noise,
             seed=self.seed,
             method=self.method,
-            degree=self.degree,
+            degree=self.degree or "auto",
             weight=self.weight,
             solver=self.solver,
         )

@@ -64,6 +64,7 @@ def _patch_mesh(name, reconstruction, deviation):
     attributes = [
         ("gaussian_curvature", "FLOAT", gaussian),
         ("mean_curvature", "FLOAT", patch.mean_curvature(x, y)),
+        ("height_std", "FLOAT", reconstruction.height_std(x, y)),
         ("deviation", "FLOAT", deviation(frame.to_world(points), normals @ frame.axes.T)),
         ("custom_normal", "FLOAT_VECTOR", normals),
         (COLOUR, "FLOAT_COLOR", colours.diverging(gaussian, limit)),

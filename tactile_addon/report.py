@@ -20,7 +20,9 @@ def readable(report):
         ("Gaussian curvature", f"{report['gaussian_curvature']:.5g} per unit of area"),
         ("mean curvature", f"{report['mean_curvature']:.5g} per unit of length"),
         ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
+        ("height std", f"{report['height_std']:.4g}, {_share(report, 'height_std')} of the radius"),
         ("mesh to patch", _verification(report)),
+        ("suggested next plane", _suggestion(report["suggested_plane"])),
         ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
@@ -36,6 +38,13 @@ def _verification(report):
     return (
         f"mean {report['vertex_distance_mean']:.4g}, {share} of the radius; "
         f"max {report['vertex_distance_max']:.4g}; {report['vertices']} vertices"
+    )
+
+
+def _suggestion(plane):
+    return (
+        f"azimuth {plane['azimuth']:.0f} degrees, along {_vector(plane['tangent'])}; "
+        f"would take height std to {plane['expected_height_std']:.4g}"
     )
 
 

@@ -38,13 +38,16 @@ def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed
     clock.append(perf_counter())
     verification = _verification_report(surface, result)
     clock.append(perf_counter())
-    seconds = dict(zip(("prepare", "track", "fit", "verify"), np.diff(clock).tolist(), strict=True))
+    suggestion = _suggestion_report(result, outward)
+    clock.append(perf_counter())
+    stages = ("prepare", "track", "fit", "verify", "suggest")
+    seconds = dict(zip(stages, np.diff(clock).tolist(), strict=True))
     report = {
         "source": obj.name,
         "status": result.status,
         "message": result.message,
         "method": fit["method"],
-        "degree": fit["degree"],
+        "degree": result.patch.degree,
         "extent": extent,
         "step": step,
         "noise": noise,
@@ -53,6 +56,7 @@ def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
         "stops": [list(contour.stops) for contour in contours],
         **verification,
+        "suggested_plane": suggestion,
         "seconds": seconds,
     }
     return surface, result, contours, report
@@ -108,6 +112,18 @@ def _verification_report(surface, result):
     }
 
 
+def _suggestion_report(result, outward):
+    """The plane that would tell most, as an azimuth like those of `planes`, and what it would bring."""
+    plane, expected = core.suggest_plane(result)
+    d1, _, n = result.frame.axes.T
+    tangent = plane.axes(n, d1)[:, 0]
+    return {
+        "azimuth": math.degrees(core.azimuth_of(tangent, outward)),
+        "tangent": tangent.tolist(),
+        "expected_height_std": expected,
+    }
+
+
 def _reconstruction_report(result):
     d1, d2, n = result.frame.axes.T.tolist()
     return {
@@ -121,6 +137,8 @@ def _reconstruction_report(result):
         "area": result.domain.area,
         "contacts": len(result.contacts),
         "fit_error": result.fit_error,
+        "height_std": result.mean_height_std,
+        "blind": result.blind,
         "total_absolute_curvature": result.total_absolute_curvature,
         "condition_number": result.condition_number,
     }

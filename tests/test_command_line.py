@@ -43,6 +43,7 @@ def test_a_patch_from_every_kind_of_file(command, files):
         reports.append(json.loads(line))
     for report in reports:
         assert report["status"] == "ok"
+        assert 0.0 < report["suggested_plane"]["expected_height_std"] < report["height_std"]
         assert report["k1"] == pytest.approx(-0.5, rel=0.05)
         assert report["frame"]["origin"] == pytest.approx(reports[0]["frame"]["origin"], abs=1e-5)
 
@@ -69,6 +70,12 @@ def test_every_option_arrives(command, files):
     assert bpy.data.objects["Sphere Patch"]["tactile"]["degree"] == 5
 
 
+def test_the_degree_may_be_left_to_the_contacts(command, files):
+    code, out, _ = command("reconstruct", files / "ball.ply", *PLACE, "--degree", "auto")
+    assert code == 0
+    assert "bayes, degree 4" in out
+
+
 def test_the_open_scene_is_touched_without_a_file(command, files):
     import bpy
 
@@ -77,6 +84,8 @@ def test_the_open_scene_is_touched_without_a_file(command, files):
     code, out, _ = command("reconstruct", *PLACE)
     assert code == 0
     assert "touched" in out
+    assert "bayes, degree 4" in out
+    assert "suggested next plane" in out
 
 
 @pytest.mark.parametrize(

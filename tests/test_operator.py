@@ -110,7 +110,11 @@ def test_the_patch_object_holds_what_it_says(empty, ball):
     # Deviation: how far the patch is outside the ball, but for the ball's facets.
     world = np.column_stack([x, y, z]) @ axes.T + frame["origin"]
     assert values(mesh, "deviation") == pytest.approx(np.linalg.norm(world, axis=1) - RADIUS, abs=1e-3)
-    assert np.abs(values(mesh, "deviation")).max() > 2e-3
+    assert np.abs(values(mesh, "deviation")).max() > 1e-4
+    std = values(mesh, "height_std")
+    assert std[0] == pytest.approx(0.0, abs=1e-9)
+    assert report["height_std"] == pytest.approx(std.mean(), rel=0.2)
+    assert np.abs(values(mesh, "deviation")).mean() < 2.0 * std.mean()
     assert mesh.materials[0].name == "Tactile Curvature"
     areas = [face.area for face in mesh.polygons]
     assert sum(areas) == pytest.approx(report["area"], rel=0.1)
@@ -255,10 +259,46 @@ def test_all_inputs_reach_the_core(empty, ball):
         np.array([[5, 5], [50, -5], [95, 10], [140, 0]]), abs=1e-4
     )
     assert (report["method"], report["degree"], len(report["coefficients"])) == ("quadratic-variation", 5, 15)
-    descent = reconstruct(empty, target="Sphere", **TOUCH, solver="descent")[1]
-    fast = reconstruct(empty, target="Sphere", **TOUCH, solver="fast")[1]
+    tagc = {"target": "Sphere", "method": "tagc", **TOUCH}
+    descent, fast = (reconstruct(empty, **tagc, solver=solver)[1] for solver in ("descent", "fast"))
     assert descent["coefficients"] != fast["coefficients"]
     assert descent["fit_error"] == pytest.approx(fast["fit_error"], rel=0.2)
+
+
+def test_the_default_is_the_accurate_fit(empty, ball):
+    report, tagc = (reconstruct(empty, target="Sphere", **TOUCH, **m)[1] for m in ({}, {"method": "tagc"}))
+    assert (report["method"], report["degree"]) == ("bayes", 4)
+    assert report["vertex_distance_mean"] < 0.5 * tagc["vertex_distance_mean"]
+    assert report["blind"] == 3
+    assert "3 of 14 coefficients are invisible to these planes" in report["message"]
+
+
+def test_degree_0_is_what_the_contacts_show(empty):
+    empty.ops.mesh.primitive_plane_add(size=4.0)
+    _, report = reconstruct(empty, location=(0.0, 0.0, 0.0), extent=1.0, noise=0.01, degree=0)
+    assert (report["degree"], report["coefficients"]) == (2, [])
+    with pytest.raises(RuntimeError, match="Degree: wanted a whole number from 2 to 6"):
+        empty.ops.tactile.reconstruct(location=(0.0, 0.0, 0.0), extent=1.0, degree=1)
+
+
+def test_the_suggested_plane_can_be_added(empty):
+    """A monkey saddle is zero along the three planes: the fourth shows it."""
+    mesh = bmesh.new()
+    bmesh.ops.create_grid(mesh, x_segments=160, y_segments=160, size=20.0)
+    for vertex in mesh.verts:
+        vertex.co.z = (3.0 * vertex.co.x**2 * vertex.co.y - vertex.co.y**3) / 900.0
+    saddle = empty.data.meshes.new("Saddle")
+    mesh.to_mesh(saddle)
+    mesh.free()
+    empty.context.scene.collection.objects.link(empty.data.objects.new("Saddle", saddle))
+    place = {"target": "Saddle", "location": (0.0, 0.0, 0.0), "extent": 13.0, "normal": (0.0, 0.0, 1.0)}
+    _, before = reconstruct(empty, **place)
+    suggested = before["suggested_plane"]
+    assert np.linalg.norm(suggested["tangent"]) == pytest.approx(1.0)
+    azimuths = [math.radians(a) for a in (0, 60, 120, suggested["azimuth"], 0, 0)]
+    _, after = reconstruct(empty, **place, plane_count=4, azimuths=azimuths)
+    assert before["vertex_distance_mean"] > 0.1
+    assert after["vertex_distance_mean"] < 0.02
 
 
 SQUASH = Matrix.LocRotScale((5.0, -3.0, 1.0), Euler((0.3, 0.9, -0.5)), (1.5, 0.75, 0.5))
@@ -489,7 +529,7 @@ def test_a_doubtful_patch_finishes_with_a_warning(empty, capfd):
     _, report = reconstruct(empty, location=(0.42, -0.62, 0.78), extent=0.3)
     assert report["status"] == "uncertain"
     assert "take a shorter extent" in report["message"]
-    assert "Warning: The patch misses its own contacts" in capfd.readouterr().out
+    assert "Warning: Heights are good to" in capfd.readouterr().out
 
 
 def test_half_a_contour_has_all_contacts_that_the_extent_has_room_for(empty):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import surfaces
 
-from core import Contour, SamplingPlane, track
+from core import Contour, SamplingPlane, azimuth_of, track
 
 PLANES = [SamplingPlane(np.radians(a), np.radians(b)) for a, b in ((10, 0), (70, 20), (130, -35))]
 
@@ -178,3 +178,11 @@ def test_a_point_where_rays_slip_between_faces_is_still_on_the_surface():
     (contour,) = track(Slit(*FLOOR), (0, 0, 0), (0, 0, 1), [SamplingPlane(0.0)], extent=5, step=1)
     assert contour.stops == ("extent", "extent")
     assert np.array_equal(contour.points[5], (0, 0, 0))
+
+
+def test_azimuth_of_a_direction_gives_the_plane_that_holds_it():
+    normal, tangent = (0.3, -0.2, 0.9), (0.1, 1.0, 0.0)
+    for degrees in (0.0, 17.0, 90.0, 163.0):
+        t = SamplingPlane(np.radians(degrees)).axes(normal, tangent)[:, 0]
+        assert np.degrees(azimuth_of(t, normal, tangent)) % 180.0 == pytest.approx(degrees, abs=1e-6)
+        assert np.degrees(azimuth_of(-t, normal, tangent)) % 180.0 == pytest.approx(degrees, abs=1e-6)
