@@ -7,6 +7,7 @@
 At one fixed point of each scan the extension tracks three curves 60 degrees apart, with a simulated
 sensor's noise, and fits a patch by each method. The Markdown table says how far the patch is from the
 contacts, (6), and from the mesh vertices in its domain, and what tracking and fit take on one thread.
+A second table does the same at random points (seeded) all over each scan, for the default and TAGC.
 """
 
 import argparse
@@ -24,9 +25,10 @@ for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
     os.environ[f"{library}_NUM_THREADS"] = "1"  # read once, when bpy imports numpy
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
-METHODS = ("tagc", "quadratic-variation", "least-squares")
+METHODS = ("bayes", "tagc", "quadratic-variation", "least-squares")
 AZIMUTHS = (0.0, 60.0, 120.0)
 RUNS = 7
+LEAST_VERTICES = 20  # over a patch, for its mean distance to count
 
 
 class Scan(NamedTuple):
@@ -74,6 +76,7 @@ def main():
     parser.add_argument(
         "--share", type=float, default=1.0, help="of the extents, to touch less (%(default)s)"
     )
+    parser.add_argument("--touches", type=int, default=40, help="at random points of each (%(default)s)")
     options = parser.parse_args()
     for path in (options.zip, *(options.data / scan.file for scan in SCANS)):
         if not path.is_file():
@@ -82,9 +85,14 @@ def main():
     with blender.quiet():
         extension = blender.start(options.zip)
         rows = [row for scan in scans for row in _rows(extension, scan, options.data)]
+        touches = [_random_row(extension, scan, options.data, options.touches) for scan in scans]
     print("| object, extent | method | contacts | fit error (6) | vertices | mean distance | max | ms |")
     print("|---|---|--:|--:|--:|--:|--:|--:|")
-    print(*rows, "", _caption(), sep="\n")
+    print(*rows, "", _caption(), "", sep="\n")
+    print(f"Medians over {options.touches} random touches. Calibration: distance over mean height std.\n")
+    print("| object, extent | bayes | tagc | ratio | height std | calibration | uncertain | fit, ms |")
+    print("|---|--:|--:|--:|--:|--:|--:|--:|")
+    print(*touches, sep="\n")
 
 
 def _rows(extension, scan, data):
@@ -113,6 +121,60 @@ def _rows(extension, scan, data):
             f"{1e3 * median(s['track'] + s['fit'] for s in seconds):.1f}",
         )
         yield f"| {' | '.join(cells)} |"
+
+
+def _random_row(extension, scan, data, count):
+    """A line of the second table: medians over random points, by area, where both methods give a patch."""
+    import bpy
+    import numpy as np
+
+    extension.tactile_addon.command_line.open_file(data / scan.file)
+    obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
+    areas = np.array([face.area for face in obj.data.polygons])
+    planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
+    lengths = {"extent": scan.extent, "step": scan.extent / scan.steps, "noise": scan.noise}
+    found = []
+    for index in np.random.default_rng(0).choice(len(areas), 4 * count, p=areas / areas.sum()):
+        location = obj.matrix_world @ obj.data.polygons[index].center
+        try:
+            bayes, tagc = (
+                extension.tactile_addon.touch.touch(
+                    obj,
+                    depsgraph,
+                    location,
+                    None,
+                    planes,
+                    **lengths,
+                    seed=int(index),
+                    method=method,
+                    degree=4,
+                )[3]
+                for method in ("bayes", "tagc")
+            )
+        except ValueError:  # an edge or a hole: no touch
+            continue
+        if min(bayes["vertices"], tagc["vertices"]) >= LEAST_VERTICES:
+            found.append((bayes, tagc))
+        if len(found) == count:
+            break
+    ours, papers = (
+        median(scan.scale * reports[i]["vertex_distance_mean"] for reports in found) for i in (0, 1)
+    )
+    std = median(scan.scale * bayes["height_std"] for bayes, _ in found)
+    calibration = median(bayes["vertex_distance_mean"] / bayes["height_std"] for bayes, _ in found)
+    uncertain = sum(bayes["status"] != "ok" for bayes, _ in found)
+    fit = median(bayes["seconds"]["fit"] for bayes, _ in found)
+    cells = (
+        f"{scan.name}, {scan.scale * scan.extent:g} {scan.unit}",
+        f"{ours:.4f}",
+        f"{papers:.4f}",
+        f"{ours / papers:.2f}",
+        f"{std:.4f}",
+        f"{calibration:.2f}",
+        f"{uncertain} of {len(found)}",
+        f"{1e3 * fit:.1f}",
+    )
+    return f"| {' | '.join(cells)} |"
 
 
 def _beside(ours, paper):

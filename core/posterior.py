@@ -31,7 +31,7 @@ ORDERS = np.array([i + j for i, j in TERMS], dtype=float)
 FREE = 5  # x, y, x^2, xy, y^2 have no prior
 POWERS = ORDERS[FREE:] - 1.0  # of the waviness
 SCALE = 0.1
-WAVINESS = np.geomspace(0.2, 1.3, 6)
+WAVINESS = np.geomspace(0.15, 1.3, 6)
 USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
 MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
 NOISES = 8  # grid points, from the floor up
