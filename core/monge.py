@@ -3,24 +3,31 @@
 """The Monge patch z(x, y) of equation (1) in its Darboux frame, and its differential geometry."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .arguments import Array
 
 
-def exponents(lowest: int, highest: int) -> list[tuple[int, int]]:
-    """(i, j) of the terms x^i y^j of these degrees, in the order of (1): 30 21 12 03 40 31 22 13 04 ..."""
-    return [(i, d - i) for d in range(lowest, highest + 1) for i in range(d, -1, -1)]
+@cache
+def exponents(lowest: int, highest: int) -> NDArray[np.intp]:
+    """(i, j) of the terms x^i y^j of these degrees, (m, 2), in the order of (1): 30 21 12 03 40 31 22 ..."""
+    terms = [(i, d - i) for d in range(lowest, highest + 1) for i in range(d, -1, -1)]
+    array = np.array(terms, dtype=np.intp).reshape(-1, 2)
+    array.flags.writeable = False
+    return array
 
 
-def monomials(x: Array, y: Array, terms: list[tuple[int, int]], dx: int = 0, dy: int = 0) -> Array:
-    """The terms x^i y^j at n points, (n, len(terms)), differentiated dx times by x and dy times by y."""
-    highest = max((i + j for i, j in terms), default=0)
-    x_powers, y_powers = (np.vander(v, highest + 1, increasing=True) for v in (x, y))
-    i, j = np.array(terms, dtype=int).reshape(-1, 2).T
+def monomials(x: Array, y: Array, terms: NDArray[np.intp], dx: int = 0, dy: int = 0) -> Array:
+    """The terms (m, 2) at n points, (n, m), differentiated dx times by x and dy times by y."""
+    powers = int(terms.max(initial=0)) + 1
+    x_powers, y_powers = (np.vander(v, powers, increasing=True) for v in (x, y))
+    i, j = terms.T
+    if dx == dy == 0:
+        return x_powers[:, i] * y_powers[:, j]
     factor = np.ones(len(terms))
     for k in range(dx):
         factor *= i - k
@@ -66,7 +73,7 @@ class MongePatch:
 
     def scaled(self, factor: float) -> "MongePatch":
         """The same surface with every length multiplied by `factor`."""
-        orders = np.array([i + j for i, j in exponents(3, self.degree)], dtype=float)
+        orders = exponents(3, self.degree).sum(axis=1)
         return MongePatch(self.k1 / factor, self.k2 / factor, self.coefficients * factor ** (1.0 - orders))
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:

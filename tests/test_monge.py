@@ -117,4 +117,4 @@ def test_scaling_scales_lengths():
 
 def test_monomials_differentiated_away_are_zero_even_at_the_origin():
     zero = np.zeros(1)
-    assert np.array_equal(monomials(zero, zero, [(3, 0), (2, 1)], 2, 1), [[0.0, 2.0]])
+    assert np.array_equal(monomials(zero, zero, np.array([(3, 0), (2, 1)]), 2, 1), [[0.0, 2.0]])
