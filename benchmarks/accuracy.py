@@ -35,8 +35,8 @@ from core.domain import closed_spline_domain
 from core.monge import exponents, monomials
 from tests import surfaces
 
-# Surfaces and extents of their half curves. Sizes were chosen before the fit was tuned, so that the
-# peers' errors are those that were measured on other surfaces when this fit was planned.
+# Surfaces and extents of their half curves. The sizes are such that the peers' errors come out like those
+# measured on other surfaces when this fit was planned, so that these are as hard.
 SURFACES = {
     "ellipsoid": (surfaces.ellipsoid(35, 32, 19, 0.4, 0.5), 13),
     "torus outer": (surfaces.torus(30, 22, 0.8), 13),

@@ -100,8 +100,11 @@ def compose(extension, patch, unit):
     put.text(f"{report['source']}, touched at {report['contacts']} points", -3.3, 2.25, 0.21)
     put.text(f"principal curvatures {report['k1']:.3g} and {report['k2']:.3g} 1/{unit}", -3.3, -2.25, 0.14)
     if report["vertices"]:
-        off = 100.0 * report["vertex_distance_mean"] / radius
-        sentence = f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius in the mean"
+        off, std = (100.0 * report[key] / radius for key in ("vertex_distance_mean", "height_std"))
+        sentence = (
+            f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius in the mean, "
+            f"standard deviation {std:.1f} %"
+        )
         put.text(sentence, -3.3, -2.48, 0.14)
     _look(scene, bpy.data.objects[report["source"]])
 
