@@ -214,16 +214,29 @@ def _noises(system: _System, floor: float) -> Array:
 
 
 def _evidence(system: _System, noises: Array) -> _Hyperparameters:
-    """Waviness and noise by their marginal likelihood, the free terms projected out (REML)."""
+    """Waviness and noise by their marginal likelihood, the free terms projected out (REML).
+
+    target ~ N(0, K), K = triangle prior triangle' + noise^2. One Cholesky factor of K bordered by the
+    target, [[K, t], [t', c]], has log |K| in its diagonal and t' K^-1 t in the last of it.
+    """
     triangle, target = system.triangle[FREE:, FREE:], system.target[FREE:]
-    deviations = SCALE * WAVINESS[:, None] ** POWERS
-    spread = triangle * deviations[:, None, :]
-    powers, vectors = np.linalg.eigh(spread @ np.swapaxes(spread, 1, 2))
-    squares = (target @ vectors)[:, None, :] ** 2
-    variances = np.maximum(powers, 0.0)[:, None, :] + noises[:, None] ** 2
+    size = len(target)
+    variances = (SCALE * WAVINESS[:, None] ** POWERS) ** 2
+    explained = (triangle * variances[:, None, :]) @ triangle.T
+    corner = 2.0 * (target @ target) / noises[0] ** 2 + 1.0  # more than t' K^-1 t
+    bordered = np.zeros((len(WAVINESS), len(noises), size + 1, size + 1))
+    bordered[:, :, :size, :size] = explained[:, None]
+    bordered[:, :, :size, size] = bordered[:, :, size, :size] = target
+    bordered[:, :, size, size] = corner
+    # Beside the noise, what rounding leaves of contacts that are no surface.
+    rounding = 1e-13 * np.trace(explained, axis1=1, axis2=2)
+    diagonal = np.arange(size)
+    bordered[:, :, diagonal, diagonal] += (noises**2 + rounding[:, None])[:, :, None]
+    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=2, axis2=3)
     others = len(system.basis) - len(TERMS)  # directions no term explains
     likelihood = -0.5 * (
-        np.sum(np.log(variances) + squares / variances, axis=2)
+        2.0 * np.sum(np.log(factors[:, :, :size]), axis=2)
+        + (corner - factors[:, :, size] ** 2)
         + others * np.log(noises**2)
         + system.square / noises**2
         + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2
@@ -233,7 +246,7 @@ def _evidence(system: _System, noises: Array) -> _Hyperparameters:
     by_waviness = weights.sum(axis=1)
     return _Hyperparameters(
         float(np.exp(by_waviness @ np.log(WAVINESS))),
-        by_waviness @ deviations**2,
+        by_waviness @ variances,
         float(np.sqrt(weights.sum(axis=0) @ noises**2)),
     )
 

@@ -179,12 +179,12 @@ def reconstruct(
         frame, contacts = Frame(p, frame.axes @ turn), contacts @ turn
         farthest = float(np.hypot(contacts[:, 0], contacts[:, 1]).max())
         radius, contacts, posterior = radius * farthest, contacts / farthest, posterior.scaled(1.0 / farthest)
-    half_curves = _half_curves(curves, frame, radius)
-    domain = _domain(half_curves)
+    domain = _domain(curves, frame, radius)
     if method == "bayes":
         patch = posterior.patch(d)
     else:
         data = fitting.problem(k1 * radius, k2 * radius, d, contacts)
+        half_curves = _half_curves(curves, frame, radius)
         a, converged = _coefficients(data, domain, half_curves, method, weight, solver)
         patch = MongePatch(k1 * radius, k2 * radius, a)
         posterior = posterior_of(patch, contacts, accuracy)
@@ -216,9 +216,12 @@ def _half_curves(curves: Sequence[Curve], frame: Frame, radius: float) -> list[A
     return [half for _, half in sorted(halves, key=lambda half: half[0])]
 
 
-def _domain(half_curves: Sequence[Array]) -> Domain:
+def _domain(curves: Sequence[Curve], frame: Frame, radius: float) -> Domain:
+    """Through the curves' ends on either side of the point, in unit radius."""
+    sides = ((0, -1.0), (-1, 1.0))
+    ends = [curve.points[i] for curve in curves for i, sign in sides if sign * curve.along[i] > 0.0]
     try:
-        return closed_spline_domain([half[-1, :2] for half in half_curves], 1.0)
+        return closed_spline_domain((np.array(ends) @ frame.axes)[:, :2] / radius, 1.0)
     except ValueError:
         raise DegenerateCurvesError(
             "the curves end in fewer than three places apart from each other, so they bound no patch: "
