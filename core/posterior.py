@@ -9,8 +9,8 @@ l^(1 - i - j), so its prior is
 
     a_ij ~ N(m_ij, (waviness^(i + j - 1) / 10)^2)    with waviness = L / l.
 
-m is the quartic of a surface that goes on with the curvatures it has at the point. The waviness and
-the noise of the contacts follow from their marginal likelihood on a grid.
+m are the quartic and sextic of a surface that goes on with the curvatures it has at the point. The
+waviness and the noise of the contacts follow from their marginal likelihood on a grid.
 """
 
 import math
@@ -21,7 +21,6 @@ from typing import NamedTuple
 import numpy as np
 
 from .arguments import Array
-from .local_geometry import UMBILIC
 from .monge import MongePatch, exponents, monomials
 from .tracking import cross
 
@@ -38,6 +37,7 @@ MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is neve
 NOISES = 8  # grid points, from the floor up
 PASSES = 8  # at most: two that turn the frame to what they found, and more for what is outlying
 SETTLED = 0.1  # of a weight, between passes
+UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
 LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
 OUTLYING = 5.0  # standard deviations
 STUDENT = 4.0  # degrees of freedom
@@ -148,7 +148,7 @@ def joint_fit(
             if np.abs(weights - before).max() <= SETTLED:
                 break
     posterior = _posterior(mean, system, hyper).turned(angle)
-    posterior.mean[[0, 1, 3]] = 0.0
+    posterior.mean[:FREE] = 0.0, 0.0, k1 / 2.0, 0.0, k2 / 2.0
     return axes, posterior
 
 
@@ -181,17 +181,24 @@ class _Hyperparameters(NamedTuple):
 
 
 def _prior_mean(k1: float, k2: float) -> Array:
-    """The prior's mean, (27,): x^4, x^2 y^2 and y^4 of a surface with constant curvature along its geodesics.
+    """The prior's mean, (27,): the quartic and sextic of a surface that goes on with its curvatures.
 
-    Where k2 is the curvature of a parallel and k1 is constant along the meridian, the torus for one,
-    x^2 y^2 has k1 k2^2 / 4; here is the mean of that and of the other case. On a sphere and a
-    cylinder both are right.
+    With Q = (k1 x^2 + k2 y^2) / 2 and G = |grad Q|^2 they are Q G / 4 and Q G^2 / 8, as on a sphere and
+    a cylinder. A torus, whose parallels have k2 at the point, has k1 k2^2 / 4 for x^2 y^2: here is the
+    mean of that and of the other case.
     """
     # Where the radius of curvature is less than L no surface goes on like that.
     k1, k2 = (min(max(k, -1.0), 1.0) for k in (k1, k2))
-    prior_mean = np.zeros(len(TERMS))
-    prior_mean[9], prior_mean[11], prior_mean[13] = k1**3 / 8.0, k1 * k2 * (k1 + k2) / 8.0, k2**3 / 8.0
-    return prior_mean
+    a, b = k1**2, k2**2
+    mean = np.zeros(len(TERMS))
+    mean[9:14:2] = k1 * a / 8.0, (k1 * b + k2 * a) / 8.0, k2 * b / 8.0
+    mean[20:27:2] = (
+        k1 * a**2 / 16.0,
+        (2.0 * k1 * a * b + k2 * a**2) / 16.0,
+        (k1 * b**2 + 2.0 * k2 * a * b) / 16.0,
+        k2 * b**2 / 16.0,
+    )
+    return mean
 
 
 def _system(local: Array, prior_mean: Array, weights: Array) -> _System:
@@ -277,9 +284,9 @@ def _turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, flo
     sx, sy, xx, xy, yy = mean[:FREE].tolist()
     n = axes @ np.array([-sx, -sy, 1.0]) / math.sqrt(1.0 + sx**2 + sy**2)
     tx, ty, _ = (tangent @ axes).tolist()
-    half = math.hypot(xx - yy, xy)
-    umbilic = half <= UMBILIC * max(1.0, abs(xx), abs(yy))
-    angle = math.atan2(ty, tx) if umbilic else 0.5 * math.atan2(-xy, yy - xx)
+    half, angle = math.hypot(xx - yy, xy), 0.5 * math.atan2(-xy, yy - xx)
+    if half <= UMBILIC * max(1.0, abs(xx), abs(yy)):
+        half, angle = 0.0, math.atan2(ty, tx)
     if math.cos(angle) * tx + math.sin(angle) * ty < 0.0:
         angle += math.pi
     d1 = math.cos(angle) * axes[:, 0] + math.sin(angle) * axes[:, 1]
