@@ -41,6 +41,7 @@ UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by a
 LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
 OUTLYING = 5.0  # standard deviations
 STUDENT = 4.0  # degrees of freedom
+DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L
 INVISIBLE = 0.9  # of the prior's variance, left over
 
 
@@ -82,7 +83,7 @@ class Posterior:
         return replace(self, mean=turn @ self.mean, covariance=turn @ self.covariance @ turn.T)
 
     def patch(self, degree: int) -> MongePatch:
-        """The patch (1) of this degree nearest to the mean over the unit disk, with its curvatures."""
+        """The patch (1) of this degree nearest to the mean over the disk, with its curvatures."""
         a = _truncation(degree) @ self.mean[FREE:]
         return MongePatch(2.0 * float(self.mean[2]), 2.0 * float(self.mean[4]), a)
 
@@ -313,7 +314,7 @@ def _nodes() -> tuple[Array, Array]:
 
 @cache
 def _truncation(degree: int) -> Array:
-    """(m, 22): least squares over the unit disk of the terms of degree 3 to 6 by those to `degree`."""
+    """(m, 22): least squares over the disk of the terms of degree 3 to 6 by those to `degree`."""
     moments = disk_moments()[FREE:, FREE:]
     last = terms_to(degree) - FREE
     return np.linalg.solve(moments[:last, :last], moments[:last])
@@ -321,12 +322,12 @@ def _truncation(degree: int) -> Array:
 
 @cache
 def disk_moments() -> Array:
-    """(27, 27): the means over the unit disk of the products of two terms."""
+    """(27, 27): the means over the disk of radius DISK of the products of two terms."""
 
     def mean(i: int, j: int) -> float:
         if i % 2 or j % 2:
             return 0.0
         around = math.gamma((i + 1) / 2) * math.gamma((j + 1) / 2) / (math.pi * math.gamma((i + j) / 2 + 1))
-        return 2.0 / (i + j + 2) * around
+        return 2.0 * DISK ** (i + j) / (i + j + 2) * around
 
     return np.array([[mean(i + k, j + m) for k, m in TERMS] for i, j in TERMS])

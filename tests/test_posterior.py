@@ -54,7 +54,7 @@ def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
     mean = np.concatenate([[0.0, 0.0, 0.2, 0.0, 0.3], rng.normal(size=22)])
     whole = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)))
     x, y = rng.uniform(-1.0, 1.0, (2, 200_000))
-    inside = np.hypot(x, y) < 1.0
+    inside = np.hypot(x, y) < posterior.DISK
     x, y = x[inside], y[inside]
     for degree in (3, 4, 5):
         fixed = monomials(x, y, posterior.TERMS[2:5]) @ mean[2:5]
