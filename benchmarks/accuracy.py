@@ -113,7 +113,7 @@ def _touched(surface, planes, noise, seed, extent, turn):
     ends = np.vstack([contour.points[[0, -1]] for contour in contours]) - surface.point
     domain = closed_spline_domain((ends @ axes)[:, :2], extent)
     hold_out = _above(surface, axes, kappas, domain.grid(HOLD_OUT)[0])
-    return hold_out and Case(surface.point, axes, kappas, contours, noise, hold_out[0])
+    return None if hold_out is None else Case(surface.point, axes, kappas, contours, noise, hold_out)
 
 
 def _darboux(surface):
@@ -135,7 +135,7 @@ def _darboux(surface):
 
 
 def _above(surface, axes, kappas, points):
-    """The surface above tangent plane points (m, 2), relative to the reference point, (m, 3) in a tuple.
+    """The surface above tangent plane points (m, 2), relative to the reference point, (m, 3).
 
     By Newton's method from the quadric; None where it finds no way.
     """
@@ -147,7 +147,7 @@ def _above(surface, axes, kappas, points):
         step = surface.level(*there.T) / slope
         z = z - np.clip(step, -3.0, 3.0)
         if np.abs(step).max() < 1e-9:
-            return (points @ axes[:, :2].T + np.outer(z, n),)
+            return points @ axes[:, :2].T + np.outer(z, n)
     return None
 
 
@@ -263,10 +263,10 @@ METHODS = {
     "jet of degree 3": partial(jet, degree=3),
     "jet of degree 4": partial(jet, degree=4),
 }
-if find_spec("sklearn") is None:
-    del METHODS["Matérn 5/2 Gaussian process"]
-SHAPE_METHODS = tuple(METHODS)[:1] + tuple(m for m in METHODS if m.startswith(("Mat", "TAGC")))
 BAYES, PROCESS, TAGC, QUADRIC = next(iter(METHODS)), "Matérn 5/2 Gaussian process", "TAGC", "quadric alone"
+if find_spec("sklearn") is None:
+    del METHODS[PROCESS]
+SHAPE_METHODS = [method for method in (BAYES, TAGC, PROCESS) if method in METHODS]
 
 
 def cramer_rao(case):
@@ -284,7 +284,7 @@ def noise_limit(case, surface):
     """The mean |dz| (um) of five terms fitted to the noise alone, as if all higher terms were known."""
     contacts = np.vstack([c.points for c in case.contours]) - case.point
     x, y, z = (contacts @ case.axes).T
-    (there,) = _above(surface, case.axes, case.kappas, np.column_stack([x, y]))
+    there = _above(surface, case.axes, case.kappas, np.column_stack([x, y]))
     terms = exponents(1, 2)
     b = np.linalg.lstsq(monomials(x, y, terms), z - there @ case.axes[:, 2], rcond=None)[0]
     over = case.hold_out @ case.axes

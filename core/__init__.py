@@ -9,9 +9,9 @@ convex body has negative curvatures under its outward normal.
 from .domain import Domain
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
-from .next_plane import suggest_plane
+from .next_plane import azimuth_of, suggest_plane
 from .reconstruction import METHODS, SOLVERS, Reconstruction, reconstruct
-from .tracking import Contour, SamplingPlane, Surface, azimuth_of, track
+from .tracking import Contour, SamplingPlane, Surface, track
 from .verification import distances, fit_error, overlapped
 
 __all__ = [

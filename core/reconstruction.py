@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 
 from . import fitting
 from .arguments import Array, finite_array, number, unit_vector
+from .bayes import joint_fit, posterior_of
 from .domain import Domain, closed_spline_domain
 from .local_geometry import Curve, DegenerateCurvesError, Frame, curve_through, darboux_frame
 from .monge import MongePatch
-from .posterior import Posterior, joint_fit, posterior_of, terms_to
+from .posterior import Posterior, terms_to
 from .tracking import Contour
 from .verification import fit_error
 
@@ -145,7 +146,7 @@ def reconstruct(
     """The surface patch around `point` from three or more contours through it.
 
     point : (3,), exact; outward : (3,), on the outer side of the surface
-    method : "bayes" (posterior.py), or one of the paper's: "tagc" (9), "quadratic-variation",
+    method : "bayes" (bayes.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)
     degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
     sensor_std : accuracy of a contact; noise is taken for no less. None: the contours' own
@@ -158,12 +159,9 @@ def reconstruct(
     p, up = finite_array("point", point, (3,)), unit_vector("outward", outward)
     _require_choice("method", method, METHODS)
     _require_choice("solver", solver, SOLVERS)
-    if degree != "auto" and (not isinstance(degree, int) or degree not in range(2, 7)):
-        raise ValueError(f'degree: wanted a whole number from 2 to 6 or "auto", got {degree!r}')
+    _require_degree(degree)
     weight = DEFAULT_WEIGHT if weight is None else number("weight", weight, above=0.0)
-    if sensor_std is None:
-        sensor_std = max((contour.noise or 0.0 for contour in contours), default=0.0)
-    sensor_std = number("sensor_std", sensor_std, least=0.0)
+    sensor_std = _sensor_std(contours) if sensor_std is None else number("sensor_std", sensor_std, least=0.0)
 
     curves = [curve_through(contour, p, f"curve {i}") for i, contour in enumerate(contours, 1)]
     frame, k1, k2, radius = darboux_frame(p, curves, up)
@@ -203,6 +201,15 @@ def reconstruct(
 def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise ValueError(f"{name}: wanted one of {', '.join(choices)}, got {value!r}")
+
+
+def _require_degree(degree: int | str) -> None:
+    if degree != "auto" and (not isinstance(degree, int) or degree not in range(2, 7)):
+        raise ValueError(f'degree: wanted a whole number from 2 to 6 or "auto", got {degree!r}')
+
+
+def _sensor_std(contours: Sequence[Contour]) -> float:
+    return max((contour.noise or 0.0 for contour in contours), default=0.0)
 
 
 def _half_curves(curves: Sequence[Curve], frame: Frame, radius: float) -> list[Array]:

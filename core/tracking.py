@@ -58,13 +58,6 @@ class SamplingPlane:
         return np.column_stack([t, u, np.cross(t, u)])
 
 
-def azimuth_of(direction: ArrayLike, normal: ArrayLike, tangent: ArrayLike | None = None) -> float:
-    """The azimuth, from 0 up to pi, of the sampling plane that holds `direction`; see SamplingPlane.axes."""
-    e1, _, across = SamplingPlane(0.0).axes(normal, tangent).T  # across is e1 x n, -e2
-    d = unit_vector("direction", direction)
-    return math.atan2(-(d @ across), d @ e1) % math.pi
-
-
 @dataclass(frozen=True)
 class Contour:
     """A tracked contour: the contacts along one curve through the reference point.
@@ -244,7 +237,7 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 def cross(a: Vector | Array, b: Vector | Array) -> Vector:
-    """a x b; np.cross takes ten times as long for two vectors."""
+    """a x b of two vectors; np.cross is made for many, and slow for one."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 

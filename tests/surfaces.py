@@ -193,3 +193,17 @@ def sine():
         # z_xy and z_y are 0 there.
         *sorted([-a * p**2 * np.sin(phase) / steep**3, -a * q**2 * np.sin(phase) / steep]),
     )
+
+
+def heights_over(surface, r, count=200):
+    """Points of a reconstruction's domain (m, 2), and the surface's heights there in its frame, by rays."""
+    points, _ = r.domain.grid(count)
+    starts = r.frame.to_world(np.column_stack([points, np.full(len(points), r.radius)]))
+    hits = [surface.ray_cast(start, -r.frame.axes[:, 2], 2 * r.radius)[0] for start in starts]
+    return points, r.frame.to_local(hits)[:, 2]
+
+
+def off_data(surface, r):
+    """Mean |dz| of a reconstruction over its domain."""
+    points, heights = heights_over(surface, r)
+    return np.mean(np.abs(r.patch.height(*points.T) - heights))

@@ -27,17 +27,6 @@ UPRIGHT = [SamplingPlane(a) for a in AZIMUTHS]
 TILTED = [SamplingPlane(a, t) for a, t in zip(AZIMUTHS, np.radians([12, -18, 8]), strict=True)]
 
 
-def off_data(surface, r):
-    """Mean |dz| over the domain, measured by rays along the patch's normal direction."""
-    heights, wanted = [], []
-    for x, y in r.domain.grid(200)[0]:
-        start = r.frame.to_world([[x, y, r.radius]])[0]
-        hit = surface.ray_cast(start, -r.frame.axes[:, 2], 2 * r.radius)
-        wanted.append(r.frame.to_local([hit[0]])[0, 2])
-        heights.append(float(r.patch.height(x, y)))
-    return np.mean(np.abs(np.subtract(heights, wanted)))
-
-
 @pytest.mark.parametrize("planes", [UPRIGHT, TILTED], ids=["upright", "tilted"])
 @pytest.mark.parametrize("method", ["tagc", "quadratic-variation"])
 @pytest.mark.parametrize(
@@ -59,7 +48,7 @@ def test_exact_surfaces_of_paper_size(surface, method, planes):
     radius is down to 18 mm and least |K| flattens the rim; the curvatures to 0.0025 / mm."""
     contours = track(surface, surface.point, surface.normal, planes, extent=12, step=1)
     r = reconstruct(surface.point, contours, outward=surface.normal, method=method)
-    assert off_data(surface, r) < (0.04 if surface.k1 < -0.05 else 0.02) * r.radius
+    assert surfaces.off_data(surface, r) < (0.04 if surface.k1 < -0.05 else 0.02) * r.radius
     assert [r.patch.k1, r.patch.k2] == pytest.approx([surface.k1, surface.k2], abs=2.5e-3)
     assert r.fit_error == pytest.approx(
         np.mean(np.abs(r.patch.height(*r.contacts[:, :2].T) - r.contacts[:, 2]))
@@ -76,7 +65,7 @@ def test_a_quartic_along_its_own_curves_is_seen_by_least_squares_in_the_true_fra
     r = reconstruct(s.point, contours, outward=s.normal, method="least-squares")
     assert r.condition_number < 100
     assert r.status == "ok"
-    assert off_data(s, r) < 0.05
+    assert surfaces.off_data(s, r) < 0.05
     assert r.patch.coefficients[:4] == pytest.approx([2e-4, -3e-4, 1e-4, 2e-4], abs=2e-4)
     three = reconstruct(s.point, contours[::2], outward=s.normal, method="least-squares")
     assert three.condition_number > 1e3
@@ -98,7 +87,7 @@ def test_other_degrees(degree):
     contours = track(s, s.point, s.normal, UPRIGHT, extent=12, step=1)
     r = reconstruct(s.point, contours, outward=s.normal, degree=degree)
     assert r.patch.degree == degree
-    assert off_data(s, r) < 0.04 * r.radius
+    assert surfaces.off_data(s, r) < 0.04 * r.radius
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -167,13 +156,13 @@ def test_four_to_six_planes_and_curves_that_are_not_planar():
     for count in (4, 5, 6):
         planes = [SamplingPlane(a) for a in np.pi * np.arange(count) / count]
         contours = track(s, s.point, s.normal, planes, extent=10, step=1)
-        assert off_data(s, reconstruct(s.point, contours, outward=s.normal)) < 0.15
+        assert surfaces.off_data(s, reconstruct(s.point, contours, outward=s.normal)) < 0.15
     # A finger that swerves: the contour of one plane, continued in another one's.
     one, other = track(s, s.point, s.normal, [SamplingPlane(0.1), SamplingPlane(0.35)], extent=10, step=1)
     swerving = Contour(np.vstack([one.points[:11], other.points[11:]]))
     rest = track(s, s.point, s.normal, [SamplingPlane(1.2), SamplingPlane(2.3)], extent=10, step=1)
     r = reconstruct(s.point, [swerving, *rest], outward=s.normal)
-    assert off_data(s, r) < 0.5
+    assert surfaces.off_data(s, r) < 0.5
 
 
 GOOD = track(
