@@ -1,21 +1,38 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What knows Blender: the surface to touch, the operator, the patch object and the command line."""
+"""What knows Blender: surfaces to touch, probes, operators, panel, handles, patches and command line."""
 
 import bpy
 
-from . import command_line, operators
+from . import command_line, gizmos, operators, overlay, panel, pick, probe
 
-_commands = []
+CLASSES = (
+    operators.TACTILE_OT_reconstruct,
+    pick.TACTILE_OT_pick,
+    gizmos.TACTILE_OT_drag,
+    gizmos.TACTILE_GGT_handles,
+    *panel.OPERATORS,
+    *panel.PANELS,
+    panel.TactilePreferences,
+)
+_commands, _drawings = [], []
 
 
 def register():
-    bpy.utils.register_class(operators.TACTILE_OT_reconstruct)
-    bpy.types.VIEW3D_MT_object.append(operators.draw_menu)
+    probe.register()
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    panel.restore_tab()
+    bpy.types.VIEW3D_MT_object.append(panel.draw_menu)
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
+    _drawings.extend(overlay.draw_handlers())
 
 
 def unregister():
+    while _drawings:
+        bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
     bpy.utils.unregister_cli_command(_commands.pop())
-    bpy.types.VIEW3D_MT_object.remove(operators.draw_menu)
-    bpy.utils.unregister_class(operators.TACTILE_OT_reconstruct)
+    bpy.types.VIEW3D_MT_object.remove(panel.draw_menu)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
+    probe.unregister()

@@ -16,9 +16,16 @@ def symmetric_range(values, floor):
     return max(float(np.percentile(np.abs(values), 98.0)), floor)
 
 
-def diverging(values, limit):
-    """Linear RGBA (n, 4), as Blender stores colours, of values (n,) on a scale from -limit to limit."""
+def shades(values, limit):
+    """RGBA (n, 4), as screens have it (sRGB), of values (n,) on a scale from -limit to limit."""
     at = np.clip(np.asarray(values) / limit, -1.0, 1.0)
     srgb = np.column_stack([np.interp(at, np.linspace(-1.0, 1.0, len(STOPS)), stop) for stop in STOPS.T])
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return np.column_stack([linear, np.ones(len(linear))])
+    return np.column_stack([srgb, np.ones(len(srgb))])
+
+
+def diverging(values, limit):
+    """The same as linear RGBA, as Blender stores colours."""
+    rgba = shades(values, limit)
+    srgb = rgba[:, :3]
+    rgba[:, :3] = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    return rgba

@@ -11,8 +11,8 @@ from pathlib import Path
 import bpy
 
 from . import patch_object
-from .operators import METHODS, SOLVERS
 from .report import readable
+from .settings import METHODS, SOLVERS
 
 
 def main(args):

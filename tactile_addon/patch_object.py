@@ -12,37 +12,99 @@ COLLECTION = "Tactile Patches"
 RECORD = "tactile"  # the patch object's custom property that holds the report
 COLOUR = "curvature_colour"
 RINGS = 25  # of the patch mesh: 1951 vertices
+CONTOUR = "contour"
 CONTOUR_COLOUR = (0.02, 0.02, 0.02, 1.0)
+KEYS = {"FLOAT": "value", "INT": "value", "FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}
+# What the colours can show: attribute, name, description, and the power of length it is measured in.
+QUANTITIES = [
+    ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
+    ("mean_curvature", "Mean Curvature", "H: blue where the surface bulges outward, red where inward", -1),
+    ("deviation", "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
+    ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
+]
+POWERS = {name: power for name, _, _, power in QUANTITIES}
+POSITIVE = ("height_std",)  # never below zero: half a scale says it all
+FLOOR = 1e-3  # of the colours' range, in unit radius: a plane is white
 
 
-def insert(scene, reconstruction, contours, report, deviation):
-    """Adds the patch and its contours to `scene`, in a collection of their own; returns the patch object.
-
-    report : what the patch object keeps, completed here by what the objects are called and coloured
-    deviation(points (n, 3), normals (n, 3)) : signed world distances (n,) to the touched mesh
-    """
-    name = report["source"]
-    mesh, limit = _patch_mesh(f"{name} Patch", reconstruction, deviation)
-    patch = bpy.data.objects.new(f"{name} Patch", mesh)
-    patch.matrix_world = _matrix(reconstruction.frame)
-    lines = bpy.data.objects.new(
-        f"{name} Contours", _contour_mesh(f"{name} Contours", reconstruction, contours)
+def insert(scene, touched, parent=None):
+    """Adds the patch and its contours to `scene`, in a collection of their own; returns the patch object."""
+    name = touched.report["source"]
+    patch, lines = (
+        bpy.data.objects.new(f"{name} {what}", bpy.data.meshes.new(f"{name} {what}"))
+        for what in ("Patch", "Contours")
     )
-    lines.parent = patch
+    patch.parent, lines.parent = parent, patch
     for obj in (patch, lines):
         obj.show_in_front = True  # it lies in the surface it describes
-        _collection(scene).objects.link(obj)
-    patch[RECORD] = report | {"patch": patch.name, "contours": lines.name, "colour_limit": limit}
+        collection(scene).objects.link(obj)
+    patch.data.materials.append(emission("Tactile Curvature", attribute=COLOUR))
+    lines.data.materials.append(emission("Tactile Contour", colour=CONTOUR_COLOUR))
+    rewrite(patch, touched)
     return patch
 
 
-def _matrix(frame):
+def rewrite(patch, touched):
+    """Makes the patch, and its contours where they are still there, those of another touch, in place."""
+    _fill_patch(patch.data, touched)
+    names = {"patch": patch.name}
+    lines = contours_of(patch)
+    if lines is not None:
+        _fill_contours(lines.data, touched)
+        names["contours"] = lines.name
+    _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
+    patch[RECORD] = touched.report | names
+    recolour(patch)
+
+
+def _place(patch, matrix):
+    """Puts the patch there in the world, under its probe or not; it stays where the probe is deleted."""
+    if patch.parent is not None:
+        patch.matrix_parent_inverse = patch.parent.matrix_world.inverted_safe()
+    patch.matrix_basis = matrix
+
+
+def hold(patch):
+    """Keeps the patch where it was touched while its probe moves on without it."""
+    frame = patch[RECORD]["frame"]
+    matrix = _matrix(np.transpose([frame[name] for name in ("d1", "d2", "normal")]), frame["origin"])
+    if not np.allclose(patch.matrix_world, matrix, rtol=1e-6, atol=1e-6 * patch[RECORD]["radius"]):
+        _place(patch, matrix)
+
+
+def datablocks(patch):
+    """Those that a touch writes to, each taken back by undo on its own; none for no patch."""
+    if patch is None:
+        return []
+    lines = contours_of(patch)
+    return [patch, patch.data] + ([] if lines is None else [lines.data])
+
+
+def contours_of(patch):
+    """The contours of a patch object, or None."""
+    return next((child for child in patch.children if child.data and CONTOUR in child.data.attributes), None)
+
+
+def recolour(patch):
+    """Colours the patch by what it is set to show, and keeps their range in its record."""
+    shown, mesh = patch.tactile_colours, patch.data
+    values = np.empty(len(mesh.vertices), dtype=np.float32)
+    mesh.attributes[shown].data.foreach_get("value", values)
+    record = patch[RECORD]
+    limit = colours.symmetric_range(values, floor=FLOOR * record["radius"] ** POWERS[shown])
+    mesh.attributes[COLOUR].data.foreach_set("color", colours.diverging(values, limit).ravel())
+    mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOUR
+    mesh.update()
+    record["colour_limit"] = limit
+
+
+def _matrix(axes, origin):
     matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = frame.axes, frame.origin
+    matrix[:3, :3], matrix[:3, 3] = axes, origin
     return Matrix(matrix.tolist())
 
 
-def _collection(scene):
+def collection(scene):
     # In a second scene of the file it is "Tactile Patches.001".
     named = (c for c in scene.collection.children_recursive if c.name.partition(".")[0] == COLLECTION)
     found = next(named, None)
@@ -52,41 +114,40 @@ def _collection(scene):
     return found
 
 
-def _patch_mesh(name, reconstruction, deviation):
-    """The patch in the Darboux frame, with curvatures as attributes and colours; and the colours' range."""
-    patch, radius = reconstruction.patch, reconstruction.radius
-    plane, triangles = reconstruction.domain.triangulation(RINGS)
+def _fill_patch(mesh, touched):
+    """The patch in the Darboux frame, with its attributes; deviations are 0 until the touch is verified."""
+    result = touched.result
+    patch, frame = result.patch, result.frame
+    plane, triangles = result.domain.triangulation(RINGS)
     x, y = plane.T
     points, normals = np.column_stack([plane, patch.height(x, y)]), patch.normal(x, y)
-    gaussian = patch.gaussian_curvature(x, y)
-    limit = colours.symmetric_range(gaussian, floor=1e-3 / radius**2)
-    frame = reconstruction.frame
+    deviation = np.zeros(len(points))
+    if touched.is_verified:
+        world = frame.to_world(points), normals @ frame.axes.T
+        deviation = touched.surface.deviations(*world, result.radius)
     attributes = [
-        ("gaussian_curvature", "FLOAT", gaussian),
+        ("gaussian_curvature", "FLOAT", patch.gaussian_curvature(x, y)),
         ("mean_curvature", "FLOAT", patch.mean_curvature(x, y)),
-        ("height_std", "FLOAT", reconstruction.height_std(x, y)),
-        ("deviation", "FLOAT", deviation(frame.to_world(points), normals @ frame.axes.T)),
+        ("height_std", "FLOAT", result.height_std(x, y)),
+        ("deviation", "FLOAT", deviation),
         ("custom_normal", "FLOAT_VECTOR", normals),
-        (COLOUR, "FLOAT_COLOR", colours.diverging(gaussian, limit)),
+        (COLOUR, "FLOAT_COLOR", np.ones((len(points), 4))),
     ]
-    mesh = triangle_mesh(name, points, triangles, attributes)
-    mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOUR
-    mesh.materials.append(emission("Tactile Curvature", attribute=COLOUR))
-    return mesh, limit
+    fill(mesh, points, triangles, attributes)
 
 
-def _contour_mesh(name, reconstruction, contours):
+def _fill_contours(mesh, touched):
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
     Point attributes tell them apart: `contour` counts the contours, `contact` the contacts along
     one, and is -1 on the tubes.
     """
-    thickness = 0.009 * reconstruction.radius
+    frame, thickness = touched.result.frame, 0.009 * touched.result.radius
     points, triangles, contour_index, contact_index = [], [], [], []
     count = 0
-    for number, contour in enumerate(contours):
-        path = reconstruction.frame.to_local(contour.points)
-        across = reconstruction.frame.axes.T @ contour.plane_normal
+    for number, contour in enumerate(touched.contours):
+        path = frame.to_local(contour.points)
+        across = frame.axes.T @ contour.plane_normal
         for mesh_points, mesh_triangles, contact in (
             (*_tube(path, across, thickness), np.full(4 * len(path), -1)),
             (*_octahedra(path, 3.6 * thickness), np.repeat(np.arange(len(path)), 6)),
@@ -97,12 +158,10 @@ def _contour_mesh(name, reconstruction, contours):
             contact_index.append(contact)
             count += len(mesh_points)
     attributes = [
-        ("contour", "INT", np.concatenate(contour_index)),
+        (CONTOUR, "INT", np.concatenate(contour_index)),
         ("contact", "INT", np.concatenate(contact_index)),
     ]
-    mesh = triangle_mesh(name, np.vstack(points), np.vstack(triangles), attributes)
-    mesh.materials.append(emission("Tactile Contour", colour=CONTOUR_COLOUR))
-    return mesh
+    fill(mesh, np.vstack(points), np.vstack(triangles), attributes)
 
 
 def _tube(path, across, thickness):
@@ -126,21 +185,32 @@ def _octahedra(centres, radius):
     return (centres[:, None] + tips).reshape(-1, 3), (offsets[:, None, None] + faces).reshape(-1, 3)
 
 
-def triangle_mesh(name, points, triangles, attributes):
-    """A mesh of points (n, 3) and triangles (m, 3) with point attributes (name, Blender's type, values)."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(len(points))
-    mesh.vertices.foreach_set("co", points.astype(np.float32).ravel())
-    mesh.loops.add(triangles.size)
-    mesh.loops.foreach_set("vertex_index", triangles.astype(np.int32).ravel())
-    mesh.polygons.add(len(triangles))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
-    keys = {"FLOAT": "value", "INT": "value", "FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}
-    for attribute, kind, values in attributes:
+def fill(mesh, points, triangles, attributes):
+    """Gives `mesh` points (n, 3), triangles (m, 3) and point attributes (name, Blender's type, values).
+
+    Where it has these triangles already, only coordinates and values are written.
+    """
+    if not _has_triangles(mesh, len(points), triangles):
+        mesh.clear_geometry()
+        mesh.vertices.add(len(points))
+        mesh.loops.add(triangles.size)
+        mesh.loops.foreach_set("vertex_index", triangles.astype(np.int32).ravel())
+        mesh.polygons.add(len(triangles))
+        mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+        mesh.update(calc_edges=True)
+    for name, kind, values in [("position", "FLOAT_VECTOR", points), *attributes]:
         # No reference to an attribute may outlive the next `new`, which moves them all.
-        mesh.attributes.new(attribute, kind, "POINT").data.foreach_set(keys[kind], values.ravel())
-    mesh.update(calc_edges=True)
-    return mesh
+        attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, "POINT")
+        attribute.data.foreach_set(KEYS[kind], values.ravel())
+    mesh.update()
+
+
+def _has_triangles(mesh, count, triangles):
+    if (len(mesh.vertices), len(mesh.loops)) != (count, triangles.size):
+        return False
+    corners = np.empty(triangles.size, dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    return np.array_equal(corners, triangles.ravel())
 
 
 def emission(name, attribute=None, colour=(1.0, 1.0, 1.0, 1.0)):

@@ -3,11 +3,11 @@
 """A mesh object of the scene as a surface to touch: as it evaluates, in world coordinates."""
 
 import math
+import zlib
 
-import bmesh
 import numpy as np
-from mathutils import Vector
-from mathutils.bvhtree import BVHTree
+
+WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
 
 
 class MeshSurface:
@@ -49,6 +49,11 @@ class MeshSurface:
         edges = np.ptp(np.array(evaluated.bound_box), axis=0)
         self.size = float((edges * np.linalg.norm(self._linear, axis=0)).max())
 
+    @property
+    def checksum(self):
+        """Another for another shape of the mesh in the object's coordinates."""
+        return zlib.crc32(self._co)
+
     def ray_cast(self, origin, direction, distance):
         """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
         back, (x, y, z) = self._inverse_rows, self._at
@@ -80,19 +85,21 @@ class MeshSurface:
 
     def project(self, location):
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""
-        local = self._to_local(location)
-        gram = self._linear.T @ self._linear
-        if not np.allclose(gram, gram[0, 0] * np.eye(3), rtol=0.0, atol=1e-4 * gram[0, 0]):
-            # Nearest within a stretched object is not nearest in the world.
-            stretched = bmesh.new()
-            stretched.from_mesh(self._mesh)
-            for vertex, co in zip(stretched.verts, self._co @ self._linear.T, strict=True):
-                vertex.co = co
-            offset = Vector(np.subtract(location, self._origin))
-            nearest, *_ = BVHTree.FromBMesh(stretched).find_nearest(offset)
-            stretched.free()
-            local = local if nearest is None else self._inverse @ nearest
-        point, normal = self._nearest(local)
+        found = self._foot(location, location)
+        # Nearest within a stretched object is not nearest in the world: walk downhill from there, by the
+        # foot of the perpendicular on the face found, as long as that brings the surface nearer.
+        for _ in range(WALK):
+            point, normal, distance = found
+            height = np.dot(np.subtract(location, point), normal)
+            ahead = self._foot(np.subtract(location, height * np.array(normal)), location)
+            if ahead[2] >= (1.0 - 1e-6) * distance:
+                break
+            found = ahead
+        return found
+
+    def _foot(self, near, location):
+        """The point nearest, as the object measures, to the world point `near`; its normal, its distance."""
+        point, normal = self._nearest(self._to_local(near))
         if not any(normal):
             raise ValueError("The location is on a face of no area: move it, or dissolve degenerate faces")
         point = self._to_world(point)

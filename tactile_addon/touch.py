@@ -3,6 +3,7 @@
 """One touch, from an object of the scene to a reconstruction and its report; nothing in the scene changes."""
 
 import math
+from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
@@ -15,15 +16,43 @@ STEPS = 12  # of a half contour, where no step is given
 COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about curvature
 
 
-def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed, **fit):
+@dataclass(frozen=True)
+class Touch:
+    """What a touch gave; `report` is a dict of plain values, which `verify` completes."""
+
+    surface: MeshSurface
+    result: core.Reconstruction
+    contours: list[core.Contour]
+    report: dict
+
+    @property
+    def is_verified(self):
+        return "vertices" in self.report
+
+
+def touch(
+    obj,
+    depsgraph,
+    location,
+    planes,
+    *,
+    normal=None,
+    toward=None,
+    tangent=None,
+    extent,
+    step,
+    noise,
+    seed,
+    **fit,
+):
     """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
 
     location : world coordinates, projected onto the object
-    normal : outward, or None for the surface's
+    normal : outward, or None for the surface's; on the side of it that `toward` points to, where given
+    tangent : azimuth 0 of the planes, see core.SamplingPlane.axes; None for its choice
     extent, step : 0 for a choice by the object's size
     fit : what core.reconstruct takes
 
-    Returns the surface, the reconstruction, the contours and the report, a dict of plain values.
     Raises ValueError with a sentence for the user.
     """
     clock = [perf_counter()]
@@ -31,17 +60,16 @@ def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed
     extent, step = _lengths(obj.name, surface, extent, step, noise)
     point, surface_normal = _reference_point(obj.name, surface, location, extent, step)
     outward = surface_normal if normal is None else normal
+    if toward is not None and np.dot(outward, toward) < 0.0:
+        outward = [-v for v in outward]
+    axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
-    contours = core.track(surface, point, outward, planes, extent=extent, step=step, noise=noise, rng=seed)
+    contours = core.track(
+        surface, point, outward, planes, extent=extent, step=step, noise=noise, rng=seed, tangent=axes[:, 0]
+    )
     clock.append(perf_counter())
     result = core.reconstruct(point, contours, outward=outward, **fit)
     clock.append(perf_counter())
-    verification = _verification_report(surface, result)
-    clock.append(perf_counter())
-    suggestion = _suggestion_report(result, outward)
-    clock.append(perf_counter())
-    stages = ("prepare", "track", "fit", "verify", "suggest")
-    seconds = dict(zip(stages, np.diff(clock).tolist(), strict=True))
     report = {
         "source": obj.name,
         "status": result.status,
@@ -54,12 +82,24 @@ def touch(obj, depsgraph, location, normal, planes, *, extent, step, noise, seed
         "seed": seed,
         **_reconstruction_report(result),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
+        "axes": axes.tolist(),
         "stops": [list(contour.stops) for contour in contours],
-        **verification,
-        "suggested_plane": suggestion,
-        "seconds": seconds,
+        "seconds": dict(zip(("prepare", "track", "fit"), np.diff(clock).tolist(), strict=True)),
     }
-    return surface, result, contours, report
+    return Touch(surface, result, contours, report)
+
+
+def verify(touched, most=None):
+    """Completes the report by what is dear: where to touch next, and distances to the mesh.
+
+    most : of the vertices, where not all are to be compared
+    """
+    clock = [perf_counter()]
+    touched.report.update(_verification_report(touched.surface, touched.result, most))
+    clock.append(perf_counter())
+    touched.report["suggested_plane"] = _suggestion_report(touched.result, np.array(touched.report["axes"]))
+    clock.append(perf_counter())
+    touched.report["seconds"] |= dict(zip(("verify", "suggest"), np.diff(clock).tolist(), strict=True))
 
 
 def _lengths(name, surface, extent, step, noise):
@@ -95,11 +135,28 @@ def _reference_point(name, surface, location, extent, step):
     return point, normal
 
 
-def _verification_report(surface, result):
+def reference_axes(outward, tangent=None):
+    """Columns e1, n and e1 x n of the planes: by `tangent`, unless that is along the normal."""
+    plane = core.SamplingPlane(0.0)
+    try:
+        return plane.axes(outward, tangent)
+    except ValueError:
+        return plane.axes(outward)
+
+
+def plane_axes(matrix, settings, number):
+    """Columns t, u, t x u of a sampling plane of a probe with that world matrix; see core.SamplingPlane."""
+    plane = core.SamplingPlane(settings.azimuths[number], settings.tilts[number])
+    return plane.axes(matrix.col[2].xyz, matrix.col[0].xyz)
+
+
+def _verification_report(surface, result, most):
     """Distances to the patch of the vertices over it that a finger can reach; none where there are none."""
     frame, radius = result.frame, result.radius
     around = surface.vertices_near(frame.origin, 2.0 * radius)
     over = core.overlapped(frame, result.domain, radius, *around)
+    if most is not None:
+        over = over[:: max(1, math.ceil(len(over) / most))]
     up = frame.axes[:, 2].tolist()
     hidden = [surface.is_hidden(vertex, up, 2.0 * radius) for vertex in frame.to_world(over).tolist()]
     misses = core.distances(result.patch, over[~np.array(hidden, dtype=bool)])
@@ -112,13 +169,13 @@ def _verification_report(surface, result):
     }
 
 
-def _suggestion_report(result, outward):
+def _suggestion_report(result, reference):
     """The plane that would tell most, as an azimuth like those of `planes`, and what it would bring."""
     plane, expected = core.suggest_plane(result)
     d1, _, n = result.frame.axes.T
     tangent = plane.axes(n, d1)[:, 0]
     return {
-        "azimuth": math.degrees(core.azimuth_of(tangent, outward)),
+        "azimuth": math.degrees(core.azimuth_of(tangent, reference[:, 1], reference[:, 0])),
         "tangent": tangent.tolist(),
         "expected_height_std": expected,
     }

@@ -145,7 +145,8 @@ def _colour_bar(extension, put, limit, unit):
     triangles = np.vstack([corners + corner for corner in ((0, 1, 3), (0, 3, 2))])
     colours = module.colours.diverging(np.repeat(at, 2), 1.0)
     attributes = [(module.patch_object.COLOUR, "FLOAT_COLOR", colours)]
-    strip = module.patch_object.triangle_mesh("Colour Bar", points, triangles, attributes)
+    strip = bpy.data.meshes.new("Colour Bar")
+    module.patch_object.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])
     put.add("Colour Bar", strip, 2.35, 0.0)
     put.text("Gaussian curvature", 1.6, BAR_REACH + 0.45, 0.18)

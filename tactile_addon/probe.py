@@ -1,0 +1,294 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The probe: an Empty at a reference point that says how to touch there, and keeps a patch up to date.
+
+The patch is a child of its probe, so a copy of a probe has none and makes its own, and where a probe is
+deleted its patch stays as an ordinary object. Each probe keeps the digest of the inputs it was last
+touched with, and so do the datablocks made from them: undo takes back every datablock by itself, and
+where they differ afterwards the handler touches again.
+"""
+
+import hashlib
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+from mathutils import Matrix, Vector
+
+from . import patch_object
+from .settings import TouchSettings, changed, touch_arguments
+from .surface import MeshSurface
+from .touch import touch, verify
+
+SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
+DIGEST = "tactile_digest"
+VERTICES = 2000  # of the mesh, compared with the patch at most
+
+
+class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
+    """`Object.tactile_probe`; scripts set its properties as the panel does."""
+
+    is_probe: BoolProperty(
+        name="Is a Probe",
+        description="Whether this Empty touches its target",
+        options={"HIDDEN"},
+        update=changed,
+    )
+    target: PointerProperty(
+        name="Target",
+        description="The mesh object to touch",
+        type=bpy.types.Object,
+        poll=lambda _, obj: obj.type == "MESH" and not is_result(obj),
+        update=changed,
+    )
+    live: BoolProperty(
+        name="Live",
+        description="Touch again whenever the probe, its target or a number changes",
+        default=True,
+        update=changed,
+    )
+    active_plane: IntProperty(
+        name="Active Plane", description="The one with a handle to tilt it", min=0, options={"HIDDEN"}
+    )
+    message: StringProperty(description="Why there is no patch; empty where there is one", options={"HIDDEN"})
+    digest: StringProperty(options={"HIDDEN"})
+    shape: StringProperty(options={"HIDDEN"})
+
+
+def is_probe(obj):
+    return obj is not None and obj.type == "EMPTY" and obj.tactile_probe.is_probe
+
+
+def is_result(obj):
+    """Whether it is a patch or the contours of one."""
+    return patch_object.RECORD in obj or (obj.parent is not None and patch_object.RECORD in obj.parent)
+
+
+def probe_of(obj):
+    """The probe that `obj` is, or is the patch or the contours of, or None."""
+    for _ in range(3):
+        if obj is None or is_probe(obj):
+            return obj
+        obj = obj.parent
+    return None
+
+
+def patch_of(probe):
+    return next((child for child in probe.children if patch_object.RECORD in child), None)
+
+
+def patch_near(obj):
+    """The patch that `obj` is, or has as a probe, or is the contours of, or None."""
+    if obj is None or patch_object.RECORD in obj:
+        return obj
+    if is_probe(obj):
+        return patch_of(obj)
+    return obj.parent if is_result(obj) else None
+
+
+def record_of(obj):
+    """The report, an ID property, of the patch near `obj`, or None."""
+    patch = patch_near(obj)
+    return None if patch is None else patch[patch_object.RECORD]
+
+
+def probes(view_layer):
+    return [obj for obj in view_layer.objects if is_probe(obj) and obj.library is None]
+
+
+def make(context, target):
+    """A new probe; it touches nothing before `is_probe` is set."""
+    probe = bpy.data.objects.new(f"{target.name} Probe", None)
+    probe.empty_display_type = "SINGLE_ARROW"
+    patch_object.collection(context.scene).objects.link(probe)
+    probe.tactile_probe.target = target
+    return probe
+
+
+def _put(probe, touched):
+    """Puts the probe on the reference point, z outward, x to azimuth 0; one already there stays as it is."""
+    location, (e1, n, across) = touched.result.frame.origin, np.transpose(touched.report["axes"])
+    turn = Matrix(np.column_stack([e1, -across, n]).tolist())
+    wanted = Matrix.LocRotScale(Vector(location), turn.to_quaternion(), None)
+    old, new = np.array(probe.matrix_world.normalized()), np.array(wanted)
+    if not np.allclose(old[:3, :3], new[:3, :3], atol=1e-4) or not np.array_equal(
+        old[:3, 3].astype(np.float32), new[:3, 3].astype(np.float32)
+    ):
+        probe.matrix_world = wanted @ Matrix.Diagonal((*probe.matrix_world.to_scale(), 1.0))
+
+
+def update(probe, depsgraph, complete):
+    """Touches again and rewrites the probe's patch; the probe's message says why where that fails.
+
+    complete : with what is dear, the distances to the mesh, and the probe put onto the surface
+    """
+    settings, patch = probe.tactile_probe, patch_of(probe)
+    try:
+        touched = _touch(probe, depsgraph)
+    except ValueError as error:
+        settings.message = str(error)[:1].upper() + str(error)[1:]
+        if patch is not None:
+            patch_object.hold(patch)
+        _sign(probe, depsgraph)
+    else:
+        adopt(probe, touched, depsgraph, complete)
+
+
+def adopt(probe, touched, depsgraph, complete):
+    """Makes the probe's patch that of `touched`; `complete` as in update."""
+    probe.tactile_probe.message = ""
+    if complete:
+        verify(touched, most=VERTICES)
+        _put(probe, touched)
+    patch = patch_of(probe)
+    if patch is None:
+        patch_object.insert(depsgraph.scene, touched, parent=probe)
+    else:
+        patch_object.rewrite(patch, touched)
+    _sign(probe, depsgraph)
+
+
+def _touch(probe, depsgraph):
+    settings, matrix = probe.tactile_probe, probe.matrix_world
+    if settings.target is None:
+        raise ValueError("the probe has no target: choose the mesh to touch")
+    if not _is_there(settings.target, depsgraph):
+        raise ValueError(
+            f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
+        )
+    return touch(
+        settings.target,
+        depsgraph,
+        list(matrix.translation),
+        toward=list(matrix.col[2].xyz),
+        tangent=list(matrix.col[0].xyz),
+        **touch_arguments(settings),
+    )
+
+
+def _is_there(target, depsgraph):
+    return depsgraph.view_layer.objects.get(target.name) == target
+
+
+def is_outdated(probe, depsgraph):
+    """Whether its patch is another than its inputs ask for, by the probe or by what it is made of."""
+    digest = _digest(probe, depsgraph)
+    blocks = patch_object.datablocks(patch_of(probe))
+    return probe.tactile_probe.digest != digest or any(block.get(DIGEST) != digest for block in blocks)
+
+
+def _sign(probe, depsgraph):
+    _measure_shape(probe.tactile_probe, depsgraph)
+    digest = _digest(probe, depsgraph)
+    probe.tactile_probe.digest = digest
+    for block in patch_object.datablocks(patch_of(probe)):
+        block[DIGEST] = digest
+
+
+def _digest(probe, depsgraph):
+    """Of all inputs of a touch, and of the probe's name, which a copy does not share.
+
+    The checksum of the target's vertices is dear, so it is kept, and taken anew where they may have changed.
+    """
+    settings, matrix = probe.tactile_probe, probe.matrix_world
+    target = settings.target
+    # What Blender makes of a rotation and back is not the same to the last digit.
+    axes = [round(v, 5) + 0.0 for row in matrix.normalized().to_3x3() for v in row]
+    inputs = [probe.name, *matrix.translation, *axes, touch_arguments(settings)]
+    if target is not None:
+        inputs += [_is_there(target, depsgraph), settings.shape, *map(tuple, target.matrix_world)]
+    return hashlib.sha1(repr(inputs).encode()).hexdigest()
+
+
+def _measure_shape(settings, depsgraph, reshaped=()):
+    target = settings.target
+    if target is None or (settings.shape.startswith(f"{target.name} ") and target not in reshaped):
+        return
+    try:
+        checksum = MeshSurface(target, depsgraph).checksum
+    except ValueError:  # the touch will say what is wrong
+        checksum = 0
+    settings.shape = f"{target.name} {checksum:08x}"
+
+
+@persistent
+def on_depsgraph_update(scene, depsgraph):
+    """Brings the patches of outdated live probes up to date; nothing happens where no input has changed."""
+    if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
+        return
+    reshaped = {u.id.original for u in depsgraph.updates if u.is_updated_geometry}
+    for probe in probes(depsgraph.view_layer):
+        settings = probe.tactile_probe
+        _forget_deleted(settings)
+        _measure_shape(settings, depsgraph, reshaped)
+        patch = patch_of(probe)
+        if is_outdated(probe, depsgraph):
+            if settings.live:
+                update(probe, depsgraph, complete=bpy.app.background)
+            elif patch is not None:
+                patch_object.hold(patch)
+        if is_pending(probe) and not bpy.app.background:
+            _settle_soon()
+
+
+def refresh(probe, context):
+    """Touches again at the end of a gesture, with all there is to know."""
+    update(probe, context.evaluated_depsgraph_get(), complete=True)
+
+
+def _forget_deleted(settings):
+    """A deleted target lives on as long as the probe points to it: lets go, so that it is deleted."""
+    target = settings.target
+    if target is not None and not target.users_scene:
+        settings.property_unset("target")
+        if not target.users:
+            bpy.data.objects.remove(target)
+
+
+def is_pending(probe):
+    """Whether what is dear is still to be filled in."""
+    patch = patch_of(probe)
+    return (
+        patch is not None and not probe.tactile_probe.message and "vertices" not in patch[patch_object.RECORD]
+    )
+
+
+def _settle_soon():
+    if bpy.app.timers.is_registered(_settle):
+        bpy.app.timers.unregister(_settle)
+    bpy.app.timers.register(_settle, first_interval=SETTLE)
+
+
+def _settle():
+    """Completes what the gesture has left, once it has ended; a timer."""
+    windows = bpy.context.window_manager.windows
+    gestures = ("TRANSFORM_OT_", "TACTILE_OT_")
+    if any(op.bl_idname.startswith(gestures) for window in windows for op in window.modal_operators):
+        return SETTLE
+    for window in windows:
+        with bpy.context.temp_override(window=window):
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            for probe in filter(is_pending, probes(window.view_layer)):
+                update(probe, depsgraph, complete=True)
+    return None
+
+
+def register():
+    bpy.utils.register_class(TactileProbe)
+    bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe)
+    bpy.types.Object.tactile_colours = EnumProperty(
+        name="Colours",
+        description="What the colours of the patch show",
+        items=[item[:3] for item in patch_object.QUANTITIES],
+        update=lambda obj, _: patch_object.recolour(obj) if patch_object.RECORD in obj else None,
+    )
+    bpy.app.handlers.depsgraph_update_post.append(on_depsgraph_update)
+
+
+def unregister():
+    if bpy.app.timers.is_registered(_settle):
+        bpy.app.timers.unregister(_settle)
+    bpy.app.handlers.depsgraph_update_post.remove(on_depsgraph_update)
+    del bpy.types.Object.tactile_colours, bpy.types.Object.tactile_probe
+    bpy.utils.unregister_class(TactileProbe)

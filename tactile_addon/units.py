@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lengths and curvatures in words, in the unit the scene shows lengths in."""
+
+METRES = {
+    "KILOMETERS": ("km", 1e3),
+    "METERS": ("m", 1.0),
+    "CENTIMETERS": ("cm", 1e-2),
+    "MILLIMETERS": ("mm", 1e-3),
+    "MICROMETERS": ("µm", 1e-6),
+    "MILES": ("mi", 1609.344),
+    "FEET": ("ft", 0.3048),
+    "INCHES": ("in", 0.0254),
+    "THOU": ("thou", 2.54e-5),
+}
+ADAPTIVE = {
+    "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
+    "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
+}
+POWERS = {1: "", 2: "²"}
+
+
+def unit_of(scene, size):
+    """(name, length in units of the world) of the unit for a thing of that size; "" where there is none."""
+    settings = scene.unit_settings
+    if settings.system == "NONE":
+        return "", 1.0
+    name = settings.length_unit
+    if name == "ADAPTIVE":
+        names = ADAPTIVE[settings.system]
+        fitting = (n for n in names if METRES[n][1] <= size * settings.scale_length * (1.0 + 1e-6))
+        name = next(fitting, names[-1])
+    symbol, metres = METRES[name]
+    return symbol, metres / settings.scale_length
+
+
+def say(value, power, unit):
+    """A value in length^power, as in "0.0123 mm" or "-4.2 1/mm²"."""
+    return f"{value / unit[1] ** power:.3g} {symbol(power, unit)}".strip()
+
+
+def symbol(power, unit):
+    """The unit of length^power, as in "mm" or "1/mm²"; empty where lengths have none."""
+    name = unit[0]
+    return f"1/{name}{POWERS[-power]}" if name and power < 0 else name
