@@ -179,9 +179,9 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
 
     def _ball(self, what, plane, colour):
         ball = self._handle("GIZMO_GT_move_3d", what, plane, colour)
-        ball.draw_style = "RING_2D" if what == TURN else "CROSS_2D"
-        ball.draw_options = {"FILL", "FILL_SELECT", "ALIGN_VIEW"}
-        ball.scale_basis = 0.12
+        ball.draw_style = "RING_2D"
+        ball.draw_options = {"FILL", "ALIGN_VIEW"} if what == TURN else {"FILL_SELECT", "ALIGN_VIEW"}
+        ball.scale_basis, ball.line_width = 0.12, 3.0
         return ball
 
     def _handle(self, kind, what, plane, colour):
@@ -205,5 +205,4 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
                 t, up, _ = plane_axes(matrix, settings, i).T
                 turn.matrix_basis = Matrix.Translation(centre + REACH * reach * t)
                 tilt.matrix_basis = Matrix.Translation(centre + UPRIGHT * reach * up)
-        self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), None)
-        self.extent.scale_basis = reach
+        self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)

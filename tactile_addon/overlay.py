@@ -69,11 +69,9 @@ def draw_plane():
     corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (1, 0.6), (-1, 0.6))]
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
-    gpu.state.depth_test_set("LESS_EQUAL")
     shader.uniform_float("color", (*PLANE_COLOURS[number], 0.25))
     positions = {"pos": [corner.tolist() for corner in corners]}
     batch_for_shader(shader, "TRIS", positions, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
-    gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")
 
 
@@ -110,8 +108,8 @@ def _draw_bar(context, title, low, labels):
         blf.dimensions(font, title)[0], width + gap + max(blf.dimensions(font, t)[0] for _, t in texts)
     )
     right, bottom = _free_corner(context)
-    x, y = right - gap - wide, bottom + 2 * gap
-    _box(x - gap, y - gap, wide + 2 * gap, height + 2 * line + 3 * gap, theme.inner)
+    x, y = right - 2 * gap - wide, bottom + 3 * gap
+    _box(x - gap, y - 1.5 * gap, wide + 2 * gap, height + 2 * line + 3.5 * gap, theme.inner)
     steps = np.linspace(low, 1.0, 33)
     edges = y + height * (np.linspace(0.0, 1.0, 33))
     points = [(a, b) for b in edges for a in (x, x + width)]

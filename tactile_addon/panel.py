@@ -228,8 +228,8 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             row.label(text=label)
             row.label(text=value)
         _draw_sentence(context, box, record["message"], ICONS[record["status"]])
-        if found is not None and "suggested_plane" in record:
-            _draw_suggestion(layout, record["suggested_plane"], unit)
+        if found is not None:
+            layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
 
 
 def _rows(record, unit):
@@ -240,24 +240,21 @@ def _rows(record, unit):
         ("Gaussian K", units.say(record["gaussian_curvature"], -2, unit)),
         ("Mean H", units.say(record["mean_curvature"], -1, unit)),
         ("Fit Error", units.say(record["fit_error"], 1, unit)),
-        ("Standard Deviation", units.say(record["height_std"], 1, unit)),
+        ("Standard Deviation", "± " + units.say(record["height_std"], 1, unit)),
     ]
     if "vertices" not in record:
         return [*rows, ("Mesh to Patch", "…")]
-    if not record["vertices"]:
-        return [*rows, ("Mesh to Patch", "no vertex there")]
+    if record["vertices"]:
+        rows += [
+            ("Mesh to Patch", units.say(record["vertex_distance_mean"], 1, unit)),
+            ("… at Most", units.say(record["vertex_distance_max"], 1, unit)),
+        ]
+    plane = record["suggested_plane"]
     return [
         *rows,
-        ("Mesh to Patch", units.say(record["vertex_distance_mean"], 1, unit)),
-        ("At Most", units.say(record["vertex_distance_max"], 1, unit)),
+        ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
+        ("… Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
     ]
-
-
-def _draw_suggestion(layout, plane, unit):
-    row = layout.row()
-    words = f"Next: {plane['azimuth']:.0f}°, to ±{units.say(plane['expected_height_std'], 1, unit)}"
-    row.label(text=words)
-    row.operator(TACTILE_OT_add_plane.bl_idname, text="Add", icon="ADD")
 
 
 def _draw_sentence(context, layout, sentence, icon):

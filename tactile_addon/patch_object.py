@@ -12,7 +12,7 @@ COLLECTION = "Tactile Patches"
 RECORD = "tactile"  # the patch object's custom property that holds the report
 COLOUR = "curvature_colour"
 RINGS = 25  # of the patch mesh: 1951 vertices
-CONTOUR = "contour"
+CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 CONTOUR_COLOUR = (0.02, 0.02, 0.02, 1.0)
 KEYS = {"FLOAT": "value", "INT": "value", "FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}
 # What the colours can show: attribute, name, description, and the power of length it is measured in.
@@ -34,7 +34,7 @@ def insert(scene, touched, parent=None):
         bpy.data.objects.new(f"{name} {what}", bpy.data.meshes.new(f"{name} {what}"))
         for what in ("Patch", "Contours")
     )
-    patch.parent, lines.parent = parent, patch
+    patch.parent, lines.parent, lines[CONTOURS] = parent, patch, True
     for obj in (patch, lines):
         obj.show_in_front = True  # it lies in the surface it describes
         collection(scene).objects.link(obj)
@@ -61,6 +61,7 @@ def _place(patch, matrix):
     """Puts the patch there in the world, under its probe or not; it stays where the probe is deleted."""
     if patch.parent is not None:
         patch.matrix_parent_inverse = patch.parent.matrix_world.inverted_safe()
+    patch.matrix_world = matrix  # known before the next evaluation
     patch.matrix_basis = matrix
 
 
@@ -82,7 +83,7 @@ def datablocks(patch):
 
 def contours_of(patch):
     """The contours of a patch object, or None."""
-    return next((child for child in patch.children if child.data and CONTOUR in child.data.attributes), None)
+    return next((child for child in patch.children if CONTOURS in child), None)
 
 
 def recolour(patch):
@@ -158,7 +159,7 @@ def _fill_contours(mesh, touched):
             contact_index.append(contact)
             count += len(mesh_points)
     attributes = [
-        (CONTOUR, "INT", np.concatenate(contour_index)),
+        ("contour", "INT", np.concatenate(contour_index)),
         ("contact", "INT", np.concatenate(contact_index)),
     ]
     fill(mesh, np.vstack(points), np.vstack(triangles), attributes)

@@ -62,16 +62,7 @@ def is_probe(obj):
 
 def is_result(obj):
     """Whether it is a patch or the contours of one."""
-    return patch_object.RECORD in obj or (obj.parent is not None and patch_object.RECORD in obj.parent)
-
-
-def probe_of(obj):
-    """The probe that `obj` is, or is the patch or the contours of, or None."""
-    for _ in range(3):
-        if obj is None or is_probe(obj):
-            return obj
-        obj = obj.parent
-    return None
+    return patch_object.RECORD in obj or patch_object.CONTOURS in obj
 
 
 def patch_of(probe):
@@ -80,11 +71,19 @@ def patch_of(probe):
 
 def patch_near(obj):
     """The patch that `obj` is, or has as a probe, or is the contours of, or None."""
-    if obj is None or patch_object.RECORD in obj:
-        return obj
     if is_probe(obj):
         return patch_of(obj)
-    return obj.parent if is_result(obj) else None
+    if obj is not None and patch_object.CONTOURS in obj:
+        obj = obj.parent
+    return obj if obj is not None and patch_object.RECORD in obj else None
+
+
+def probe_of(obj):
+    """The probe that `obj` is, or is the patch or the contours of, or None."""
+    if is_probe(obj):
+        return obj
+    patch = patch_near(obj)
+    return patch.parent if patch is not None and is_probe(patch.parent) else None
 
 
 def record_of(obj):
@@ -141,6 +140,7 @@ def adopt(probe, touched, depsgraph, complete):
     if complete:
         verify(touched, most=VERTICES)
         _put(probe, touched)
+    probe.empty_display_size = 0.6 * touched.report["extent"]
     patch = patch_of(probe)
     if patch is None:
         patch_object.insert(depsgraph.scene, touched, parent=probe)

@@ -570,6 +570,6 @@ def test_disabling_and_enabling_leaves_nothing_behind(extension):
 
 
 def test_the_menus_offer_what_core_offers(extension):
-    operators = extension.tactile_addon.operators
-    assert tuple(name for name, _, _ in operators.METHODS) == extension.core.METHODS
-    assert tuple(name for name, _, _ in operators.SOLVERS) == extension.core.SOLVERS
+    settings = extension.tactile_addon.settings
+    assert tuple(name for name, _, _ in settings.METHODS) == extension.core.METHODS
+    assert tuple(name for name, _, _ in settings.SOLVERS) == extension.core.SOLVERS
