@@ -18,7 +18,10 @@ PLANE_COLOURS = [
 ]  # fmt: skip
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 97)
-BAR = 14, 140  # width and height of the legend's bar, in pixels at the resolution scale 1
+FONT = 0
+STEPS = 65  # of the legend's colours
+# In pixels at the resolution scale 1, width and height: the legend's bar, and Blender's navigation buttons.
+BAR, NAVIGATION = (150, 12), (50, 290)
 
 
 def draw_preview(seen):
@@ -69,7 +72,7 @@ def draw_plane():
     corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (1, 0.6), (-1, 0.6))]
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
-    shader.uniform_float("color", (*PLANE_COLOURS[number], 0.25))
+    shader.uniform_float("color", (*PLANE_COLOURS[number], 0.18))
     positions = {"pos": [corner.tolist() for corner in corners]}
     batch_for_shader(shader, "TRIS", positions, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
     gpu.state.blend_set("NONE")
@@ -93,56 +96,69 @@ def draw_legend():
 
 
 def _draw_bar(context, title, low, labels):
+    """The title, the colours from `low` to 1, the (place, text) labels; nothing where it has no room."""
     theme, scale = (
         context.preferences.themes[0].user_interface.wcol_tooltip,
         context.preferences.system.ui_scale,
     )
-    font = 0
-    blf.size(font, 11.0 * scale)
-    blf.color(font, *theme.text, 1.0)
-    width, height = (round(v * scale) for v in BAR)
-    gap = round(8 * scale)
-    line = blf.dimensions(font, "0")[1]
-    texts = [(at, text.replace("-", "\N{MINUS SIGN}")) for at, text in labels]
-    wide = max(
-        blf.dimensions(font, title)[0], width + gap + max(blf.dimensions(font, t)[0] for _, t in texts)
-    )
-    right, bottom = _free_corner(context)
-    x, y = right - 2 * gap - wide, bottom + 3 * gap
-    _box(x - gap, y - 1.5 * gap, wide + 2 * gap, height + 2 * line + 3.5 * gap, theme.inner)
-    steps = np.linspace(low, 1.0, 33)
-    edges = y + height * (np.linspace(0.0, 1.0, 33))
-    points = [(a, b) for b in edges for a in (x, x + width)]
-    shades = colours.shades(np.repeat(steps, 2), 1.0)
-    corners = [(2 * i + a, 2 * i + b, 2 * i + c) for i in range(32) for a, b, c in ((0, 1, 2), (1, 3, 2))]
+    blf.size(FONT, 11.0 * scale)
+    blf.color(FONT, *theme.text, 1.0)
+    gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
+    high = BAR[1] * scale + 2.0 * line + 4.0 * gap
+    left, right, bottom = _free_strip(context, high + gap)
+    wide = min(max(BAR[0] * scale, blf.dimensions(FONT, title)[0]) + 4.0 * gap, right - left - gap)
+    if wide < 0.5 * BAR[0] * scale or bottom + high > context.region.height:
+        return
+    x, y = right - gap - wide, bottom + gap
+    _fill([(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)], [(*theme.inner[:3], 0.8)] * 4)
+    x, y, wide = x + 2.0 * gap, y + 2.0 * gap + line, wide - 4.0 * gap
+    at = np.linspace(x, x + wide, STEPS)
+    shades = colours.shades(np.repeat(np.linspace(low, 1.0, STEPS), 2), 1.0)
+    _fill([(a, b) for a in at for b in (y, y + BAR[1] * scale)], shades.tolist())
+    for share, text in labels:
+        text = text.replace("-", "\N{MINUS SIGN}")
+        middle = x + (share - low) / (1.0 - low) * wide
+        length = blf.dimensions(FONT, text)[0]
+        _write(text, min(max(middle - 0.5 * length, x - gap), x + wide + gap - length), y - gap - line)
+    blf.size(FONT, 11.0 * scale * min(1.0, wide / blf.dimensions(FONT, title)[0]))
+    _write(title, x, y + BAR[1] * scale + gap)
+
+
+def _write(text, x, y):
+    blf.position(FONT, x, y, 0.0)
+    blf.draw(FONT, text)
+
+
+def _fill(points, shades):
+    """A strip of triangles, each of its points (x, y) in a colour of its own."""
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    batch_for_shader(shader, "TRIS", {"pos": points, "color": shades.tolist()}, indices=corners).draw(shader)
-    for at, text in texts:
-        share = (at - low) / (1.0 - low)
-        blf.position(font, x + width + gap, y + share * height - 0.5 * line, 0.0)
-        blf.draw(font, text)
-    blf.position(font, x, y + height + line + 0.5 * gap, 0.0)
-    blf.draw(font, title)
-
-
-def _box(x, y, width, height, colour):
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
-    shader.uniform_float("color", (*colour[:3], 0.8))
-    corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height)]
-    batch_for_shader(shader, "TRIS", {"pos": corners}, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
+    batch_for_shader(shader, "TRI_STRIP", {"pos": points, "color": shades}).draw(shader)
     gpu.state.blend_set("NONE")
 
 
-def _free_corner(context):
-    """The lower right corner of what no sidebar or shelf covers of the viewport's region."""
-    region, right, bottom = context.region, context.region.width, 0
+def _free_strip(context, high):
+    """(left, right, bottom) of a strip so high that no sidebar, shelf or button covers, as low as can be."""
+    region, scale = context.region, context.preferences.system.ui_scale
+    left, right, bottom = 0.0, region.width, 0.0
+    hud = 0.0
     for other in context.area.regions:
-        if other.type == "UI" and other.alignment == "RIGHT" and other.width > 1:
-            right = min(right, other.x - region.x)
-        if other.alignment == "BOTTOM" and other.type not in ("WINDOW", "HUD") and other.height > 1:
-            bottom = max(bottom, other.y + other.height - region.y)
-    return right, bottom
+        if other.type == "WINDOW" or min(other.width, other.height) <= 1:
+            continue
+        x, y = other.x - region.x, other.y - region.y
+        if other.type == "HUD":
+            hud, hud_top = x + other.width, y + other.height
+        elif other.alignment == "LEFT":
+            left = max(left, x + other.width)
+        elif other.alignment == "RIGHT":
+            right = min(right, x)
+        elif other.alignment == "BOTTOM":
+            bottom = max(bottom, y + other.height)
+    if region.height - NAVIGATION[1] * scale < bottom + high:
+        right -= NAVIGATION[0] * scale
+    if hud and right - 1.3 * BAR[0] * scale < hud:
+        bottom = max(bottom, hud_top)
+    return left, right, bottom
 
 
 def draw_handlers():

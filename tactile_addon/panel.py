@@ -188,7 +188,8 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
 def _draw_planes(layout, settings):
     column = layout.column(align=True)
     heading = column.row(align=True)
-    heading.label(text="Planes")
+    for text in ("Azimuth", "Tilt"):
+        heading.label(text=text)
     heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
     for i in range(settings.plane_count):
         row = column.row(align=True)
