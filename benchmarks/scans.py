@@ -100,13 +100,12 @@ def _rows(extension, scan, data):
     import bpy
 
     extension.tactile_addon.command_line.open_file(data / scan.file)
-    touched = (bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get(), scan.location, None)
+    touched = (bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get(), scan.location)
     planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
     lengths = {"extent": scan.extent, "step": scan.extent / scan.steps, "noise": scan.noise}
     for method in METHODS:
         fit = {"seed": 0, "method": method, "degree": 4}
-        touch = extension.tactile_addon.touch.touch
-        reports = [touch(*touched, planes, **lengths, **fit)[3] for _ in range(RUNS + 1)]
+        reports = [_report(extension, *touched, planes, **lengths, **fit) for _ in range(RUNS + 1)]
         seconds = [report["seconds"] for report in reports[1:]]
         report = reports[0]
         contacts, fit_error, distance = PAPER.get((scan.name, method), ("", "", ""))
@@ -138,17 +137,17 @@ def _random_row(extension, scan, data, count):
         location = obj.matrix_world @ obj.data.polygons[index].center
         try:
             bayes, tagc = (
-                extension.tactile_addon.touch.touch(
+                _report(
+                    extension,
                     obj,
                     depsgraph,
                     location,
-                    None,
                     planes,
                     **lengths,
                     seed=int(index),
                     method=method,
                     degree=4,
-                )[3]
+                )
                 for method in ("bayes", "tagc")
             )
         except ValueError:  # an edge or a hole: no touch
@@ -175,6 +174,12 @@ def _random_row(extension, scan, data, count):
         f"{1e3 * fit:.1f}",
     )
     return f"| {' | '.join(cells)} |"
+
+
+def _report(extension, *place, **inputs):
+    touched = extension.tactile_addon.touch.touch(*place, **inputs)
+    extension.tactile_addon.touch.verify(touched)
+    return touched.report
 
 
 def _beside(ours, paper):

@@ -3,7 +3,7 @@
 """The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A)."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,10 +44,12 @@ class Domain:
 
     def boundary(self, n: int) -> Array:
         """n points on the boundary, (n, 2), counterclockwise from azimuth 0 in equal turns."""
-        azimuth = 2.0 * np.pi * np.arange(n) / n
+        return self._at(2.0 * np.pi * np.arange(n) / n)
+
+    def _at(self, azimuth: Array) -> Array:
         return self._radius(azimuth)[:, None] * np.column_stack([np.cos(azimuth), np.sin(azimuth)])
 
-    @property
+    @cached_property
     def area(self) -> float:
         """The area inside, in length^2."""
         x, y = self.boundary(SAMPLES).T
@@ -69,22 +71,30 @@ class Domain:
         Ring k has 6k points in equal turns, so that triangles are of one size and near to equilateral
         where the domain is near to a disk.
         """
-        points = [np.zeros((1, 2))]
-        triangles = []
-        start, inner_start = 1, 0
-        for k in range(1, rings + 1):
-            points.append(self.boundary(6 * k) * (k / rings))
-            outer = np.arange(6 * k)
-            # Outer point s of sector q stands between the inner points s - 1 and s of that sector.
-            sector, s = np.divmod(outer, k)
-            inner = inner_start + (sector * (k - 1) + s) % max(6 * (k - 1), 1)
-            following = start + (outer + 1) % (6 * k)
-            triangles.append(np.column_stack([start + outer, following, inner]))
-            between = s > 0
-            before = inner_start + (sector * (k - 1) + s - 1) % max(6 * (k - 1), 1)
-            triangles.append(np.column_stack([start + outer, inner, before])[between])
-            inner_start, start = start, start + 6 * k
-        return np.vstack(points), np.vstack(triangles)
+        ring = np.repeat(np.arange(rings + 1), [1, *range(6, 6 * rings + 1, 6)])
+        turn = np.concatenate([[0.0], *(np.arange(6 * k) / (6 * k) for k in range(1, rings + 1))])
+        return self._at(2.0 * np.pi * turn) * (ring / rings)[:, None], _disk(rings)
+
+
+@lru_cache(maxsize=4)
+def _disk(rings: int) -> NDArray[np.intp]:
+    """The triangles between the rings of Domain.triangulation."""
+    triangles = []
+    start, inner_start = 1, 0
+    for k in range(1, rings + 1):
+        outer = np.arange(6 * k)
+        # Outer point s of sector q stands between the inner points s - 1 and s of that sector.
+        sector, s = np.divmod(outer, k)
+        inner = inner_start + (sector * (k - 1) + s) % max(6 * (k - 1), 1)
+        following = start + (outer + 1) % (6 * k)
+        triangles.append(np.column_stack([start + outer, following, inner]))
+        between = s > 0
+        before = inner_start + (sector * (k - 1) + s - 1) % max(6 * (k - 1), 1)
+        triangles.append(np.column_stack([start + outer, inner, before])[between])
+        inner_start, start = start, start + 6 * k
+    disk = np.vstack(triangles)
+    disk.flags.writeable = False
+    return disk
 
 
 def closed_spline_domain(ends: ArrayLike, radius: float) -> Domain:

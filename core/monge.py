@@ -78,18 +78,25 @@ class MongePatch:
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives at (x, y)."""
-        orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
-        return Derivatives(*(self._derivative(x, y, dx, dy) for dx, dy in orders))
+        return Derivatives(*self._evaluate(x, y, [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """z(x, y)."""
-        return self._derivative(x, y, 0, 0)
+        return self._evaluate(x, y, [(0, 0)])[0]
 
-    def _derivative(self, x: ArrayLike, y: ArrayLike, dx: int, dy: int) -> Array:
+    def _evaluate(self, x: ArrayLike, y: ArrayLike, orders: list[tuple[int, int]]) -> Array:
+        """The derivatives of `orders` (dx, dy), (m, ...): rows x^i, times tables of a_ij, times y^j."""
         x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        a = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
-        basis = monomials(x_array.ravel(), y_array.ravel(), exponents(2, self.degree), dx, dy)
-        return (basis @ a).reshape(x_array.shape)
+        powers = self.degree + 1
+        table = np.zeros((powers, powers))
+        i, j = exponents(2, self.degree).T
+        table[i, j] = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
+        derive = np.diag(np.arange(1.0, powers), 1)  # takes the a_i of x^i to those of its derivative
+        power = np.linalg.matrix_power
+        tables = [power(derive, dx) @ table @ power(derive.T, dy) for dx, dy in orders]
+        x_powers, y_powers = (np.vander(v.ravel(), powers, increasing=True) for v in (x_array, y_array))
+        rows = (x_powers @ np.hstack(tables)).reshape(-1, len(orders), powers)
+        return np.einsum("nmj,nj->mn", rows, y_powers).reshape(len(orders), *x_array.shape)
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Unit normal on the side of +z, shape (..., 3)."""

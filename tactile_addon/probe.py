@@ -23,7 +23,7 @@ from .touch import touch, verify
 
 SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
 DIGEST = "tactile_digest"
-VERTICES = 2000  # of the mesh, compared with the patch at most
+VERTICES = 8000  # of the mesh around, compared with the patch at most; a quarter of them lies over it
 
 
 class TactileProbe(TouchSettings, bpy.types.PropertyGroup):

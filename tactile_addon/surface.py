@@ -66,12 +66,17 @@ class MeshSurface:
         # A face of no area has no normal, and nothing of it can be felt.
         return (self._to_world(point), self._normal_to_world(normal)) if hit and any(normal) else None
 
-    def vertices_near(self, point, radius):
-        """World coordinates and normals, of any length, of the vertices within `radius` of a world point."""
+    def vertices_near(self, point, radius, most=None):
+        """World coordinates and normals, of any length, of the vertices within `radius` of a world point.
+
+        Where these are more than `most`, only each second, third, ... of them.
+        """
         # A sphere of the world is an ellipsoid in the object: its longest axis bounds it.
         reach = radius * np.linalg.norm(self._inverse, ord=2)
         local = self._co - self._to_local(point).astype(np.float32)
         near = np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
+        if most is not None:
+            near = near[:: math.ceil(len(near) / most) or 1]
         normals = [self._mesh.vertex_normals[i].vector for i in near.tolist()]
         return (
             self._co[near] @ self._linear.T + self._origin,

@@ -92,7 +92,7 @@ def touch(
 def verify(touched, most=None):
     """Completes the report by what is dear: where to touch next, and distances to the mesh.
 
-    most : of the vertices, where not all are to be compared
+    most : of the vertices around, where not all are to be compared
     """
     clock = [perf_counter()]
     touched.report.update(_verification_report(touched.surface, touched.result, most))
@@ -153,10 +153,8 @@ def plane_axes(matrix, settings, number):
 def _verification_report(surface, result, most):
     """Distances to the patch of the vertices over it that a finger can reach; none where there are none."""
     frame, radius = result.frame, result.radius
-    around = surface.vertices_near(frame.origin, 2.0 * radius)
+    around = surface.vertices_near(frame.origin, 2.0 * radius, most)
     over = core.overlapped(frame, result.domain, radius, *around)
-    if most is not None:
-        over = over[:: max(1, math.ceil(len(over) / most))]
     up = frame.axes[:, 2].tolist()
     hidden = [surface.is_hidden(vertex, up, 2.0 * radius) for vertex in frame.to_world(over).tolist()]
     misses = core.distances(result.patch, over[~np.array(hidden, dtype=bool)])

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the time goes when a probe follows the mouse: one live update, on a small and on a large mesh.
+
+`python -m benchmarks.live ZIP`, from the root of a checkout; ZIP is the built extension.
+
+A wavy sheet is touched once, so that Blender's tree of its faces is there; then the first plane is
+turned by a degree again and again, as dragging its handle does. The Markdown table has medians in
+milliseconds on one thread, in one Blender without a window: `ray casts` are Blender's part of tracking,
+`fit` is the reconstruction with its report, `mesh write` rewrites patch and contours with normals and
+colours, `all` is the whole update with Blender's evaluation of what has changed, without the redraw.
+The last two columns happen once: building that tree, and at the end of a gesture the distances to the mesh.
+"""
+
+import argparse
+import math
+import os
+import platform
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+from tools import blender
+
+for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
+    os.environ[f"{library}_NUM_THREADS"] = "1"  # read once, when bpy imports numpy
+
+FACES = (10_000, 1_000_000)
+UPDATES = 101
+STAGES = ("ray casts", "tracking", "fit", "mesh write", "all")
+
+
+class Clock:
+    """Adds up the time spent in functions of modules, which it wraps."""
+
+    def __init__(self):
+        self.spent = {}
+
+    def wrap(self, owner, name, stage):
+        inner = getattr(owner, name)
+
+        def timed(*args, **kwargs):
+            start = perf_counter()
+            try:
+                return inner(*args, **kwargs)
+            finally:
+                self.spent[stage] = self.spent.get(stage, 0.0) + perf_counter() - start
+
+        setattr(owner, name, timed)
+
+
+def sheet(bpy, faces):
+    """A wavy sheet of that many faces, the only object."""
+    import numpy as np
+
+    bpy.ops.wm.read_homefile(use_empty=True)
+    side = math.isqrt(faces)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=side, y_subdivisions=side, size=2.0)
+    obj = bpy.context.object
+    co = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
+    obj.data.vertices.foreach_get("co", co.ravel())
+    co[:, 2] = 0.3 * np.sin(2.0 * co[:, 0]) * np.cos(1.5 * co[:, 1])
+    obj.data.vertices.foreach_set("co", co.ravel())
+    obj.data.update()
+    return obj
+
+
+def measure(bpy, update, clock, faces):
+    """A row of the table: medians in milliseconds by stage, and what is done once."""
+    obj = sheet(bpy, faces)
+    start = perf_counter()
+    bpy.ops.tactile.pick(target=obj.name, location=(0.2, 0.1, 0.05))
+    first = perf_counter() - start
+    probe = bpy.context.object
+    (patch,) = probe.children
+    runs = []
+    for i in range(UPDATES):
+        clock.spent.clear()
+        start = perf_counter()
+        probe.tactile_probe.azimuths[0] = math.radians(1 + i % 50)
+        runs.append({**clock.spent, "all": perf_counter() - start})
+    start = perf_counter()
+    update(probe, bpy.context.evaluated_depsgraph_get(), complete=True)
+    once = (first, perf_counter() - start)
+    stages = [median(run[stage] for run in runs) for stage in STAGES]
+    cells = [f"{1e3 * seconds:.1f}" for seconds in (*stages, *once)]
+    return " | ".join([f"{len(obj.data.polygons)}", f"{len(patch.data.vertices)}", *cells])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("zip", type=Path, metavar="ZIP")
+    extension = blender.start(parser.parse_args().zip)
+    import bpy
+
+    addon, clock = extension.tactile_addon, Clock()
+    clock.wrap(addon.surface.MeshSurface, "ray_cast", "ray casts")
+    clock.wrap(addon.touch.core, "track", "tracking")
+    clock.wrap(addon.touch.core, "reconstruct", "fit")
+    clock.wrap(addon.touch, "_reconstruction_report", "fit")
+    clock.wrap(addon.patch_object, "rewrite", "mesh write")
+    # As in a window, where what is dear waits for the end of the gesture.
+    update = addon.probe.update
+    addon.probe.update = lambda probe, depsgraph, complete: update(probe, depsgraph, complete=False)
+    columns = ("faces", "patch vertices", *STAGES, "first touch", "end of a gesture")
+    print(f"| {' | '.join(columns)} |\n|{'--:|' * len(columns)}")
+    for faces in FACES:
+        with blender.quiet():
+            row = measure(bpy, update, clock, faces)
+        print(f"| {row} |")
+    print(
+        f"\nMilliseconds, medians of {UPDATES} updates; Python {platform.python_version()}, "
+        f"Blender {bpy.app.version_string}."
+    )
+
+
+if __name__ == "__main__":
+    main()
