@@ -100,7 +100,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
     def _below(self, context, event):
         """Where the mouse is: an angle, or a distance from the point; None where that cannot be told."""
-        origin, direction = mouse_ray(context.space_data, context.region, context.region_data, event)
+        origin, direction = mouse_ray(context.region, context.region_data, event)
         centre, normal = self._matrix.translation, self._matrix.col[2].xyz.normalized()
         e1 = self._matrix.col[0].xyz.normalized()
         right, up = e1, normal.cross(e1)

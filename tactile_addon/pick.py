@@ -195,14 +195,11 @@ def viewport_below(context, event):
     return None
 
 
-def mouse_ray(space, region, view, event):
-    """(origin, direction) of all that is drawn below the mouse in a viewport, in the world."""
+def mouse_ray(region, view, event):
+    """(origin, direction) of the line below the mouse in a viewport, in the world."""
     at = event.mouse_x - region.x, event.mouse_y - region.y
     direction = view3d_utils.region_2d_to_vector_3d(region, view, at)
-    origin = view3d_utils.region_2d_to_origin_3d(region, view, at)
-    if not view.is_perspective:
-        origin -= space.clip_end * direction  # an orthographic view shows what is behind it too
-    return origin, direction
+    return view3d_utils.region_2d_to_origin_3d(region, view, at), direction
 
 
 def _point_below(context, event):
@@ -213,26 +210,30 @@ def _point_below(context, event):
     viewport = viewport_below(context, event)
     if viewport is None:
         return None
-    space, _, _ = viewport
-    origin, direction = mouse_ray(*viewport, event)
+    space, region, view = viewport
+    eye, direction = mouse_ray(region, view, event)
+    # An orthographic view shows what is behind its origin too.
+    start = eye if view.is_perspective else eye - space.clip_end * direction
     depsgraph = context.evaluated_depsgraph_get()
     for _ in range(LAYERS):
-        hit, point, _, _, found, matrix = context.scene.ray_cast(depsgraph, origin, direction)
+        hit, point, _, _, found, matrix = context.scene.ray_cast(depsgraph, start, direction)
         if not hit:
             return None
-        if not probe.is_result(found.original) and found.original.visible_in_viewport_get(space):
-            return _near(found.original, matrix, depsgraph, point, direction)
-        origin = point + 1e-5 * (point - origin).length * direction
+        obj = found.original
+        if not probe.is_result(obj) and obj.visible_in_viewport_get(space):
+            _require_touchable(obj, matrix)
+            # Cast again from close by: from far away it is not exact.
+            surface = MeshSurface(obj, depsgraph)
+            near = 0.01 * surface.size
+            start = eye + ((point - eye).dot(direction) - near) * direction
+            hit = surface.ray_cast(start, direction, 2.0 * near)
+            return obj, list(point) if hit is None else hit[0], -direction
+        start = point + 1e-5 * (point - start).length * direction
     return None
 
 
-def _near(obj, matrix, depsgraph, point, direction):
-    """The result of _point_below, by a ray from close by: from far away it is not exact."""
+def _require_touchable(obj, matrix):
     if obj.type != "MESH":
         raise ValueError(f'"{obj.name}" is no mesh: convert it to one first')
     if matrix != obj.matrix_world:
         raise ValueError(f'This is an instance of "{obj.name}": make it real to touch it')
-    surface = MeshSurface(obj, depsgraph)
-    near = 0.01 * surface.size
-    hit = surface.ray_cast(point - near * direction, direction, 2.0 * near)
-    return obj, list(point) if hit is None else hit[0], -direction

@@ -8,24 +8,18 @@ which shows a scan where pear.ply is beside the scene.
 """
 
 import os
+import sys
 from pathlib import Path
 
 import bpy
 import gui
 from mathutils import Vector
 
+sys.path.insert(0, str(Path(__file__).parent))
+from common import check, data_blocks, look
+
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 OBJECT_MENU = 330, 40  # where its name is in a window 1280 wide
-
-
-def check(what, good, detail=""):
-    print(f"ok: {what}" if good else f"FAILED: {what}: {detail}", flush=True)
-    return good
-
-
-def data_blocks():
-    kinds = ("objects", "meshes", "materials", "collections", "node_groups", "images")
-    return {kind: sorted(getattr(bpy.data, kind).keys()) for kind in kinds}
 
 
 def source():
@@ -38,19 +32,6 @@ def source():
         obj.data.attributes.keys(),
         obj.data.materials.keys(),
     )
-
-
-def look(point, direction, distance):
-    """Turns the viewport to `point`, seen from `direction`; colours are those of the vertices."""
-    _, area, _ = gui.find()
-    view = area.spaces.active.region_3d
-    view.view_perspective = "PERSP"
-    view.view_location = point
-    view.view_rotation = Vector(direction).to_track_quat("Z", "Y")
-    view.view_distance = distance
-    # The material preview does not draw "in front": half of the patch is hidden in the source there.
-    area.spaces.active.shading.type = "SOLID"
-    area.spaces.active.shading.color_type = "VERTEX"
 
 
 def choose_in_menu():

@@ -1,0 +1,458 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run in a window of Blender on the scene of make_scene.py: probes by mouse and keyboard, as a user has them.
+
+Every step asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
+"""
+
+import math
+import os
+import sys
+from pathlib import Path
+
+import bpy
+import gui
+from bpy.app.handlers import persistent
+from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).parent))
+from common import check, data_blocks, look
+
+FOLDER = Path(os.environ["GUI_SHOT"]).parent
+# Where they are in a window of 1280 by 800 with the sidebar open.
+PICK_BUTTON, EXTENT_FIELD, DELETE_BUTTON = (893, 128), (943, 180), (1001, 128)
+COLOURS_BUTTON, ASIDE = (893, 430), (300, 640)
+ARROW = 1.15  # of the extent: where the handles are
+
+
+def probe():
+    return next((o for o in bpy.data.objects if o.type == "EMPTY" and o.tactile_probe.is_probe), None)
+
+
+def patch(owner=None):
+    return next((o for o in bpy.data.objects if "tactile" in o and o.parent == (owner or probe())), None)
+
+
+def state(owner=None):
+    """What must come back with undo: inputs, report and mesh of a probe."""
+    owner = owner or probe()
+    if owner is None:
+        return None
+    settings, shown = owner.tactile_probe, patch(owner)
+    record = shown["tactile"].to_dict()
+    corner = tuple(shown.data.vertices[-1].co)
+    numbers = [*settings.azimuths, *settings.tilts, settings.extent, *corner, record["k1"], record["k2"]]
+    numbers += [*shown.matrix_world.translation]
+    return settings.plane_count, [round(v, 6) for v in numbers]
+
+
+def handle(azimuth, reach=ARROW):
+    """Where the handle of a plane at that azimuth is in the window."""
+    obj = probe()
+    e1, e2 = obj.matrix_world.col[0].xyz, obj.matrix_world.col[1].xyz
+    at = math.cos(azimuth) * e1 + math.sin(azimuth) * e2
+    return gui.view_point(obj.matrix_world.translation + reach * obj.tactile_probe.extent * at)
+
+
+def consistent(when, owner=None):
+    """The report's planes are the probe's, and the patch lies where the probe is."""
+    owner = owner or probe()
+    record = patch(owner)["tactile"].to_dict()
+    count = owner.tactile_probe.plane_count
+    planes = [math.degrees(a) for a in owner.tactile_probe.azimuths[:count]]
+    good = all(abs(a - b[0]) < 1e-3 for a, b in zip(planes, record["planes"], strict=True))
+    good = good and abs(record["extent"] - owner.tactile_probe.extent) < 1e-6
+    check(f"{when}: the patch is that of the probe's numbers", good, (planes, record["planes"]))
+    off = (patch(owner).matrix_world.translation - owner.matrix_world.translation).length
+    check(f"{when}: and lies at the probe", off < 1e-4 * record["radius"], off)
+
+
+def undo_redo(what, before, after):
+    """One step back and one forth, by keyboard."""
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+    yield 1
+    check(f"{what}: one Ctrl Z takes it back", state() == before, (state(), before))
+    gui.xdo("key", "ctrl+shift+z")
+    yield 1
+    check(f"{what}: Ctrl Shift Z brings it again", state() == after, (state(), after))
+
+
+def until(reached, seconds=8):
+    """Waits until something is so: a window without a graphics card may take its time."""
+    for _ in range(4 * seconds):
+        yield 0.25
+        if reached():
+            break
+    yield 0.25
+
+
+def is_complete():
+    return not any(window.modal_operators for window in bpy.context.window_manager.windows) and (
+        patch() is not None and "vertices" in patch()["tactile"]
+    )
+
+
+def picture(name):
+    gui.shot(str(FOLDER / f"{name}.png"))
+
+
+def pick(target):
+    place = bpy.context.scene.cursor.location.copy()
+    look(place, (0.3, -1, 0.3), 5)
+    yield 0.5
+    at = [round(v) for v in gui.view_point(place)]
+    before = data_blocks()
+    gui.click(*PICK_BUTTON)
+    yield 0.5
+    gui.xdo("mousemove", at[0] - 30, at[1], "sleep", 0.3, "mousemove", *at)
+    yield 0.7
+    picture("pick")
+    gui.xdo("key", "Escape")
+    yield 0.5
+    check("Esc in the middle of a pick leaves nothing", data_blocks() == before and probe() is None)
+    gui.click(*PICK_BUTTON)
+    yield 0.5
+    gui.xdo("mousemove", *at, "sleep", 0.3, "click", 4, "sleep", 0.5, "click", 3)
+    yield 0.7
+    check("the right button leaves nothing either", data_blocks() == before and probe() is None)
+    closer = gui.find()[1].spaces.active.region_3d.view_distance
+    check("... and the wheel zoomed meanwhile", closer < 4.9, closer)
+    gui.click(*PICK_BUTTON)
+    yield 0.5
+    at = [round(v) for v in gui.view_point(place)]
+    gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.2, "mousemove", *at, "sleep", 0.3, "click", 1)
+    yield 1
+    found = probe()
+    if not check("a click places a probe", found is not None and patch() is not None, data_blocks()):
+        return
+    off = (found.location - place).length
+    check("... at the place clicked", off < 0.02, off)
+    check("... on the object clicked", found.tactile_probe.target == bpy.data.objects[target])
+    check("... active and selected", bpy.context.object == found and found.select_get())
+    normal = found.matrix_world.col[2].xyz
+    outward = Vector(patch()["tactile"]["frame"]["normal"])
+    check(
+        "... with z along the normal, towards the eye", normal.dot(outward) > 0.99 and normal.y < 0.0, normal
+    )
+    check("... and nothing else", len(bpy.data.objects) == len(before["objects"]) + 3, data_blocks())
+    consistent("picked")
+    picture("picked")
+    after = data_blocks()
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+    yield 1
+    check("Ctrl Z takes probe and patch away", probe() is None and data_blocks() == before, data_blocks())
+    gui.xdo("key", "ctrl+shift+z")
+    yield 1
+    check("Ctrl Shift Z brings them again", data_blocks() == after and probe() is not None, data_blocks())
+
+
+def drag_handles():
+    settings = probe().tactile_probe
+    look(probe().location, probe().matrix_world.col[2].xyz + 0.3 * probe().matrix_world.col[1].xyz, 2)
+    yield 0.5
+    before, blocks = state(), data_blocks()
+    start, azimuth = handle(settings.azimuths[0]), settings.azimuths[0] + 0.5
+    end = handle(azimuth)
+    gui.drag(start, end)
+    yield 1
+    settings = probe().tactile_probe
+    turned = settings.azimuths[0]
+    check("dragging a handle turns its plane", abs(turned - azimuth) < 0.05, turned)
+    check("... and the patch changes", state()[1][13:] != before[1][13:], state())
+    consistent("a plane turned")
+    check("... in place", data_blocks() == blocks, data_blocks())
+    check("... completed at the end", "vertices" in patch()["tactile"], "")
+    picture("turned")
+    yield from undo_redo("a plane turned", before, state())
+
+    before = state()
+    azimuth = probe().tactile_probe.azimuths[1]
+    start, middle, end = (map(round, handle(azimuth + turn)) for turn in (0.0, 0.2, 0.4))
+    gui.xdo("mousemove", *start, "sleep", 0.3, "mousedown", 1, "sleep", 0.2)
+    gui.xdo("mousemove", *middle, "sleep", 0.3, "mousemove", *end, "sleep", 0.4)
+    yield from until(lambda: state() != before)
+    check("... while the button is down the patch follows", state() != before, state())
+    picture("turning")
+    gui.xdo("key", "Escape", "sleep", 0.2, "mouseup", 1)
+    yield 1
+    check("Esc in the middle of a turn takes it back", state() == before, (state(), before))
+
+    before = state()
+    axes = probe().matrix_world
+    reach = probe().tactile_probe.extent
+    number = probe().tactile_probe.active_plane
+    top = axes.translation + 0.75 * reach * axes.col[2].xyz
+    gui.drag(gui.view_point(top), [v + 35 for v in gui.view_point(top)])
+    yield 1
+    tilt = probe().tactile_probe.tilts[number]
+    check("dragging the handle above tilts the active plane", abs(tilt) > 0.03, math.degrees(tilt))
+    consistent("a plane tilted")
+    picture("tilted")
+    yield from undo_redo("a plane tilted", before, state())
+
+    before = state()
+    free = 0.5 * (probe().tactile_probe.azimuths[0] + probe().tactile_probe.azimuths[1]) + math.pi
+    gui.drag(handle(free, 1.0), handle(free, 0.7))
+    yield 1
+    ratio = probe().tactile_probe.extent / reach
+    check("dragging the ring changes the extent", abs(ratio - 0.7) < 0.05, ratio)
+    consistent("another extent")
+    picture("extent")
+    yield from undo_redo("another extent", before, state())
+
+
+def move_probe():
+    before, place = state(), probe().location.copy()
+    at = [round(v) for v in gui.view_point(place)]
+    gui.xdo("mousemove", *at, "sleep", 0.2, "key", "g", "sleep", 0.3)
+    for i in range(1, 6):
+        gui.xdo("mousemove", at[0] - 8 * i, at[1] + 4 * i, "sleep", 0.15)
+    yield from until(lambda: state() != before)
+    check("while the probe is dragged the patch follows", state() != before, state())
+    picture("moving")
+    gui.xdo("key", "Escape")
+    yield 1
+    check("Esc in the middle of a move takes it back", state() == before, (state(), before))
+    gui.xdo("mousemove", *at, "sleep", 0.2, "key", "g", "sleep", 0.3)
+    for i in range(1, 6):
+        gui.xdo("mousemove", at[0] - 8 * i, at[1] + 4 * i, "sleep", 0.15)
+    gui.xdo("click", 1)
+    yield 1
+    yield from until(is_complete)
+    check("a dragged probe moves", (probe().location - place).length > 0.02, probe().location)
+    consistent("the probe moved")
+    check("... completed at the end", "vertices" in patch()["tactile"], "")
+    yield from undo_redo("the probe moved", before, state())
+
+
+def type_a_number():
+    before = state()
+    gui.xdo("mousemove", *EXTENT_FIELD, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1, "sleep", 0.4)
+    gui.xdo("key", "ctrl+a", "sleep", 0.2, "type", "0.2")
+    gui.xdo("key", "Return")
+    yield 1.5
+    check("a number typed in the panel counts", abs(probe().tactile_probe.extent - 0.2) < 1e-5, state())
+    consistent("a number typed")
+    yield from undo_redo("a number typed", before, state())
+
+
+def save_and_reload():
+    """Opening a file ends all timers, this script's too: it goes on in `reopened`."""
+    before = state()
+    file = str(FOLDER / "probes.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    yield 0.5
+
+    @persistent
+    def go_on(*_):
+        bpy.app.handlers.load_post.remove(go_on)
+        gui.play(reopened(before))
+
+    bpy.app.handlers.load_post.append(go_on)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    yield 60
+
+
+def reopened(before):
+    yield 1
+    check("saved and opened again, all is as it was", state() == before, (state(), before))
+    probe().tactile_probe.azimuths[2] += 0.2
+    yield 1
+    consistent("changed after opening")
+    check("... completed", "vertices" in patch()["tactile"], "")
+    bpy.ops.ed.undo_push(message="Changed")
+    yield from two_probes()
+    yield from hide_and_delete_target("Suzanne")
+    yield from edit_mode("Suzanne")
+    yield from delete_by_keys()
+    yield from orthographic_and_tiny()
+    yield from looks()
+
+
+def two_probes():
+    first, blocks = probe(), data_blocks()
+    at = [round(v) for v in gui.view_point(first.location)]
+    was = state(first)
+    gui.xdo("mousemove", *at, "sleep", 0.2, "key", "shift+d", "sleep", 0.4)
+    gui.xdo("mousemove", at[0] - 50, at[1] + 30, "sleep", 0.4, "click", 1)
+    yield 1.5
+    first = bpy.data.objects[first.name]
+    second = bpy.context.object
+    check("Shift D makes a second probe", second != first and second.tactile_probe.is_probe, second)
+    check("... with a patch of its own", patch(second) is not None and patch(second) != patch(first), "")
+    check("... and the first keeps its own", state(first) == was, state(first))
+    consistent("the copy", second)
+    picture("two")
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+    yield 1
+    gui.xdo("key", "ctrl+z")
+    yield 1
+    left = len(bpy.data.objects)
+    check("undone, only the first is left", left == len(blocks["objects"]), data_blocks())
+
+
+def hide_and_delete_target(target):
+    obj = bpy.data.objects[target]
+    obj.hide_set(True)
+    bpy.ops.ed.undo_push(message="Hide")
+    before = state()
+    probe().tactile_probe.azimuths[0] += 0.1
+    yield 1
+    check("a hidden target is still touched", state() != before and not probe().tactile_probe.message)
+    picture("hidden")
+    bpy.data.objects[target].hide_set(False)
+    for selected in bpy.context.view_layer.objects.selected:
+        selected.select_set(False)
+    bpy.data.objects[target].select_set(True)
+    bpy.context.view_layer.objects.active = bpy.data.objects[target]
+    bpy.ops.ed.undo_push(message="Select")
+    before = state()
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "x", "sleep", 0.5, "key", "Return")
+    yield 1
+    check("X deletes the target, probe or not", target not in bpy.data.objects, bpy.data.objects.keys())
+    check(
+        "... the probe says so", "no target" in probe().tactile_probe.message, probe().tactile_probe.message
+    )
+    check("... and keeps the last patch", state() == before, (state(), before))
+    bpy.context.view_layer.objects.active = probe()
+    yield 0.7
+    picture("deleted")
+    for _ in range(3):
+        gui.xdo("key", "ctrl+z")
+        yield 0.7
+        if target in bpy.data.objects:
+            break
+    for key in ("ctrl+shift+z", "ctrl+z") * 5:
+        gui.xdo("key", key)
+        yield 0.4
+    check("Ctrl Z brings it back", probe().tactile_probe.target == bpy.data.objects.get(target), "")
+    yield 0.5
+    check("... and the probe is content", not probe().tactile_probe.message, probe().tactile_probe.message)
+
+
+def edit_mode(target):
+    obj = bpy.data.objects[target]
+    bpy.context.view_layer.objects.active = obj
+    before = state()
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    yield 0.5
+    poll = bpy.ops.tactile.pick.poll()
+    check("no pick in Edit Mode", not poll)
+    picture("edit")
+    bpy.ops.transform.resize(value=(1.05, 1.05, 1.05))
+    yield 1.5
+    check("the patch follows an edit of the mesh", state() != before, state())
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.ed.undo_push(message="Edited")
+    yield 1
+    check("... and is completed after it", "vertices" in patch()["tactile"], "")
+
+
+def delete_by_keys():
+    for selected in bpy.context.view_layer.objects.selected:
+        selected.select_set(False)
+    owner, shown = probe(), patch()
+    owner.select_set(True)
+    bpy.context.view_layer.objects.active = owner
+    bpy.ops.ed.undo_push(message="Select")
+    place, name, count = shown.matrix_world.copy(), shown.name, len(bpy.data.objects)
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "x", "sleep", 0.5, "key", "Return")
+    yield 1
+    left = bpy.data.objects.get(name)
+    check("X on the probe leaves the patch", probe() is None and left is not None, bpy.data.objects.keys())
+    off = max(
+        abs(a - b) for r, s in zip(left.matrix_world, place, strict=True) for a, b in zip(r, s, strict=True)
+    )
+    check("... where it was, without a parent", left.parent is None and off < 1e-5, off)
+    check("... and nothing without users", len(bpy.data.objects) == count - 1, bpy.data.objects.keys())
+    unused = [o.name for o in bpy.data.objects if not o.users]
+    check("... no object has no user", not unused, unused)
+    gui.xdo("key", "ctrl+z")
+    yield 1
+    check("Ctrl Z brings the probe back", probe() is not None and patch() is not None)
+    gui.click(*DELETE_BUTTON)
+    yield 1
+    names = {
+        kind: [n for n in found if "Patch" in n or "Contours" in n] for kind, found in data_blocks().items()
+    }
+    check("the bin takes probe, patch and contours", not names["objects"] and not names["meshes"], names)
+
+
+def orthographic_and_tiny():
+    """A millimetre of a thing, scaled unevenly, with a modifier, seen without perspective."""
+    file = FOLDER / "pear.ply"
+    if not file.is_file():
+        return
+    for obj in bpy.data.objects:
+        obj.hide_set(True)
+    bpy.ops.wm.ply_import(filepath=str(file))
+    pear = bpy.context.object
+    pear.scale = (0.01, 0.013, 0.008)
+    pear.modifiers.new("Smooth", "SMOOTH").iterations = 2
+    bpy.ops.ed.undo_push(message="Pear")
+    yield 0.5
+    look(pear.matrix_world @ Vector((0, 0, 0.04)), (0.2, -1, 0.3), 0.003, "ORTHO")
+    gui.find()[1].spaces.active.clip_start = 1e-5
+    yield 1
+    gui.click(*PICK_BUTTON)
+    yield 0.5
+    view = gui.find()[2]
+    at = view.x + view.width // 3, 800 - view.y - view.height // 2
+    gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.3, "mousemove", *at, "sleep", 0.5)
+    yield 0.5
+    picture("tiny_pick")
+    gui.xdo("click", 1)
+    yield 1.5
+    found = probe()
+    if not check(
+        "a click places a probe on a scan, tiny and stretched", found is not None and patch() is not None
+    ):
+        return
+    check("... on the scan", found.tactile_probe.target == pear, found.tactile_probe.target)
+    seen = gui.view_point(found.location)
+    off = math.dist(seen, at)
+    check("... below the mouse", off < 3.0, off)
+    check(
+        "... with a patch in its mesh",
+        patch()["tactile"]["vertex_distance_mean"] < 0.03 * patch()["tactile"]["radius"],
+    )
+    picture("tiny")
+
+
+def looks():
+    """Colours, their button, a light theme and large letters; the last picture is run.sh's."""
+    shading = gui.find()[1].spaces.active.shading
+    shading.color_type = "MATERIAL"
+    yield 1
+    gui.click(*COLOURS_BUTTON)
+    yield 1
+    check("a button has the viewport show the colours", shading.color_type == "VERTEX", shading.color_type)
+    shown = patch()
+    for name in ("mean_curvature", "deviation", "height_std"):
+        shown.tactile_colours = name
+        yield 1
+        check(f"the colours of {name} have a range", shown["tactile"]["colour_limit"] > 0.0)
+        picture(name)
+    folder = bpy.utils.preset_paths("interface_theme")[0]
+    theme = next(Path(folder).glob("*ight*.xml"))
+    bpy.ops.script.execute_preset(filepath=str(theme), menu_idname="USERPREF_MT_interface_theme_presets")
+    yield 1
+    picture("light")
+    bpy.context.preferences.view.ui_scale = 2.0
+    yield 1.5
+
+
+def steps():
+    gui.sidebar()
+    yield 1
+    gui.sidebar("Tactile")
+    yield 1
+    yield from pick("Suzanne")
+    yield from drag_handles()
+    yield from move_probe()
+    yield from type_a_number()
+    yield from save_and_reload()
+
+
+gui.play(steps())
