@@ -115,8 +115,10 @@ def _draw_bar(context, title, low, labels):
     at = np.linspace(x, x + wide, STEPS)
     shades = colours.shades(np.repeat(np.linspace(low, 1.0, STEPS), 2), 1.0)
     _fill([(a, b) for a in at for b in (y, y + BAR[1] * scale)], shades.tolist())
+    labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
+    if sum(blf.dimensions(FONT, text)[0] + gap for _, text in labels) > wide + 2.0 * gap:
+        del labels[1]  # the one in the middle
     for share, text in labels:
-        text = text.replace("-", "\N{MINUS SIGN}")
         middle = x + (share - low) / (1.0 - low) * wide
         length = blf.dimensions(FONT, text)[0]
         _write(text, min(max(middle - 0.5 * length, x - gap), x + wide + gap - length), y - gap - line)

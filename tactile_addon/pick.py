@@ -4,7 +4,7 @@
 
 import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
-from bpy_extras import view3d_utils
+from mathutils import Vector
 
 from . import overlay, probe, units
 from .operators import make_active, report_error, target_object
@@ -196,10 +196,19 @@ def viewport_below(context, event):
 
 
 def mouse_ray(region, view, event):
-    """(origin, direction) of the line below the mouse in a viewport, in the world."""
-    at = event.mouse_x - region.x, event.mouse_y - region.y
-    direction = view3d_utils.region_2d_to_vector_3d(region, view, at)
-    return view3d_utils.region_2d_to_origin_3d(region, view, at), direction
+    """(origin, direction) of the line below the mouse in a viewport, in the world.
+
+    Not by view3d_utils: the inverse of the whole projection, which it uses, is off by many pixels where
+    the clipping range is a million times as long as what is seen.
+    """
+    x = 2.0 * (event.mouse_x - region.x) / region.width - 1.0
+    y = 2.0 * (event.mouse_y - region.y) / region.height - 1.0
+    window, to_world = view.window_matrix, view.view_matrix.inverted()
+    if view.is_perspective:
+        ahead = Vector(((x + window[0][2]) / window[0][0], (y + window[1][2]) / window[1][1], -1.0))
+        return to_world.translation, (to_world.to_3x3() @ ahead).normalized()
+    aside = Vector(((x - window[0][3]) / window[0][0], (y - window[1][3]) / window[1][1], 0.0))
+    return to_world @ aside, -to_world.col[2].xyz.normalized()
 
 
 def _point_below(context, event):
@@ -224,9 +233,9 @@ def _point_below(context, event):
             _require_touchable(obj, matrix)
             # Cast again from close by: from far away it is not exact.
             surface = MeshSurface(obj, depsgraph)
-            near = 0.01 * surface.size
-            start = eye + ((point - eye).dot(direction) - near) * direction
-            hit = surface.ray_cast(start, direction, 2.0 * near)
+            depth = (point - eye).dot(direction) - surface.size
+            start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
+            hit = surface.ray_cast(start, direction, 2.0 * surface.size)
             return obj, list(point) if hit is None else hit[0], -direction
         start = point + 1e-5 * (point - start).length * direction
     return None

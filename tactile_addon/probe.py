@@ -111,9 +111,9 @@ def _put(probe, touched):
     turn = Matrix(np.column_stack([e1, -across, n]).tolist())
     wanted = Matrix.LocRotScale(Vector(location), turn.to_quaternion(), None)
     old, new = np.array(probe.matrix_world.normalized()), np.array(wanted)
-    if not np.allclose(old[:3, :3], new[:3, :3], atol=1e-4) or not np.array_equal(
-        old[:3, 3].astype(np.float32), new[:3, 3].astype(np.float32)
-    ):
+    # Put there again and again, it would creep by rounding.
+    near = 1e-5 * touched.report["extent"]
+    if not np.allclose(old[:3, :3], new[:3, :3], atol=1e-4) or np.abs(old - new)[:3, 3].max() > near:
         probe.matrix_world = wanted @ Matrix.Diagonal((*probe.matrix_world.to_scale(), 1.0))
 
 

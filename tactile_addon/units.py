@@ -21,15 +21,17 @@ POWERS = {1: "", 2: "²"}
 
 
 def unit_of(scene, size):
-    """(name, length in units of the world) of the unit for a thing of that size; "" where there is none."""
+    """(name, length in units of the world) of the unit for a thing of that size; "" where there is none.
+
+    The scene's own, unless that would make for very long numbers.
+    """
     settings = scene.unit_settings
     if settings.system == "NONE":
         return "", 1.0
-    name = settings.length_unit
-    if name == "ADAPTIVE":
+    name, metres = settings.length_unit, size * settings.scale_length * (1.0 + 1e-6)
+    if name == "ADAPTIVE" or not 1e-2 <= metres / METRES[name][1] <= 1e4:
         names = ADAPTIVE[settings.system]
-        fitting = (n for n in names if METRES[n][1] <= size * settings.scale_length * (1.0 + 1e-6))
-        name = next(fitting, names[-1])
+        name = next((n for n in names if METRES[n][1] <= metres), names[-1])
     symbol, metres = METRES[name]
     return symbol, metres / settings.scale_length
 
