@@ -46,9 +46,12 @@ def insert(scene, touched, parent=None):
 
 def rewrite(patch, touched):
     """Makes the patch, and its contours where they are still there, those of another touch, in place."""
+    lines = contours_of(patch)
+    for obj in filter(None, (patch, lines)):
+        if obj.data.users > 1:  # a linked copy, which shows another touch from now on
+            obj.data = obj.data.copy()
     _fill_patch(patch.data, touched)
     names = {"patch": patch.name}
-    lines = contours_of(patch)
     if lines is not None:
         _fill_contours(lines.data, touched)
         names["contours"] = lines.name
@@ -73,12 +76,10 @@ def hold(patch):
         _place(patch, matrix)
 
 
-def datablocks(patch):
-    """Those that a touch writes to, each taken back by undo on its own; none for no patch."""
-    if patch is None:
-        return []
-    lines = contours_of(patch)
-    return [patch, patch.data] + ([] if lines is None else [lines.data])
+def meshes(patch):
+    """Those of a patch object and of its contours; none for no patch."""
+    objects = [] if patch is None else [patch, contours_of(patch)]
+    return [obj.data for obj in objects if obj is not None]
 
 
 def contours_of(patch):

@@ -93,7 +93,9 @@ def record_of(obj):
 
 
 def probes(view_layer):
-    return [obj for obj in view_layer.objects if is_probe(obj) and obj.library is None]
+    """Those that can be kept up to date: not of a library, and with no patch in Edit Mode."""
+    found = [obj for obj in view_layer.objects if is_probe(obj) and obj.library is None]
+    return [obj for obj in found if not any(mesh.is_editmode for mesh in patch_object.meshes(patch_of(obj)))]
 
 
 def make(context, target):
@@ -106,7 +108,12 @@ def make(context, target):
 
 
 def _put(probe, touched):
-    """Puts the probe on the reference point, z outward, x to azimuth 0; one already there stays as it is."""
+    """Puts the probe on the reference point, z outward, x to azimuth 0.
+
+    One that is there already stays as it is, and so does one that constraints would take back.
+    """
+    if probe.constraints:
+        return
     location, (e1, n, across) = touched.result.frame.origin, np.transpose(touched.report["axes"])
     turn = Matrix(np.column_stack([e1, -across, n]).tolist())
     wanted = Matrix.LocRotScale(Vector(location), turn.to_quaternion(), None)
@@ -174,15 +181,21 @@ def _is_there(target, depsgraph):
 def is_outdated(probe, depsgraph):
     """Whether its patch is another than its inputs ask for, by the probe or by what it is made of."""
     digest = _digest(probe, depsgraph)
-    blocks = patch_object.datablocks(patch_of(probe))
-    return probe.tactile_probe.digest != digest or any(block.get(DIGEST) != digest for block in blocks)
+    stored = [probe.tactile_probe.digest, *(block.get(DIGEST) for block in _made(probe))]
+    return any(other != digest for other in stored)
+
+
+def _made(probe):
+    """The datablocks that a touch writes to."""
+    patch = patch_of(probe)
+    return [] if patch is None else [patch, *patch_object.meshes(patch)]
 
 
 def _sign(probe, depsgraph):
     _measure_shape(probe.tactile_probe, depsgraph)
     digest = _digest(probe, depsgraph)
     probe.tactile_probe.digest = digest
-    for block in patch_object.datablocks(patch_of(probe)):
+    for block in _made(probe):
         block[DIGEST] = digest
 
 
@@ -220,7 +233,7 @@ def on_depsgraph_update(scene, depsgraph):
     reshaped = {u.id.original for u in depsgraph.updates if u.is_updated_geometry}
     for probe in probes(depsgraph.view_layer):
         settings = probe.tactile_probe
-        _forget_deleted(settings)
+        _forget_deleted(probe)
         _measure_shape(settings, depsgraph, reshaped)
         patch = patch_of(probe)
         if is_outdated(probe, depsgraph):
@@ -237,13 +250,16 @@ def refresh(probe, context):
     update(probe, context.evaluated_depsgraph_get(), complete=True)
 
 
-def _forget_deleted(settings):
-    """A deleted target lives on as long as the probe points to it: lets go, so that it is deleted."""
+def _forget_deleted(probe):
+    """A target that was deleted lives on as long as the probe points to it: lets go, so that it is gone."""
+    settings, record = probe.tactile_probe, record_of(probe)
     target = settings.target
-    if target is not None and not target.users_scene:
-        settings.property_unset("target")
-        if not target.users:
-            bpy.data.objects.remove(target)
+    # One that has never been touched is a script's, which may be about to put it into the scene.
+    if target is None or target.users_scene or record is None or record["source"] != target.name:
+        return
+    settings.property_unset("target")
+    if not target.users:
+        bpy.data.objects.remove(target)
 
 
 def is_pending(probe):

@@ -22,10 +22,16 @@ class MeshSurface:
     def __init__(self, obj, depsgraph):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
         evaluated = obj.evaluated_get(depsgraph)
-        if not evaluated.is_evaluated:
+        try:
+            if obj.data.is_editmode:
+                # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
+                evaluated.to_mesh()
+                evaluated.to_mesh_clear()
+            evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
+        except RuntimeError as error:
             raise ValueError(
                 f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
-            )
+            ) from error
         matrix = np.array(evaluated.matrix_world, dtype=float)
         _require_invertible(obj.name, matrix[:3, :3])
         self._linear, self._origin = matrix[:3, :3], matrix[:3, 3]
@@ -34,10 +40,6 @@ class MeshSurface:
         self._rows, self._inverse_rows, self._at = (
             array.tolist() for array in (self._linear, self._inverse, self._origin)
         )
-        if obj.data.is_editmode:
-            # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
-            evaluated.to_mesh()
-            evaluated.to_mesh_clear()
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
         if not len(self._mesh.polygons):
             raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
