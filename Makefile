@@ -18,7 +18,7 @@ READY := $(VENV)/.ready
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
-	$(shell find core tactile_addon -name __pycache__ -prune -o -print)
+	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
 
 .PHONY: help demo test zip zip-nowheels clean
 

@@ -24,6 +24,7 @@ def register():
         bpy.utils.register_class(cls)
     panel.restore_tab()
     bpy.types.VIEW3D_MT_object.append(panel.draw_menu)
+    bpy.utils.register_manual_map(panel.manual_map)
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
     _drawings.extend(overlay.draw_handlers())
 
@@ -32,6 +33,7 @@ def unregister():
     while _drawings:
         bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
     bpy.utils.unregister_cli_command(_commands.pop())
+    bpy.utils.unregister_manual_map(panel.manual_map)
     bpy.types.VIEW3D_MT_object.remove(panel.draw_menu)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

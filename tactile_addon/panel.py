@@ -4,6 +4,7 @@
 
 import math
 import textwrap
+from pathlib import Path
 
 import bpy
 from bpy.props import IntProperty, StringProperty
@@ -273,6 +274,18 @@ def draw_menu(self, context):
         self.layout.operator(operator.bl_idname)
 
 
+def manual_map():
+    """For Online Manual in the context menus: the page that comes with the extension."""
+    page = Path(__file__).resolve().parents[1] / "manual" / "viewport.html"
+    pages = {
+        "bpy.ops.tactile.pick": "#the-first-patch",
+        "bpy.ops.tactile*": "#probe",
+        "bpy.types.tactileprobe*": "#probe",
+        "bpy.types.object.tactile_colours": "#result",
+    }
+    return page.as_uri(), tuple(pages.items())
+
+
 def _move_tab(preferences, context):
     """Panels learn their tab when they are registered."""
     for panel in PANELS:
@@ -298,6 +311,7 @@ class TactilePreferences(bpy.types.AddonPreferences):
     def draw(self, context):
         self.layout.use_property_split = True
         self.layout.prop(self, "tab")
+        self.layout.operator("wm.url_open", text="Manual", icon="HELP").url = manual_map()[0]
 
 
 PANELS = (TACTILE_PT_probe, TACTILE_PT_result)

@@ -19,11 +19,22 @@ import tempfile
 import tomllib
 from pathlib import Path
 
+import markdown
+
 ROOT = Path(__file__).resolve().parents[1]
 MANIFEST = ROOT / "blender_manifest.toml"
 # Blender's pattern list can only exclude, so what ships is named: nothing else lying in a checkout,
 # an environment or a scan, can get into a release.
 SHIPPED = ("__init__.py", "LICENSE", "core", "tactile_addon")
+# The page that Blender's Online Manual opens, made into HTML, and its pictures.
+MANUAL = ROOT / "docs" / "viewport.md"
+PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Tactile Patch</title>
+<style>body {{ max-width: 50em; margin: 2em auto; padding: 0 1em; font: 1rem/1.5 sans-serif; }}
+img {{ max-width: 100%; }} td, th {{ padding: 0.2em 1em 0.2em 0; text-align: left; }}
+pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
+{}
+</html>
+"""
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}
 
 
@@ -119,6 +130,7 @@ def stage(folder: Path, platforms: list[str], wheels: list[str]) -> None:
         else:
             folder.mkdir(exist_ok=True)
             shutil.copy2(ROOT / name, folder)
+    write_manual(folder / "manual")
     for wheel in wheels:
         (folder / wheel).parent.mkdir(exist_ok=True)
         shutil.copy2(ROOT / wheel, folder / wheel)
@@ -134,6 +146,16 @@ def stage(folder: Path, platforms: list[str], wheels: list[str]) -> None:
     if tomllib.loads(text) != {key: value for key, value in expected.items() if value}:
         sys.exit(f"{MANIFEST.name}: platforms and wheels must be plain arrays, `key = [...]`.")
     (folder / MANIFEST.name).write_text(text, encoding="utf-8")
+
+
+def write_manual(folder: Path) -> None:
+    """The manual as a page of HTML, with the pictures it shows."""
+    folder.mkdir()
+    text = MANUAL.read_text(encoding="utf-8")
+    body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
+    (folder / "viewport.html").write_text(PAGE.format(body), encoding="utf-8")
+    for picture in re.findall(r"!\[.*?\]\((.+?)\)", text):
+        shutil.copy2(MANUAL.parent / picture, folder)
 
 
 def run(tool: Path, *arguments: str | Path) -> None:
