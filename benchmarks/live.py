@@ -101,7 +101,7 @@ def main():
     clock.wrap(addon.patch_object, "rewrite", "mesh write")
     # As in a window, where what is dear waits for the end of the gesture.
     update = addon.probe.update
-    addon.probe.update = lambda probe, depsgraph, complete: update(probe, depsgraph, complete=False)
+    addon.live.update = lambda probe, depsgraph, complete: update(probe, depsgraph, complete=False)
     columns = ("faces", "patch vertices", *STAGES, "first touch", "end of a gesture")
     print(f"| {' | '.join(columns)} |\n|{'--:|' * len(columns)}")
     for faces in FACES:

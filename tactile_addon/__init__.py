@@ -4,14 +4,14 @@
 
 import bpy
 
-from . import command_line, gizmos, operators, overlay, panel, pick, probe
+from . import command_line, gizmos, live, operators, overlay, panel, pick, probe, probe_operators
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
     pick.TACTILE_OT_pick,
     gizmos.TACTILE_OT_drag,
     gizmos.TACTILE_GGT_handles,
-    *panel.OPERATORS,
+    *probe_operators.OPERATORS,
     *panel.PANELS,
     panel.TactilePreferences,
 )
@@ -25,6 +25,7 @@ def register():
     panel.restore_tab()
     bpy.types.VIEW3D_MT_object.append(panel.draw_menu)
     bpy.utils.register_manual_map(panel.manual_map)
+    live.register()
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
     _drawings.extend(overlay.draw_handlers())
 
@@ -32,6 +33,7 @@ def register():
 def unregister():
     while _drawings:
         bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
+    live.unregister()
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.utils.unregister_manual_map(panel.manual_map)
     bpy.types.VIEW3D_MT_object.remove(panel.draw_menu)

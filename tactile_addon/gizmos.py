@@ -12,14 +12,13 @@ from mathutils.geometry import intersect_line_plane
 
 from . import probe
 from .overlay import PLANE_COLOURS
-from .pick import mouse_ray
-from .settings import MOST_PLANES
+from .settings import MOST_PLANES, STEEPEST
 from .touch import plane_axes
+from .viewport import mouse_ray
 
 TURN, TILT, EXTENT = "TURN", "TILT", "EXTENT"
 REACH = 1.15  # of the extent: where the handles are
 UPRIGHT = 0.75
-STEEPEST = math.radians(60.0)
 SNAP = math.radians(5.0)
 PRECISE = 0.1
 HINTS = (
@@ -112,11 +111,9 @@ class TACTILE_OT_drag(bpy.types.Operator):
         at = intersect_line_plane(origin, origin + direction, centre, normal)
         if at is None or (at - centre).length == 0.0:
             return None
-        return (
-            (at - centre).length
-            if self.what == EXTENT
-            else math.atan2((at - centre).dot(up), (at - centre).dot(right))
-        )
+        if self.what == EXTENT:
+            return (at - centre).length
+        return math.atan2((at - centre).dot(up), (at - centre).dot(right))
 
     def _get(self, context):
         settings = context.object.tactile_probe
@@ -168,7 +165,8 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
     @classmethod
     def poll(cls, context):
         obj = context.object
-        return context.mode == "OBJECT" and probe.is_probe(obj) and obj.visible_get() and probe.record_of(obj)
+        shown = context.mode == "OBJECT" and probe.is_probe(obj) and obj.visible_get()
+        return shown and probe.record_of(obj) is not None
 
     def setup(self, context):
         self.extent = self._handle("GIZMO_GT_dial_3d", EXTENT, 0, (1.0, 1.0, 1.0))

@@ -7,6 +7,7 @@ from bpy.props import FloatVectorProperty, StringProperty
 
 from . import patch_object
 from .probe import patch_near
+from .report import sentence
 from .settings import TouchSettings, draw_all, touch_arguments
 from .touch import touch, verify
 
@@ -19,17 +20,21 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     target: StringProperty(
-        name="Target", description="Name of the mesh object to touch; empty for the active object"
+        name="Target",
+        description="Name of the mesh object to touch; empty for the active object",
+        options={"SKIP_PRESET"},
     )
     location: FloatVectorProperty(
         name="Location",
         subtype="TRANSLATION",
         description="Where to touch; the 3D cursor where it is not set",
+        options={"SKIP_PRESET"},
     )
     normal: FloatVectorProperty(
         name="Normal",
         subtype="XYZ",
         description="The outward direction there; the surface's own where it is not set",
+        options={"SKIP_PRESET"},
     )
 
     @classmethod
@@ -72,13 +77,8 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
 
 
 def report_error(operator, error):
-    operator.report({"ERROR"}, sentence_of(error))
+    operator.report({"ERROR"}, sentence(error))
     return {"CANCELLED"}
-
-
-def sentence_of(error):
-    """The words of an exception as a sentence."""
-    return str(error)[:1].upper() + str(error)[1:]
 
 
 def target_object(context, name):

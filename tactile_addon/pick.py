@@ -4,13 +4,14 @@
 
 import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
-from mathutils import Vector
 
 from . import overlay, probe, units
 from .operators import make_active, report_error, target_object
+from .report import sentence
 from .settings import NAMES, TouchSettings, draw_all, touch_arguments
 from .surface import MeshSurface
 from .touch import touch
+from .viewport import mouse_ray, viewport_below
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
 LAYERS = 64  # patches and hidden objects that the mouse sees through at most
@@ -101,21 +102,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         _redraw(context)
 
     def execute(self, context):
-        given = self.properties.is_property_set
         depsgraph = context.evaluated_depsgraph_get()
         moved = self._inherit(context)
         try:
-            if moved is not None and not self.target and moved.tactile_probe.target is not None:
-                target = moved.tactile_probe.target
-            else:
-                target = target_object(context, self.target)
-            touched = touch(
-                target,
-                depsgraph,
-                list(self.location) if given("location") else list(context.scene.cursor.location),
-                toward=list(self.normal) if given("normal") else None,
-                **touch_arguments(self),
-            )
+            target = self._target(context, moved)
+            touched = self._touch(context, target, depsgraph)
         except ValueError as error:
             return report_error(self, error)
         found = moved or probe.make(context, target)
@@ -131,6 +122,21 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         report = touched.report
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, report["message"])
         return {"FINISHED"}
+
+    def _target(self, context, moved):
+        if moved is not None and not self.target and moved.tactile_probe.target is not None:
+            return moved.tactile_probe.target
+        return target_object(context, self.target)
+
+    def _touch(self, context, target, depsgraph):
+        given = self.properties.is_property_set
+        return touch(
+            target,
+            depsgraph,
+            list(self.location) if given("location") else list(context.scene.cursor.location),
+            toward=list(self.normal) if given("normal") else None,
+            **touch_arguments(self),
+        )
 
     def draw(self, context):
         layout = self.layout
@@ -150,7 +156,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
 
     def _hover(self, context, event):
         """Touches below the mouse; the preview shows it, and the header says it."""
-        self._seen["touched"], sentence = None, "Move over a mesh to touch it"
+        self._seen["touched"], words = None, "Move over a mesh to touch it"
         try:
             found = _point_below(context, event)
             if found is not None:
@@ -160,10 +166,10 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
                 self._seen["touched"] = touched
                 unit = units.unit_of(context.scene, touched.result.radius)
                 k1, k2 = (units.say(k, -1, unit) for k in (touched.result.patch.k1, touched.result.patch.k2))
-                sentence = f"{touched.report['source']}: principal curvatures {k1} and {k2}"
+                words = f"{touched.report['source']}: principal curvatures {k1} and {k2}"
         except ValueError as error:
-            sentence = str(error)[0].upper() + str(error)[1:]
-        self._area.header_text_set(f"Pick Reference Point     {sentence}")
+            words = sentence(error)
+        self._area.header_text_set(f"Pick Reference Point     {words}")
         _redraw(context)
 
 
@@ -183,32 +189,6 @@ def _redraw(context):
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             area.tag_redraw()
-
-
-def viewport_below(context, event):
-    """(space, region, view) of the 3D viewport below the mouse, or None over anything else."""
-    x, y = event.mouse_x, event.mouse_y
-    for area in context.screen.areas:
-        inside = [r for r in area.regions if 0 <= x - r.x < r.width and 0 <= y - r.y < r.height]
-        if area.type == "VIEW_3D" and inside and all(r.type == "WINDOW" for r in inside):
-            return area.spaces.active, inside[0], inside[0].data
-    return None
-
-
-def mouse_ray(region, view, event):
-    """(origin, direction) of the line below the mouse in a viewport, in the world.
-
-    Not by view3d_utils: the inverse of the whole projection, which it uses, is off by many pixels where
-    the clipping range is a million times as long as what is seen.
-    """
-    x = 2.0 * (event.mouse_x - region.x) / region.width - 1.0
-    y = 2.0 * (event.mouse_y - region.y) / region.height - 1.0
-    window, to_world = view.window_matrix, view.view_matrix.inverted()
-    if view.is_perspective:
-        ahead = Vector(((x + window[0][2]) / window[0][0], (y + window[1][2]) / window[1][1], -1.0))
-        return to_world.translation, (to_world.to_3x3() @ ahead).normalized()
-    aside = Vector(((x - window[0][3]) / window[0][0], (y - window[1][3]) / window[1][1], 0.0))
-    return to_world @ aside, -to_world.col[2].xyz.normalized()
 
 
 def _point_below(context, event):

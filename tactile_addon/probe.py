@@ -5,23 +5,22 @@
 The patch is a child of its probe, so a copy of a probe has none and makes its own, and where a probe is
 deleted its patch stays as an ordinary object. Each probe keeps the digest of the inputs it was last
 touched with, and so do the datablocks made from them: undo takes back every datablock by itself, and
-where they differ afterwards the handler touches again.
+where they differ afterwards the handler of live.py touches again.
 """
 
 import hashlib
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 from mathutils import Matrix, Vector
 
 from . import patch_object
+from .report import sentence
 from .settings import TouchSettings, changed, touch_arguments
 from .surface import MeshSurface
 from .touch import touch, verify
 
-SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
 DIGEST = "tactile_digest"
 VERTICES = 8000  # of the mesh around, compared with the patch at most; a quarter of them lies over it
 
@@ -133,7 +132,7 @@ def update(probe, depsgraph, complete):
     try:
         touched = _touch(probe, depsgraph)
     except ValueError as error:
-        settings.message = str(error)[:1].upper() + str(error)[1:]
+        settings.message = sentence(error)
         if patch is not None:
             patch_object.hold(patch)
         _sign(probe, depsgraph)
@@ -192,7 +191,7 @@ def _made(probe):
 
 
 def _sign(probe, depsgraph):
-    _measure_shape(probe.tactile_probe, depsgraph)
+    measure_shape(probe.tactile_probe, depsgraph)
     digest = _digest(probe, depsgraph)
     probe.tactile_probe.digest = digest
     for block in _made(probe):
@@ -214,7 +213,8 @@ def _digest(probe, depsgraph):
     return hashlib.sha1(repr(inputs).encode()).hexdigest()
 
 
-def _measure_shape(settings, depsgraph, reshaped=()):
+def measure_shape(settings, depsgraph, reshaped=()):
+    """Keeps the checksum of the target, taken anew where it is among the `reshaped` objects."""
     target = settings.target
     if target is None or (settings.shape.startswith(f"{target.name} ") and target not in reshaped):
         return
@@ -225,69 +225,9 @@ def _measure_shape(settings, depsgraph, reshaped=()):
     settings.shape = f"{target.name} {checksum:08x}"
 
 
-@persistent
-def on_depsgraph_update(scene, depsgraph):
-    """Brings the patches of outdated live probes up to date; nothing happens where no input has changed."""
-    if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
-        return
-    reshaped = {u.id.original for u in depsgraph.updates if u.is_updated_geometry}
-    for probe in probes(depsgraph.view_layer):
-        settings = probe.tactile_probe
-        _forget_deleted(probe)
-        _measure_shape(settings, depsgraph, reshaped)
-        patch = patch_of(probe)
-        if is_outdated(probe, depsgraph):
-            if settings.live:
-                update(probe, depsgraph, complete=bpy.app.background)
-            elif patch is not None:
-                patch_object.hold(patch)
-        if is_pending(probe) and not bpy.app.background:
-            _settle_soon()
-
-
 def refresh(probe, context):
     """Touches again at the end of a gesture, with all there is to know."""
     update(probe, context.evaluated_depsgraph_get(), complete=True)
-
-
-def _forget_deleted(probe):
-    """A target that was deleted lives on as long as the probe points to it: lets go, so that it is gone."""
-    settings, record = probe.tactile_probe, record_of(probe)
-    target = settings.target
-    # One that has never been touched is a script's, which may be about to put it into the scene.
-    if target is None or target.users_scene or record is None or record["source"] != target.name:
-        return
-    settings.property_unset("target")
-    if not target.users:
-        bpy.data.objects.remove(target)
-
-
-def is_pending(probe):
-    """Whether what is dear is still to be filled in."""
-    patch = patch_of(probe)
-    return (
-        patch is not None and not probe.tactile_probe.message and "vertices" not in patch[patch_object.RECORD]
-    )
-
-
-def _settle_soon():
-    if bpy.app.timers.is_registered(_settle):
-        bpy.app.timers.unregister(_settle)
-    bpy.app.timers.register(_settle, first_interval=SETTLE)
-
-
-def _settle():
-    """Completes what the gesture has left, once it has ended; a timer."""
-    windows = bpy.context.window_manager.windows
-    gestures = ("TRANSFORM_OT_", "TACTILE_OT_")
-    if any(op.bl_idname.startswith(gestures) for window in windows for op in window.modal_operators):
-        return SETTLE
-    for window in windows:
-        with bpy.context.temp_override(window=window):
-            depsgraph = bpy.context.evaluated_depsgraph_get()
-            for probe in filter(is_pending, probes(window.view_layer)):
-                update(probe, depsgraph, complete=True)
-    return None
 
 
 def register():
@@ -299,12 +239,8 @@ def register():
         items=[item[:3] for item in patch_object.QUANTITIES],
         update=lambda obj, _: patch_object.recolour(obj) if patch_object.RECORD in obj else None,
     )
-    bpy.app.handlers.depsgraph_update_post.append(on_depsgraph_update)
 
 
 def unregister():
-    if bpy.app.timers.is_registered(_settle):
-        bpy.app.timers.unregister(_settle)
-    bpy.app.handlers.depsgraph_update_post.remove(on_depsgraph_update)
     del bpy.types.Object.tactile_colours, bpy.types.Object.tactile_probe
     bpy.utils.unregister_class(TactileProbe)

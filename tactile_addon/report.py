@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report of a reconstruction as a table for people."""
+"""The report of a reconstruction as a table for people, and errors as sentences."""
 
 
 def readable(report):
@@ -29,6 +29,12 @@ def readable(report):
     ]
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
+
+
+def sentence(error):
+    """The words of an exception, as a sentence begins."""
+    words = str(error)
+    return words[:1].upper() + words[1:]
 
 
 def _verification(report):

@@ -36,6 +36,7 @@ SOLVERS = [
     ("descent", "Steepest Descent", "The paper's minimisation, slower, to compare with"),
 ]
 MOST_PLANES = 6
+STEEPEST = math.radians(60)  # of a tilt, by mouse
 
 
 def changed(settings, context):
@@ -69,8 +70,8 @@ class TouchSettings:
         description="How far the planes lean from upright",
         size=MOST_PLANES,
         unit="ROTATION",
-        soft_min=-math.radians(60),
-        soft_max=math.radians(60),
+        soft_min=-STEEPEST,
+        soft_max=STEEPEST,
         update=changed,
     )
     extent: FloatProperty(

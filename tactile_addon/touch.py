@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from .. import core
+from .settings import STEEPEST
 from .surface import MeshSurface
 
 EXTENT_SHARE = 1.0 / 8.0  # of the object's largest dimension, where no extent is given
@@ -145,8 +146,12 @@ def reference_axes(outward, tangent=None):
 
 
 def plane_axes(matrix, settings, number):
-    """Columns t, u, t x u of a sampling plane of a probe with that world matrix; see core.SamplingPlane."""
-    plane = core.SamplingPlane(settings.azimuths[number], settings.tilts[number])
+    """Columns t, u, t x u of a sampling plane of a probe with that world matrix, to draw it.
+
+    See core.SamplingPlane.axes; a tilt that cannot be touched with is drawn as the steepest.
+    """
+    tilt = min(max(settings.tilts[number], -STEEPEST), STEEPEST)
+    plane = core.SamplingPlane(settings.azimuths[number], tilt)
     return plane.axes(matrix.col[2].xyz, matrix.col[0].xyz)
 
 

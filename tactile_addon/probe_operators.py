@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons of the panels besides picking: planes, another touch, deletion, and a viewport with colours."""
+
+import math
+
+import bpy
+from bpy.props import IntProperty
+
+from . import patch_object, probe
+from .settings import MOST_PLANES
+
+
+class _ProbeOperator:
+    """Mixed into operators on the active probe, which may be active by its patch or contours."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if probe.probe_of(context.view_layer.objects.active) is None:
+            cls.poll_message_set("Select a probe, or pick a reference point first")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Leave this mode: probes are changed in Object Mode")
+            return False
+        return True
+
+
+class TACTILE_OT_add_plane(_ProbeOperator, bpy.types.Operator):
+    """Feel along one more plane: the one that tells most of what is still open"""
+
+    bl_idname = "tactile.add_plane"
+    bl_label = "Add Suggested Plane"
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == MOST_PLANES:
+            cls.poll_message_set("Six planes are the most: remove one first")
+            return False
+        return True
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        settings, record = found.tactile_probe, probe.record_of(found)
+        number = settings.plane_count
+        if record is not None and "suggested_plane" in record:
+            settings.azimuths[number] = math.radians(record["suggested_plane"]["azimuth"])
+            settings.tilts[number] = 0.0
+        settings.plane_count = number + 1
+        settings.active_plane = number
+        probe.refresh(found, context)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
+    """Feel along one plane less"""
+
+    bl_idname = "tactile.remove_plane"
+    bl_label = "Remove Plane"
+
+    plane: IntProperty(name="Plane", description="Which one, from 0", min=0, max=MOST_PLANES - 1)
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == 3:
+            cls.poll_message_set("A patch needs three planes")
+            return False
+        return True
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        settings = found.tactile_probe
+        for name in ("azimuths", "tilts"):
+            values = list(getattr(settings, name))
+            values.append(values.pop(self.plane))
+            setattr(settings, name, values)
+        settings.plane_count -= 1
+        probe.refresh(found, context)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_update(_ProbeOperator, bpy.types.Operator):
+    """Touch again with the numbers and at the place of the probe"""
+
+    bl_idname = "tactile.update"
+    bl_label = "Touch Again"
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        probe.refresh(found, context)
+        if found.tactile_probe.message:
+            self.report({"WARNING"}, found.tactile_probe.message)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
+    """Delete the probe with its patch and contours; the mesh that was touched stays"""
+
+    bl_idname = "tactile.delete"
+    bl_label = "Delete Probe and Patch"
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        patch = probe.patch_of(found)
+        lines = None if patch is None else patch_object.contours_of(patch)
+        for obj in filter(None, (lines, patch, found)):
+            mesh = obj.data
+            bpy.data.objects.remove(obj)
+            if mesh is not None and not mesh.users:
+                bpy.data.meshes.remove(mesh)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_show_colours(bpy.types.Operator):
+    """Have this viewport draw the colours of the vertices, in Solid shading"""
+
+    bl_idname = "tactile.show_colours"
+    bl_label = "Show Patch Colours"
+
+    @classmethod
+    def poll(cls, context):
+        space = context.space_data
+        if space is None or space.type != "VIEW_3D":
+            cls.poll_message_set("Use it in a 3D viewport")
+            return False
+        if shows_colours(space):
+            cls.poll_message_set("This viewport shows the colours of the patch already")
+            return False
+        return True
+
+    def execute(self, context):
+        context.space_data.shading.type = "SOLID"
+        context.space_data.shading.color_type = "VERTEX"
+        return {"FINISHED"}
+
+
+def shows_colours(space):
+    kind = space.shading.type
+    return kind in ("MATERIAL", "RENDERED") or (kind == "SOLID" and space.shading.color_type == "VERTEX")
+
+
+OPERATORS = (
+    TACTILE_OT_add_plane,
+    TACTILE_OT_remove_plane,
+    TACTILE_OT_update,
+    TACTILE_OT_delete,
+    TACTILE_OT_show_colours,
+)

@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is below the mouse: the 3D viewport, and the line into the scene."""
+
+from mathutils import Vector
+
+
+def viewport_below(context, event):
+    """(space, region, view) of the 3D viewport below the mouse, or None over anything else."""
+    x, y = event.mouse_x, event.mouse_y
+    for area in context.screen.areas:
+        inside = [r for r in area.regions if 0 <= x - r.x < r.width and 0 <= y - r.y < r.height]
+        if area.type == "VIEW_3D" and inside and all(r.type == "WINDOW" for r in inside):
+            return area.spaces.active, inside[0], inside[0].data
+    return None
+
+
+def mouse_ray(region, view, event):
+    """(origin, direction) of the line below the mouse in a viewport, in the world.
+
+    Not by view3d_utils: the inverse of the whole projection, which it uses, is off by many pixels where
+    the clipping range is a million times as long as what is seen.
+    """
+    x = 2.0 * (event.mouse_x - region.x) / region.width - 1.0
+    y = 2.0 * (event.mouse_y - region.y) / region.height - 1.0
+    window, to_world = view.window_matrix, view.view_matrix.inverted()
+    if view.is_perspective:
+        ahead = Vector(((x + window[0][2]) / window[0][0], (y + window[1][2]) / window[1][1], -1.0))
+        return to_world.translation, (to_world.to_3x3() @ ahead).normalized()
+    aside = Vector(((x - window[0][3]) / window[0][0], (y - window[1][3]) / window[1][1], 0.0))
+    return to_world @ aside, -to_world.col[2].xyz.normalized()
