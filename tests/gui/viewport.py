@@ -440,6 +440,8 @@ def orthographic_and_tiny():
 
 def looks():
     """Colours, their button, a light theme and large letters; the last picture is run.sh's."""
+    if patch() is None:  # there was no scan
+        bpy.ops.tactile.pick(target="Suzanne")
     shading = gui.find()[1].spaces.active.shading
     shading.color_type = "MATERIAL"
     yield 1
