@@ -438,6 +438,27 @@ def orthographic_and_tiny():
     picture("tiny")
 
 
+def rendering():
+    """While a picture is rendered, in another thread, nothing is touched."""
+    scene, settings = bpy.context.scene, probe().tactile_probe
+    bpy.context.preferences.view.render_display_type = "NONE"
+    scene.render.engine, scene.cycles.samples = "CYCLES", 4096
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.render.render("INVOKE_DEFAULT")
+    yield 1
+    digest = settings.digest
+    settings.azimuths[0] += 0.1
+    yield 1
+    busy = bpy.app.is_job_running("RENDER")
+    check("no touch while a picture is rendered", busy and settings.digest == digest, busy)
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "Escape")
+    yield from until(lambda: not bpy.app.is_job_running("RENDER"))
+    probe().update_tag()
+    yield 1
+    check("... but after it", settings.digest != digest and not settings.message, settings.message)
+
+
 def looks():
     """Colours, their button, a light theme and large letters; the last picture is run.sh's."""
     if patch() is None:  # there was no scan
@@ -454,6 +475,7 @@ def looks():
         yield 1
         check(f"the colours of {name} have a range", shown["tactile"]["colour_limit"] > 0.0)
         picture(name)
+    yield from rendering()
     folder = bpy.utils.preset_paths("interface_theme")[0]
     theme = next(Path(folder).glob("*ight*.xml"))
     bpy.ops.script.execute_preset(filepath=str(theme), menu_idname="USERPREF_MT_interface_theme_presets")
