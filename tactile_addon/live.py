@@ -10,7 +10,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import patch_object
-from .probe import is_outdated, measure_shape, patch_of, probes, record_of, update
+from .probe import is_free, is_outdated, is_probe, measure_shape, patch_of, probe_of, record_of, update
 
 SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
 GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
@@ -22,7 +22,7 @@ def on_depsgraph_update(scene, depsgraph):
     if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
     reshaped = {u.id.original for u in depsgraph.updates if u.is_updated_geometry}
-    for probe in probes(depsgraph.view_layer):
+    for probe in filter(is_free, _concerned(depsgraph)):
         settings = probe.tactile_probe
         _forget_deleted(probe)
         measure_shape(settings, depsgraph, reshaped)
@@ -34,6 +34,16 @@ def on_depsgraph_update(scene, depsgraph):
                 patch_object.hold(patch)
         if is_pending(probe) and not bpy.app.background:
             _settle_soon()
+
+
+def _concerned(depsgraph):
+    """The probes that something has happened to: to them, their patch or target, or to what is there."""
+    updated = {u.id.original for u in depsgraph.updates}
+    found = [obj for obj in depsgraph.view_layer.objects if is_probe(obj)]
+    if any(isinstance(datablock, bpy.types.Scene | bpy.types.Collection) for datablock in updated):
+        return found
+    owners = {probe_of(datablock) for datablock in updated if isinstance(datablock, bpy.types.Object)}
+    return [obj for obj in found if obj in owners or obj.tactile_probe.target in updated]
 
 
 def _forget_deleted(probe):
@@ -71,8 +81,9 @@ def _settle():
     for window in windows:
         with bpy.context.temp_override(window=window):
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            for probe in filter(is_pending, probes(window.view_layer)):
-                update(probe, depsgraph, complete=True)
+            for probe in filter(is_probe, window.view_layer.objects):
+                if is_pending(probe) and is_free(probe):
+                    update(probe, depsgraph, complete=True)
     return None
 
 

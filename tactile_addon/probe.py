@@ -91,10 +91,11 @@ def record_of(obj):
     return None if patch is None else patch[patch_object.RECORD]
 
 
-def probes(view_layer):
-    """Those that can be kept up to date: not of a library, and with no patch in Edit Mode."""
-    found = [obj for obj in view_layer.objects if is_probe(obj) and obj.library is None]
-    return [obj for obj in found if not any(mesh.is_editmode for mesh in patch_object.meshes(patch_of(obj)))]
+def is_free(probe):
+    """Whether it can be kept up to date: it is not a library's, and nobody edits its patch."""
+    return probe.library is None and not any(
+        mesh.is_editmode for mesh in patch_object.meshes(patch_of(probe))
+    )
 
 
 def make(context, target):
