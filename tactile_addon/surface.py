@@ -92,9 +92,23 @@ class MeshSurface:
 
     def project(self, location):
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""
-        found = self._foot(location, location)
-        # Nearest within a stretched object is not nearest in the world: walk downhill from there, by the
-        # foot of the perpendicular on the face found, as long as that brings the surface nearer.
+        found = self._walk(location, location)
+        gram = self._linear.T @ self._linear
+        stretched = not np.allclose(gram, gram[0, 0] * np.eye(3), rtol=0.0, atol=1e-4 * gram[0, 0])
+        if stretched and found[2] > 1e-3 * self.size:
+            # Nearest within a stretched object may be on another sheet than nearest in the world.
+            offsets = self._co @ self._linear.T.astype(np.float32)
+            offsets -= np.subtract(location, self._origin).astype(np.float32)
+            nearest = self._co[np.argmin(np.einsum("ij,ij->i", offsets, offsets))]
+            found = min(found, self._walk(self._to_world(nearest.tolist()), location), key=lambda f: f[2])
+        return found
+
+    def _walk(self, start, location):
+        """Downhill to the nearest point, from the one nearest to `start` as the object measures.
+
+        By the foot of the perpendicular on the face found, as long as that brings the surface nearer.
+        """
+        found = self._foot(start, location)
         for _ in range(WALK):
             point, normal, distance = found
             height = np.dot(np.subtract(location, point), normal)

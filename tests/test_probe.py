@@ -685,19 +685,29 @@ def test_disabling_takes_handler_and_properties_away_and_enabling_brings_them_ba
     assert_touches(*pick(empty))
 
 
-def test_the_nearest_point_of_a_stretched_ball_is_nearest_in_the_world(empty, extension):
-    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=RADIUS)
-    ball = empty.context.object
-    ball.scale, ball.rotation_euler = (1.0, 2.0, 0.5), (0.3, 0.9, -0.5)
+@pytest.mark.parametrize("shape", ["uv_sphere", "monkey"])
+@pytest.mark.parametrize("share", [0.02, 0.1])
+def test_the_nearest_point_of_a_stretched_object_is_nearest_in_the_world(empty, extension, shape, share):
+    getattr(empty.ops.mesh, f"primitive_{shape}_add")()
+    obj = empty.context.object
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 3
+    obj.scale, obj.rotation_euler = (1.0, 2.0, 0.5), (0.3, 0.9, -0.5)
     update(empty)
-    surface = extension.tactile_addon.surface.MeshSurface(ball, empty.context.evaluated_depsgraph_get())
-    world = [ball.matrix_world @ vertex.co for vertex in ball.data.vertices]
-    tree = BVHTree.FromPolygons(world, [face.vertices[:] for face in ball.data.polygons])
-    normals = ball.matrix_world.to_3x3().inverted().transposed()
+    depsgraph = empty.context.evaluated_depsgraph_get()
+    surface, mesh = (
+        extension.tactile_addon.surface.MeshSurface(obj, depsgraph),
+        obj.evaluated_get(depsgraph).data,
+    )
+    world = [obj.matrix_world @ vertex.co for vertex in mesh.vertices]
+    tree = BVHTree.FromPolygons(world, [face.vertices[:] for face in mesh.polygons])
+    normals = obj.matrix_world.to_3x3().inverted().transposed()
     rng = np.random.default_rng(0)
-    for i in rng.choice(len(world), 100, replace=False).tolist():
-        off = (normals @ ball.data.vertices[i].normal).normalized() * 0.02 * surface.size
+    excess = []
+    for i in rng.choice(len(world), 200, replace=False).tolist():
+        off = (normals @ mesh.vertices[i].normal).normalized() * share * surface.size
         location = world[i] + (off if rng.random() < 0.5 else -off)
         point, _, distance = surface.project(list(location))
-        assert distance == pytest.approx(tree.find_nearest(location)[3], rel=0.02)
-        assert distance == pytest.approx((location - Vector(point)).length, rel=1e-4)
+        excess.append(distance / tree.find_nearest(location)[3] - 1.0)
+        assert distance == pytest.approx((location - Vector(point)).length, rel=1e-4, abs=1e-6)
+    assert np.quantile(excess, 0.95) < 0.01
+    assert max(excess) < 0.1
