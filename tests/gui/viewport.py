@@ -466,6 +466,8 @@ def looks():
     shading = gui.find()[1].spaces.active.shading
     shading.color_type = "MATERIAL"
     yield 1
+    gui.xdo("mousemove", *COLOURS_BUTTON)
+    yield 0.5
     gui.click(*COLOURS_BUTTON)
     yield 1
     check("a button has the viewport show the colours", shading.color_type == "VERTEX", shading.color_type)
