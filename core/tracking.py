@@ -3,9 +3,9 @@
 """Contour tracking in a sampling plane (paper, sections III-C and V), on anything that can answer a ray."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from .arguments import Array, finite_array, number, unit_vector
 
 MAX_TURN = math.cos(math.radians(45.0))  # between contacts; a sharper turn is a crease to a finger
 MAX_TILT = math.cos(math.radians(75.0))  # against the normal at the point; beyond, slopes exceed 3.7
+LEAST_IN_PLANE = 1e-3  # of a surface normal
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 
 Vector = tuple[float, float, float]
@@ -26,6 +27,18 @@ class Surface(Protocol):
         self, origin: Vector, direction: Vector, distance: float
     ) -> tuple[Sequence[float], Sequence[float]] | None:
         """The first point hit within `distance` along the unit `direction`, and the unit normal there."""
+
+
+class _Contact(NamedTuple):
+    """A touch in a sampling plane: where, and the part of the surface normal in the plane; both in space."""
+
+    at: complex
+    up: complex
+    point: Vector
+    normal: Vector
+
+
+Cast = Callable[[complex, complex, float], _Contact | None]  # start, direction and distance of a ray
 
 
 @dataclass(frozen=True)
@@ -50,12 +63,13 @@ class SamplingPlane:
             tangent = (0.0, 1.0, 0.0) if abs(n[0]) > 0.9 else (1.0, 0.0, 0.0)
         e1 = unit_vector("tangent", tangent)
         e1 -= (e1 @ n) * n
-        if np.linalg.norm(e1) < 1e-6:
+        length = math.sqrt(e1 @ e1)
+        if length < 1e-6:
             raise ValueError("tangent: wanted a direction across the normal, got one along it")
-        e1 /= np.linalg.norm(e1)
-        t = math.cos(azimuth) * e1 + math.sin(azimuth) * np.cross(n, e1)
-        u = math.cos(tilt) * n + math.sin(tilt) * np.cross(n, t)
-        return np.column_stack([t, u, np.cross(t, u)])
+        e1 /= length
+        t = math.cos(azimuth) * e1 + math.sin(azimuth) * np.array(cross(n, e1))
+        u = math.cos(tilt) * n + math.sin(tilt) * np.array(cross(n, t))
+        return np.column_stack([t, u, cross(t, u)])
 
 
 @dataclass(frozen=True)
@@ -124,10 +138,10 @@ def track(
     contours = []
     for plane in planes:
         axes = plane.axes(n, tangent)
-        back, ahead = (
-            _half_contour(surface, start, up, side, _vector(n), _vector(across), count, step)
-            for across in (-axes[:, 2], axes[:, 2])
-        )
+        t, u = _vector(axes[:, 0]), _vector(axes[:, 1])
+        cast, up_in_plane = _section(surface, start, t, u, side), complex(_dot(up, t), _dot(up, u))
+        # Turned by a quarter, clockwise, the curve's normal is its tangent.
+        back, ahead = (_half_contour(cast, up_in_plane, turn, _vector(n), count, step) for turn in (1j, -1j))
         points = np.array([*back[0][::-1], tuple(p), *ahead[0]])
         normals = np.array([*back[1][::-1], up, *ahead[1]])
         if noise:
@@ -157,74 +171,82 @@ def _first_contact(surface: Surface, p: Vector, n: Vector, step: float) -> tuple
     )
 
 
-def _half_contour(
-    surface: Surface,
-    contact: Vector,
-    surface_normal: Vector,
-    side: float,
-    n: Vector,
-    across: Vector,
-    count: int,
-    step: float,
-) -> tuple[list[Vector], list[Vector], str]:
-    """Contacts, surface normals and the reason of the stop on one side of the reference point.
+def _section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float) -> Cast:
+    """The rays of the sampling plane through `origin` that holds t and u, both unit, as a complex plane.
 
-    All in Python floats: a contact costs a ray cast, not a dozen numpy calls. `across` is the
-    plane's normal, `up` the curve's normal in the plane, `up x across` the way ahead.
+    In Python floats: a contact costs its ray casts, not a dozen numpy calls.
+    """
+    (x0, y0, z0), (tx, ty, tz), (ux, uy, uz) = origin, t, u
+
+    def cast(start: complex, direction: complex, distance: float) -> _Contact | None:
+        a, b, c, d = start.real, start.imag, direction.real, direction.imag
+        hit = surface.ray_cast(
+            (x0 + a * tx + b * ux, y0 + a * ty + b * uy, z0 + a * tz + b * uz),
+            (c * tx + d * ux, c * ty + d * uy, c * tz + d * uz),
+            distance,
+        )
+        if hit is None:
+            return None
+        (x, y, z), (nx, ny, nz) = hit
+        nx, ny, nz = side * nx, side * ny, side * nz
+        dx, dy, dz = x - x0, y - y0, z - z0
+        at = complex(dx * tx + dy * ty + dz * tz, dx * ux + dy * uy + dz * uz)
+        up = complex(nx * tx + ny * ty + nz * tz, nx * ux + ny * uy + nz * uz)
+        return _Contact(at, up, (x, y, z), (nx, ny, nz))
+
+    return cast
+
+
+def _half_contour(
+    cast: Cast, up: complex, turn: complex, n: Vector, count: int, step: float
+) -> tuple[list[Vector], list[Vector], str]:
+    """Contacts, surface normals and the reason of the stop on one side of the reference point, which is 0.
+
+    up : the curve's normal there, `turn` times which is the way ahead
     """
     points: list[Vector] = []
     normals: list[Vector] = []
-    up = _in_plane(surface_normal, across)
-    if up is None:
+    at = 0j
+    if abs(up) < LEAST_IN_PLANE:
         return points, normals, CREASE
+    up /= abs(up)
     for _ in range(count):
-        tangent = cross(up, across)
+        ahead = turn * up
         # A finger bumps into a wall; the ray from above would come down behind it.
-        if surface.ray_cast(_along(contact, up, step), tangent, step) is not None:
+        if cast(at + step * up, ahead, step) is not None:
             return points, normals, CREASE
-        hit = _next_contact(surface, contact, tangent, up, step)
-        if hit is None:
-            below = _along(_along(contact, tangent, step), up, -0.5 * step)
-            flank = surface.ray_cast(below, _scaled(tangent, -1.0), step)
+        contact = _next_contact(cast, at, ahead, up, step)
+        if contact is None:
+            flank = cast(at + step * ahead - 0.5 * step * up, -ahead, step)
             return points, normals, NO_CONTACT if flank is None else CREASE
-        contact, surface_normal = _vector(hit[0]), _scaled(_vector(hit[1]), side)
-        next_up = _in_plane(surface_normal, across)
-        if next_up is None or _dot(next_up, up) < MAX_TURN:
+        length = abs(contact.up)
+        # Where the surface lies in the plane there is no curve to follow.
+        if length < LEAST_IN_PLANE or (contact.up * up.conjugate()).real < MAX_TURN * length:
             return points, normals, CREASE
-        if _dot(surface_normal, n) < MAX_TILT:
+        if _dot(contact.normal, n) < MAX_TILT:
             return points, normals, NOT_MONGE
-        up = next_up
-        points.append(contact)
-        normals.append(surface_normal)
+        at, up = contact.at, contact.up / length
+        points.append(contact.point)
+        normals.append(contact.normal)
     return points, normals, EXTENT
 
 
-def _next_contact(
-    surface: Surface, contact: Vector, tangent: Vector, up: Vector, step: float
-) -> tuple[Sequence[float], Sequence[float]] | None:
-    """The hit one `step` from `contact`, by a ray from above back along the curve's normal.
+def _next_contact(cast: Cast, at: complex, ahead: complex, up: complex, step: float) -> _Contact | None:
+    """The contact one `step` from `at`, by a ray from above back along the curve's normal.
 
     A step along the tangent lands farther than a step along the curve, so where that is more than
     0.1 % the ray is cast once more from where the chord has the right length.
     """
     forward = step
     for _ in range(2):
-        origin = _along(_along(contact, tangent, forward), up, step)
-        hit = surface.ray_cast(origin, _scaled(up, -1.0), 2.0 * step)
-        if hit is None:
+        contact = cast(at + forward * ahead + step * up, -up, 2.0 * step)
+        if contact is None:
             return None
-        chord = math.dist(contact, hit[0])
+        chord = abs(contact.at - at)
         if abs(chord - step) <= 1e-3 * step:
             break
         forward *= step / chord
-    return hit
-
-
-def _in_plane(v: Vector, across: Vector) -> Vector | None:
-    """`v` projected onto the plane, unit; None where the surface lies in the plane: no curve to follow."""
-    projected = _along(v, across, -_dot(v, across))
-    length = math.sqrt(_dot(projected, projected))
-    return _scaled(projected, 1.0 / length) if length > 1e-3 else None
+    return contact
 
 
 def _vector(v: Sequence[float] | Array) -> Vector:

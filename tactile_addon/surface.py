@@ -37,10 +37,11 @@ class MeshSurface:
         self._linear, self._origin = matrix[:3, :3], matrix[:3, 3]
         self._inverse = np.linalg.inv(self._linear)
         # The same for ray_cast, where a numpy call would cost more than the cast.
-        self._rows, self._inverse_rows, self._at = (
-            array.tolist() for array in (self._linear, self._inverse, self._origin)
+        self._rows, self._inverse_rows, self._normal_rows, self._at = (
+            array.tolist() for array in (self._linear, self._inverse, self._inverse.T, self._origin)
         )
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
+        self._ray_cast = evaluated.ray_cast
         if not len(self._mesh.polygons):
             raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
         self._co = _coordinates(self._mesh)
@@ -59,11 +60,12 @@ class MeshSurface:
     def ray_cast(self, origin, direction, distance):
         """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
         back, (x, y, z) = self._inverse_rows, self._at
-        direction = _product(back, direction)
-        scale = math.hypot(*direction)
-        origin = _product(back, (origin[0] - x, origin[1] - y, origin[2] - z))
-        hit, point, normal, _ = self._object.ray_cast(
-            origin, direction, distance=distance * scale, depsgraph=self._depsgraph
+        local = _product(back, *direction)
+        hit, point, normal, _ = self._ray_cast(
+            _product(back, origin[0] - x, origin[1] - y, origin[2] - z),
+            local,
+            distance=distance * math.hypot(*local),
+            depsgraph=self._depsgraph,
         )
         # A face of no area has no normal, and nothing of it can be felt.
         return (self._to_world(point), self._normal_to_world(normal)) if hit and any(normal) else None
@@ -165,12 +167,12 @@ class MeshSurface:
         return self._inverse @ np.subtract(point, self._origin)
 
     def _to_world(self, point):
-        x, y, z = _product(self._rows, point)
+        x, y, z = _product(self._rows, *point)
         return x + self._at[0], y + self._at[1], z + self._at[2]
 
     def _normal_to_world(self, normal):
         """By the inverse transpose: outward stays outward under any scale, a mirroring one too."""
-        x, y, z = _product(zip(*self._inverse_rows, strict=True), normal)
+        x, y, z = _product(self._normal_rows, *normal)
         length = math.hypot(x, y, z)
         return x / length, y / length, z / length
 
@@ -192,7 +194,7 @@ def _require_invertible(name, linear):
         raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')
 
 
-def _product(rows, v):
+def _product(rows, x, y, z):
     """A matrix, as rows of Python floats, times a vector."""
-    x, y, z = v
-    return [a * x + b * y + c * z for a, b, c in rows]
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
