@@ -14,17 +14,20 @@ PYTHON_VERSION := $(filter 3.11 3.13,$(shell '$(PYTHON)' -c '$(VERSION)' 2>/dev/
 VENV := build/venv-$(PYTHON_VERSION)
 VENV_PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
+PEERS := $(VENV)/.peers
 
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
 	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo test zip zip-nowheels clean
+.PHONY: help demo test chart paper zip zip-nowheels clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
 	@echo 'make test              check style and types, then test the extension in Blender'
+	@echo 'make chart [QUICK=1]   draw speed against accuracy, beside what else one could take, in build/charts'
+	@echo 'make paper             repeat the experiments of the paper, beside its figures'
 	@echo 'make zip               build the zip files of a release, one for each platform, in build/dist'
 	@echo 'make zip-nowheels      build the zip for a Blender whose own Python has scipy, in build/dist'
 	@echo 'make clean             remove build; the downloaded wheels stay'
@@ -39,6 +42,14 @@ test: $(ZIP)
 	$(VENV_PY) -m mypy core
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest
 
+chart: $(ZIP) $(PEERS)
+	$(VENV_PY) -m benchmarks.chart $(if $(QUICK),--quick)
+	$(VENV_PY) -m benchmarks.amount $(if $(QUICK),--quick)
+	$(VENV_PY) -m benchmarks.mesh_size $(ZIP) $(if $(QUICK),--quick)
+
+paper: $(ZIP) $(PEERS)
+	$(VENV_PY) -m benchmarks.paper $(ZIP)
+
 zip: $(READY)
 	$(VENV_PY) tools/build.py --wheels all
 
@@ -51,6 +62,12 @@ clean:
 # The environment has to be there to build, but a new one is no reason to build again.
 $(ZIP): $(SOURCES) | $(READY)
 	@zip=$$($(VENV_PY) tools/build.py --output build) && mv "$$zip" $@
+
+# One by one: a chart goes without a peer that is not made for this Python or system.
+$(PEERS): benchmarks/requirements.txt $(READY)
+	@echo 'Installing what the charts are drawn with and compare to: once.'
+	@grep -v '^#' $< | xargs -n 1 $(VENV_PY) -m pip install --quiet --disable-pip-version-check || true
+	@touch $@
 
 $(READY): tools/requirements.txt tools/check_bpy.py
 ifeq ($(PYTHON_VERSION),)

@@ -13,8 +13,6 @@ frame it found itself (the peers in the paper's). Lengths are in mm, errors in m
 """
 
 import argparse
-import os
-import platform
 import warnings
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -24,16 +22,14 @@ from statistics import median
 from time import perf_counter
 from typing import NamedTuple
 
-for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
-    os.environ[f"{library}_NUM_THREADS"] = "1"  # read once, when numpy is imported
-
 import numpy as np
-import scipy
 
 from core import SamplingPlane, reconstruct, track
 from core.domain import closed_spline_domain
 from core.monge import exponents, monomials
 from tests import surfaces
+
+from . import machine
 
 # Surfaces and extents of their half curves. The sizes are such that the peers' errors come out like those
 # measured on other surfaces when this fit was planned, so that these are as hard.
@@ -453,10 +449,7 @@ def main():
         random = list(pool.map(random_scores, range(options.shapes), chunksize=4))
     exact_tables(exact, times)
     random_table(random)
-    print(
-        f"Seeds {options.seeds}, {options.shapes} shapes; times on one thread; Python "
-        f"{platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}."
-    )
+    print(f"Seeds {options.seeds}, {options.shapes} shapes; {machine('numpy', 'scipy')}.")
 
 
 if __name__ == "__main__":

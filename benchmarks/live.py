@@ -14,16 +14,13 @@ The last two columns happen once: building that tree, and at the end of a gestur
 
 import argparse
 import math
-import os
-import platform
 from pathlib import Path
 from statistics import median
 from time import perf_counter
 
 from tools import blender
 
-for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
-    os.environ[f"{library}_NUM_THREADS"] = "1"  # read once, when bpy imports numpy
+from . import machine
 
 FACES = (10_000, 1_000_000)
 UPDATES = 101
@@ -108,10 +105,7 @@ def main():
         with blender.quiet():
             row = measure(bpy, update, clock, faces)
         print(f"| {row} |")
-    print(
-        f"\nMilliseconds, medians of {UPDATES} updates; Python {platform.python_version()}, "
-        f"Blender {bpy.app.version_string}."
-    )
+    print(f"\nMilliseconds, medians of {UPDATES} updates; {machine('bpy')}.")
 
 
 if __name__ == "__main__":

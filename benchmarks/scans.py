@@ -12,8 +12,6 @@ A second table does the same at random points (seeded) all over each scan, for t
 
 import argparse
 import math
-import os
-import platform
 import sys
 from pathlib import Path
 from statistics import median
@@ -21,10 +19,8 @@ from typing import NamedTuple
 
 from tools import blender
 
-for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
-    os.environ[f"{library}_NUM_THREADS"] = "1"  # read once, when bpy imports numpy
+from . import SCANS_FOLDER, machine
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 METHODS = ("bayes", "tagc", "quadratic-variation", "least-squares")
 AZIMUTHS = (0.0, 60.0, 120.0)
 RUNS = 7
@@ -71,7 +67,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, help="the built extension")
     parser.add_argument(
-        "--data", type=Path, default=DATA, metavar="FOLDER", help="of the scans (%(default)s)"
+        "--data", type=Path, default=SCANS_FOLDER, metavar="FOLDER", help="of the scans (%(default)s)"
     )
     parser.add_argument(
         "--share", type=float, default=1.0, help="of the extents, to touch less (%(default)s)"
@@ -187,20 +183,10 @@ def _beside(ours, paper):
 
 
 def _caption():
-    import bpy
-    import numpy
-    import scipy
-
-    cpu = platform.processor() or platform.machine()
-    if (listing := Path("/proc/cpuinfo")).exists():
-        lines = listing.read_text().splitlines()
-        cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), cpu)
     return (
         "Lengths in mm, of Eros in km; sensor noise 0.05 mm, of Eros 0.0163 km; seed 0; contacts without the "
         "reference point. In brackets: the paper, on its own objects, where a fit took 10 minutes. "
-        f"ms: tracking and fit, median of {RUNS} runs on one thread ({cpu}); Python "
-        f"{platform.python_version()}, Blender {bpy.app.version_string}, numpy {numpy.__version__}, "
-        f"scipy {scipy.__version__}."
+        f"ms: tracking and fit, median of {RUNS} runs, {machine('bpy', 'numpy', 'scipy')}."
     )
 
 
