@@ -52,8 +52,9 @@ class Domain:
     @cached_property
     def area(self) -> float:
         """The area inside, in length^2."""
-        x, y = self.boundary(SAMPLES).T
-        return float(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+        azimuth, r = self._polar
+        turn, following = np.diff(azimuth, append=azimuth[0] + 2.0 * np.pi), np.roll(r, -1)
+        return float(np.sum(turn * (r**2 + r * following + following**2)) / 6.0)
 
     def grid(self, count: int) -> tuple[Array, float]:
         """The grid of (8): about `count` points (m, 2) inside with uniform spacing h, and h."""

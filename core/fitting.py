@@ -1,24 +1,21 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The coefficients of (1) from the contacts: the three methods of the paper's section IV.
+"""The coefficients of (1) from the contacts: least squares and quadratic variation, and the start of TAGC.
 
 Everything here is in unit radius, in the Darboux frame, kappa1 and kappa2 known. lambda is then a
 pure number, the weight of the mean square error f against a curvature integral over the domain.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .arguments import Array
 from .domain import Domain
-from .monge import MongePatch, exponents, monomials
+from .monge import MongePatch, derived_monomials, exponents, monomials
 
 GRID = 600  # points of (8) over the domain
-DESCENT_CAP = 20_000  # steps
-
-Objective = Callable[[Array], tuple[float, Array]]
 
 
 @dataclass(frozen=True)
@@ -51,62 +48,20 @@ def least_squares(data: Problem) -> Array:
 
 def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
     """min of the integral of z_xx^2 + 2 z_xy^2 + z_yy^2 plus lambda f(a) (section V), a linear solve."""
-    bends, h = _on_grid(data, domain, [(2, 0), (1, 1), (0, 2)])
+    bends, known, h = on_grid(data, domain, [(2, 0), (1, 1), (0, 2)])
     factors = h * np.sqrt([1.0, 2.0, 1.0])
     share = np.sqrt(weight / len(data.basis))
-    rows = [share * data.basis, *(f * basis for f, (basis, _) in zip(factors, bends, strict=True))]
-    wanted = [share * data.remainder, *(-f * known for f, (_, known) in zip(factors, bends, strict=True))]
-    return np.linalg.lstsq(np.vstack(rows), np.concatenate(wanted), rcond=None)[0]
+    rows = [share * data.basis, *(f * bend.T for f, bend in zip(factors, bends, strict=True))]
+    wanted = np.concatenate([share * data.remainder, (-factors[:, None] * known).ravel()])
+    return np.linalg.lstsq(np.vstack(rows), wanted, rcond=None)[0]
 
 
-def _on_grid(
-    data: Problem, domain: Domain, orders: list[tuple[int, int]]
-) -> tuple[list[tuple[Array, Array]], float]:
-    """Derivatives of (1) on the grid of (8), each as basis (m, terms) and quadric's part (m,); and h."""
+def on_grid(data: Problem, domain: Domain, orders: list[tuple[int, int]]) -> tuple[Array, Array, float]:
+    """k derivatives of (1) on the m points of (8): of the terms, (k, terms, m), of the quadric, (k, m); h."""
     points, h = domain.grid(GRID)
-    x, y = points.T
-    terms, known = exponents(3, data.degree), data.quadric.derivatives(x, y)
-    return [(monomials(x, y, terms, dx, dy), getattr(known, "x" * dx + "y" * dy)) for dx, dy in orders], h
-
-
-def total_absolute_curvature(data: Problem, domain: Domain) -> Objective:
-    """g(a) of (8) and its gradient, the signs delta_j of K held as they are at a (IV-B).
-
-    With W = 1 + z_x^2 + z_y^2 and D = z_xx z_yy - z_xy^2 the integrand |K| sqrt(W) is |D| W^(-3/2).
-    """
-    derivatives, h = _on_grid(data, domain, [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)])
-    (bx, qx), (by, qy), (bxx, qxx), (bxy, qxy), (byy, qyy) = derivatives
-
-    def g(a: Array) -> tuple[float, Array]:
-        zx, zy = bx @ a + qx, by @ a + qy
-        zxx, zxy, zyy = bxx @ a + qxx, bxy @ a + qxy, byy @ a + qyy
-        w = 1.0 + zx**2 + zy**2
-        det = zxx * zyy - zxy**2
-        delta = np.where(det >= 0.0, 1.0, -1.0) * w**-1.5
-        slope = -3.0 * delta * det / w
-        gradient = (
-            (delta * zyy) @ bxx
-            + (delta * zxx) @ byy
-            - 2.0 * (delta * zxy) @ bxy
-            + (slope * zx) @ bx
-            + (slope * zy) @ by
-        )
-        return h**2 * float(delta @ det), h**2 * gradient
-
-    return g
-
-
-def tagc_objective(data: Problem, domain: Domain, weight: float) -> Objective:
-    """g(a) + lambda f(a) of (9) and its gradient."""
-    g = total_absolute_curvature(data, domain)
-
-    def objective(a: Array) -> tuple[float, Array]:
-        value, gradient = g(a)
-        miss = data.basis @ a - data.remainder
-        scale = weight / len(miss)
-        return value + scale * float(miss @ miss), gradient + 2.0 * scale * (miss @ data.basis)
-
-    return objective
+    terms = derived_monomials(points[:, 0], points[:, 1], exponents(2, data.degree), orders)
+    known = 0.5 * (data.quadric.k1 * terms[:, 0] + data.quadric.k2 * terms[:, 2])
+    return terms[:, 3:], known, h
 
 
 def tagc_start(data: Problem, half_curves: Sequence[Array]) -> Array:
@@ -123,42 +78,3 @@ def tagc_start(data: Problem, half_curves: Sequence[Array]) -> Array:
     artificial = problem(data.quadric.k1, data.quadric.k2, data.degree, np.vstack(between))
     basis = np.vstack([data.basis, artificial.basis])
     return np.linalg.lstsq(basis, np.concatenate([data.remainder, artificial.remainder]), rcond=None)[0]
-
-
-def quick_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
-    """L-BFGS from `start`; the coefficients, and whether it converged."""
-    from scipy.optimize import minimize
-
-    found = minimize(
-        objective, start, jac=True, method="L-BFGS-B", options={"maxiter": 1000, "ftol": 1e-10, "gtol": 1e-8}
-    )
-    # 1 is the cap. Anything else is a minimum, a kink of |K| among them, where no line search descends.
-    return found.x, bool(found.status != 1)
-
-
-def descent_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
-    """The paper's steepest descent from `start`; the coefficients, and whether it converged before the cap.
-
-    Each step is halved until it descends at all, and the next one tries twice as far: a demand for
-    more descent would end it on the kinks of |K|. Converged where 100 steps have not lowered the
-    objective by a millionth.
-    """
-    a, (value, gradient) = start, objective(start)
-    length, mark = 1.0 / max(float(np.linalg.norm(gradient)), 1e-300), value
-    for step in range(1, DESCENT_CAP + 1):
-        square = float(gradient @ gradient)
-        while True:
-            trial = a - length * gradient
-            trial_value, trial_gradient = objective(trial)
-            if trial_value <= value - 1e-3 * length * square or length * square <= 1e-16 * abs(value):
-                break
-            length *= 0.5
-        if trial_value >= value:
-            return a, True
-        a, value, gradient = trial, trial_value, trial_gradient
-        length *= 2.0
-        if step % 100 == 0:
-            if mark - value <= 1e-6 * abs(value):
-                return a, True
-            mark = value
-    return a, False

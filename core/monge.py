@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Monge patch z(x, y) of equation (1) in its Darboux frame, and its differential geometry."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
@@ -21,20 +22,28 @@ def exponents(lowest: int, highest: int) -> NDArray[np.intp]:
     return array
 
 
-def monomials(x: Array, y: Array, terms: NDArray[np.intp], dx: int = 0, dy: int = 0) -> Array:
-    """The terms (m, 2) at n points, (n, m), differentiated dx times by x and dy times by y."""
-    powers = int(terms.max(initial=0)) + 1
-    x_powers, y_powers = (np.vander(v, powers, increasing=True) for v in (x, y))
+def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:
+    """The terms (m, 2) at n points, (n, m)."""
+    return derived_monomials(x, y, terms, [(0, 0)])[0].T
+
+
+def derived_monomials(
+    x: Array, y: Array, terms: NDArray[np.intp], orders: Sequence[tuple[int, int]]
+) -> Array:
+    """The terms (m, 2) at n points, (k, m, n), differentiated as each of k orders (dx, dy) says."""
     i, j = terms.T
-    if dx == dy == 0:
-        return x_powers[:, i] * y_powers[:, j]
-    factor = np.ones(len(terms))
-    for k in range(dx):
-        factor *= i - k
-    for k in range(dy):
-        factor *= j - k
-    # Where a derivative has killed a term its factor is 0, whatever power stands beside it.
-    return factor * x_powers[:, np.maximum(i - dx, 0)] * y_powers[:, np.maximum(j - dy, 0)]
+    x_powers, y_powers = np.ones((2, int(terms.max(initial=0)) + 1, len(x)))
+    for k in range(1, len(x_powers)):
+        np.multiply(x_powers[k - 1], x, out=x_powers[k])
+        np.multiply(y_powers[k - 1], y, out=y_powers[k])
+    derived = np.empty((len(orders), len(terms), len(x)))
+    for values, (dx, dy) in zip(derived, orders, strict=True):
+        # Where a derivative has killed a term its factor is 0, whatever power stands beside it.
+        np.multiply(x_powers[np.maximum(i - dx, 0)], y_powers[np.maximum(j - dy, 0)], out=values)
+        for exponent, times in ((i, dx), (j, dy)):
+            for k in range(times):
+                values *= (exponent - k)[:, None]
+    return derived
 
 
 class Derivatives(NamedTuple):

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import fitting
+from . import fitting, tagc
 from .arguments import Array, finite_array, number, unit_vector
 from .bayes import joint_fit, posterior_of
 from .domain import Domain, closed_spline_domain
@@ -152,7 +152,7 @@ def reconstruct(
     degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
     sensor_std : accuracy of a contact; noise is taken for no less. None: the contours' own
     weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000
-    solver : of "tagc", "fast" (L-BFGS) or "descent" (the paper's)
+    solver : of "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
     method. A fit in doubt comes back with a status.
@@ -250,6 +250,8 @@ def _coefficients(
         return fitting.least_squares(data), True
     if method == "quadratic-variation":
         return fitting.quadratic_variation(data, domain, weight), True
-    start = fitting.tagc_start(data, half_curves)
-    minimum = fitting.quick_minimum if solver == "fast" else fitting.descent_minimum
-    return minimum(fitting.tagc_objective(data, domain, weight), start)
+    objective = tagc.Objective(data, domain, weight)
+    if solver == "descent":
+        return tagc.descent_minimum(objective, fitting.tagc_start(data, half_curves))
+    # On convex surfaces (9) has many minima: from the quadric they are lower than from the paper's start.
+    return tagc.newton_minimum(objective, np.zeros(data.basis.shape[1]))
