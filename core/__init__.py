@@ -10,7 +10,7 @@ from .domain import Domain
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import azimuth_of, suggest_plane
-from .reconstruction import METHODS, SOLVERS, Reconstruction, reconstruct
+from .reconstruction import METHODS, SOLVERS, Reconstruction, reconstruct, reconstruct_many
 from .tracking import Contour, SamplingPlane, Surface, track
 from .verification import distances, fit_error, overlapped
 
@@ -30,6 +30,7 @@ __all__ = [
     "fit_error",
     "overlapped",
     "reconstruct",
+    "reconstruct_many",
     "suggest_plane",
     "track",
 ]

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The accurate fit: one Bayesian linear solve for everything at once, which knows what it cannot see.
 
+Of many touches at once, for most of the time goes into calling numpy and not into what it does.
+
 Beside the paper. Near the reference point the surface is taken for a polynomial of degree 6, in unit
 radius and in its Darboux frame. Slopes and second derivatives are free. The coefficient a_ij of a
 higher degree is a length^(1 - i - j): where the curvature changes over a length l it has the size
@@ -17,6 +19,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arguments import Array
 from .monge import MongePatch, monomials
@@ -29,7 +32,8 @@ SCALE = 0.1
 WAVINESS = np.geomspace(0.15, 1.3, 6)
 USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
 MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
-NOISES = 8  # grid points, from the floor up
+NOISES = 5  # grid points, from the floor up
+GROUP = 4  # touches whose likelihoods are computed at once
 PASSES = 8  # at most: two that turn the frame to what they found, and more for what is outlying
 SETTLED = 0.1  # of a weight, between passes
 UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
@@ -39,61 +43,100 @@ STUDENT = 4.0  # degrees of freedom
 
 
 class _System(NamedTuple):
-    """Heights (n,) ~ basis (n, 27) @ b, less the prior's mean; and the same after QR with weights.
+    """Heights (b, n) ~ basis (b, n, 27) @ coefficients, less the prior's mean; the same after weighted QR.
 
-    triangle (27, 27) @ b ~ target (27,) in the sense of least squares, which leaves `square` over.
+    triangle (b, 27, 27) @ coefficients ~ target (b, 27) in the sense of least squares, which leaves
+    `square` (b,) over; so many `contacts` (b,) are weighed at all.
     """
 
     basis: Array
     heights: Array
     triangle: Array
     target: Array
-    square: float
+    square: Array
+    contacts: Array
 
 
 class _Hyperparameters(NamedTuple):
-    """The waviness, its geometric mean; the prior variances (22,), averaged over it; and the noise."""
+    """Waviness (b,), its geometric mean; prior variances (b, 22), averaged over it; and noise (b,)."""
 
-    waviness: float
+    waviness: Array
     variances: Array
-    noise: float
+    noise: Array
+
+
+class _Touches(NamedTuple):
+    """What a pass of the fit needs to know of b touches; the last four are what it changes."""
+
+    contacts: Array
+    tangent: Array
+    floor: Array
+    axes: Array
+    k1: Array
+    k2: Array
+    weights: Array
 
 
 def joint_fit(
-    contacts: Array, k1: float, k2: float, tangent: Array, accuracy: float
+    contacts: Array, weights: Array, k1: Array, k2: Array, tangent: Array, accuracy: Array
 ) -> tuple[Array, Posterior]:
-    """The Darboux frame and the surface that the contacts show, and how well they show it.
+    """The Darboux frames and the surfaces that the contacts of b touches show, and how well they show them.
 
-    contacts : (n, 3), in unit radius, in a frame near to the Darboux frame
-    k1, k2 : a first guess of the curvatures along its axes
-    tangent : (3,), in that frame, which d1 is to follow
-    accuracy : standard deviation of a contact, at least
+    contacts : (b, n, 3), in unit radius, in a frame near to the Darboux frame
+    weights : (b, n), 1 for a contact, 0 where there is none
+    k1, k2 : (b,), a first guess of the curvatures along its axes
+    tangent : (b, 3), in that frame, which d1 is to follow
+    accuracy : (b,), standard deviation of a contact, at least
 
-    Returns the columns d1, d2, n (3, 3) in the frame given, and the posterior in the new one, where
+    Returns the columns d1, d2, n (b, 3, 3) in the frame given, and the posteriors in the new one, where
     the means of the slopes and of the mixed second derivative are 0. Where a residual is beyond
     OUTLYING standard deviations, contacts weigh as under a Student t distribution.
     """
-    floor = max(accuracy, MISFIT)
-    axes, weights = np.eye(3), np.ones(len(contacts))
-    hyper = _Hyperparameters(USUAL_WAVINESS, (SCALE * USUAL_WAVINESS**POWERS) ** 2, floor)
+    axes = np.broadcast_to(np.eye(3), (len(contacts), 3, 3))
+    touches = _Touches(contacts, tangent, np.maximum(accuracy, MISFIT), axes, k1, k2, weights)
+    pending, found = np.arange(len(contacts)), []
     for step in range(PASSES):
-        prior_mean = _prior_mean(k1, k2)
-        system = _system(contacts @ axes, prior_mean, weights)
-        if step > 0:
-            hyper = _evidence(system, _noises(system, floor))
-        # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
-        prior = (SCALE * hyper.waviness**POWERS) ** 2
-        solution = _covariance(system, prior, hyper.noise) @ (system.triangle.T @ system.target)
-        solution /= hyper.noise**2
-        mean = prior_mean + solution
-        axes, k1, k2, angle = _turned(axes, mean, tangent)
-        if step > 1 or (step == 1 and math.hypot(mean[0], mean[1]) <= LEVEL):
-            before, weights = weights, _student_weights(system.heights - system.basis @ solution, floor)
-            if np.abs(weights - before).max() <= SETTLED:
-                break
-    posterior = _posterior(mean, system, hyper).turned(angle)
-    posterior.mean[:FREE] = 0.0, 0.0, k1 / 2.0, 0.0, k2 / 2.0
-    return axes, posterior
+        touches, settled, posterior = _pass(touches, step)
+        if posterior is not None:
+            found.append((pending[settled], touches.axes[settled], *posterior))
+        if settled.all():
+            break
+        touches, pending = _Touches(*(values[~settled] for values in touches)), pending[~settled]
+    if len(found) == 1:  # all at once, as nearly always: in the order they came
+        return found[0][1], Posterior(*found[0][2:])
+    order, turns, *posteriors = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    back = np.argsort(order)
+    return turns[back], Posterior(*(values[back] for values in posteriors))
+
+
+def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
+    """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
+    prior_mean = np.array([_prior_mean(*pair) for pair in zip(touches.k1, touches.k2, strict=True)])
+    system = _system(touches.contacts @ touches.axes, touches.weights, prior_mean)
+    if step == 0:
+        waviness = np.full(len(prior_mean), USUAL_WAVINESS)
+        hyper = _Hyperparameters(waviness, (SCALE * waviness[:, None] ** POWERS) ** 2, touches.floor)
+    else:
+        hyper = _evidence(system, _noises(system, touches.floor))
+    # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
+    prior = (SCALE * hyper.waviness[:, None] ** POWERS) ** 2
+    seen = (system.target[:, None] @ system.triangle)[:, 0] / hyper.noise[:, None] ** 2
+    solution = np.linalg.solve(_precision(system, prior, hyper.noise), seen[..., None])
+    mean = prior_mean + solution[..., 0]
+    turned = [_turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
+    axes, k1, k2, angle = (np.array(values) for values in zip(*turned, strict=True))
+    # Outliers show against a surface in level axes.
+    level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
+    weights, settled, posterior = touches.weights, np.full(len(mean), step == PASSES - 1), None
+    if step > 0 and level.any():
+        residuals = system.heights - (system.basis @ solution)[..., 0]
+        weights = np.where(level[:, None], _student_weights(residuals, weights > 0.0, touches.floor), weights)
+        settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED)
+    if settled.any():
+        posterior = _posterior(mean, system, hyper).at(settled).turned(angle[settled])
+        posterior.mean[:, [0, 1, 3]] = 0.0
+        posterior.mean[:, 2], posterior.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
+    return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, posterior
 
 
 def posterior_of(patch: MongePatch, contacts: Array, accuracy: float) -> Posterior:
@@ -101,14 +144,14 @@ def posterior_of(patch: MongePatch, contacts: Array, accuracy: float) -> Posteri
 
     All in unit radius. The noise is what the patch leaves over at the contacts, or `accuracy`.
     """
-    system = _system(contacts, np.zeros(len(TERMS)), np.ones(len(contacts)))
+    system = _system(contacts[None], np.ones((1, len(contacts))), np.zeros((1, len(TERMS))))
     x, y, z = contacts.T
     residual = math.sqrt(np.mean((z - patch.height(x, y)) ** 2))
-    hyper = _evidence(system, np.array([max(residual, accuracy, MISFIT)]))
-    mean = np.zeros(len(TERMS))
-    mean[[2, 4]] = patch.k1 / 2.0, patch.k2 / 2.0
-    mean[FREE : FREE + len(patch.coefficients)] = patch.coefficients
-    return _posterior(mean, system, hyper)
+    hyper = _evidence(system, np.array([[max(residual, accuracy, MISFIT)]]))
+    mean = np.zeros((1, len(TERMS)))
+    mean[0, [2, 4]] = patch.k1 / 2.0, patch.k2 / 2.0
+    mean[0, FREE : FREE + len(patch.coefficients)] = patch.coefficients
+    return _posterior(mean, system, hyper).at(0)
 
 
 def _prior_mean(k1: float, k2: float) -> Array:
@@ -132,82 +175,106 @@ def _prior_mean(k1: float, k2: float) -> Array:
     return mean
 
 
-def _system(local: Array, prior_mean: Array, weights: Array) -> _System:
-    x, y, z = local.T
-    basis = monomials(x, y, TERMS)
-    heights = z - basis @ prior_mean
+def _system(local: Array, weights: Array, prior_mean: Array) -> _System:
+    b, n = weights.shape
+    flat = local.reshape(-1, 3)
+    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(b, n, -1)
+    heights = local[..., 2] - (basis @ prior_mean[..., None])[..., 0]
     size = len(TERMS) + 1
-    rows = np.zeros((max(len(z), size), size))  # as many as QR needs for a whole triangle
-    rows[: len(z), :-1], rows[: len(z), -1] = basis, heights
-    rows[: len(z)] *= np.sqrt(weights)[:, None]
+    rows = np.zeros((b, max(n, size), size))  # as many as QR needs for a whole triangle
+    rows[:, :n, :-1], rows[:, :n, -1] = basis, heights
+    rows[:, :n] *= np.sqrt(weights)[..., None]
     triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
-    return _System(basis, heights, triangle[:-1, :-1], triangle[:-1, -1], float(triangle[-1, -1] ** 2))
+    return _System(
+        basis,
+        heights,
+        triangle[:, :-1, :-1],
+        triangle[:, :-1, -1],
+        triangle[:, -1, -1] ** 2,
+        np.count_nonzero(weights, axis=1),
+    )
 
 
-def _noises(system: _System, floor: float) -> Array:
-    """A grid of the noise, from the floor to beyond what the quadric leaves over."""
-    left = float(system.target[FREE:] @ system.target[FREE:]) + system.square
-    largest = 2.0 * floor + 3.0 * math.sqrt(left / len(system.basis))
-    return floor * (largest / floor) ** (np.arange(NOISES) / (NOISES - 1.0))
+def _noises(system: _System, floor: Array) -> Array:
+    """A grid of the noise, (b, 5), from the floor to beyond what the quadric leaves over."""
+    left = np.sum(system.target[:, FREE:] ** 2, axis=1) + system.square
+    largest = 2.0 * floor + 3.0 * np.sqrt(left / system.contacts)
+    return floor[:, None] * (largest / floor)[:, None] ** (np.arange(NOISES) / (NOISES - 1.0))
 
 
 def _evidence(system: _System, noises: Array) -> _Hyperparameters:
+    """Waviness and noise by their marginal likelihood, group by group: one fits into a processor's cache."""
+    groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
+    found = [_evidence_of(_System(*(part[group] for part in system)), noises[group]) for group in groups]
+    return _Hyperparameters(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _evidence_of(system: _System, noises: Array) -> _Hyperparameters:
     """Waviness and noise by their marginal likelihood, the free terms projected out (REML).
 
     target ~ N(0, K), K = triangle prior triangle' + noise^2. One Cholesky factor of K bordered by the
     target, [[K, t], [t', c]], has log |K| in its diagonal and t' K^-1 t in the last of it.
     """
-    triangle, target = system.triangle[FREE:, FREE:], system.target[FREE:]
-    size = len(target)
+    triangle, target = system.triangle[:, FREE:, FREE:], system.target[:, FREE:]
+    b, size = target.shape
     variances = (SCALE * WAVINESS[:, None] ** POWERS) ** 2
-    explained = (triangle * variances[:, None, :]) @ triangle.T
-    corner = 2.0 * (target @ target) / noises[0] ** 2 + 1.0  # more than t' K^-1 t
-    bordered = np.zeros((len(WAVINESS), len(noises), size + 1, size + 1))
-    bordered[:, :, :size, :size] = explained[:, None]
-    bordered[:, :, :size, size] = bordered[:, :, size, :size] = target
-    bordered[:, :, size, size] = corner
+    explained = (triangle[:, None] * variances[:, None]) @ np.swapaxes(triangle, 1, 2)[:, None]
+    corner = 2.0 * np.sum(target**2, axis=1) / noises[:, 0] ** 2 + 1.0  # more than t' K^-1 t
+    bordered = np.zeros((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
+    bordered[..., :size, :size] = explained[:, :, None]
+    bordered[..., :size, size] = bordered[..., size, :size] = target[:, None, None]
+    bordered[..., size, size] = corner[:, None, None]
     # Beside the noise, what rounding leaves of contacts that are no surface.
-    rounding = 1e-13 * np.trace(explained, axis1=1, axis2=2)
+    rounding = 1e-13 * np.trace(explained, axis1=2, axis2=3)
     diagonal = np.arange(size)
-    bordered[:, :, diagonal, diagonal] += (noises**2 + rounding[:, None])[:, :, None]
-    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=2, axis2=3)
-    others = len(system.basis) - len(TERMS)  # directions no term explains
+    bordered[..., diagonal, diagonal] += (noises[:, None] ** 2 + rounding[..., None])[..., None]
+    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
+    others = (system.contacts - len(TERMS))[:, None, None]  # directions no term explains
     likelihood = -0.5 * (
-        2.0 * np.sum(np.log(factors[:, :, :size]), axis=2)
-        + (corner - factors[:, :, size] ** 2)
-        + others * np.log(noises**2)
-        + system.square / noises**2
+        2.0 * np.log(np.prod(factors[..., :size], axis=3))
+        + (corner[:, None, None] - factors[..., size] ** 2)
+        + others * np.log(noises[:, None] ** 2)
+        + (system.square[:, None] / noises**2)[:, None]
         + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2
     )
-    weights = np.exp(likelihood - likelihood.max())
-    weights /= weights.sum()
-    by_waviness = weights.sum(axis=1)
+    weights = np.exp(likelihood - likelihood.max(axis=(1, 2), keepdims=True))
+    weights /= weights.sum(axis=(1, 2), keepdims=True)
+    by_waviness = weights.sum(axis=2)
     return _Hyperparameters(
-        float(np.exp(by_waviness @ np.log(WAVINESS))),
+        np.exp(by_waviness @ np.log(WAVINESS)),
         by_waviness @ variances,
-        float(np.sqrt(weights.sum(axis=0) @ noises**2)),
+        np.sqrt(np.sum(weights.sum(axis=1) * noises**2, axis=1)),
     )
 
 
 def _posterior(mean: Array, system: _System, hyper: _Hyperparameters) -> Posterior:
-    covariance = _covariance(system, hyper.variances, hyper.noise)
-    return Posterior(mean, covariance, hyper.noise, system.triangle[FREE:, FREE:] * (SCALE / hyper.noise))
+    covariance = np.linalg.inv(_precision(system, hyper.variances, hyper.noise))
+    visibility = system.triangle[:, FREE:, FREE:] * (SCALE / hyper.noise)[:, None, None]
+    return Posterior(mean, covariance, hyper.noise, visibility)
 
 
-def _covariance(system: _System, variances: Array, noise: float) -> Array:
-    precision = system.triangle.T @ system.triangle / noise**2
+def _precision(system: _System, variances: Array, noise: Array) -> Array:
+    """(b, 27, 27), the inverse of the covariance."""
+    precision = np.swapaxes(system.triangle, 1, 2) @ system.triangle / noise[:, None, None] ** 2
+    diagonal = np.arange(len(TERMS))
     # A slope or second derivative of 100 is no surface; and with that no contacts make it singular.
-    precision[np.diag_indices(len(TERMS))] += np.concatenate([np.full(FREE, 1e-4), 1.0 / variances])
-    return np.linalg.inv(precision)
+    precision[:, diagonal[:FREE], diagonal[:FREE]] += 1e-4
+    precision[:, diagonal[FREE:], diagonal[FREE:]] += 1.0 / variances
+    return precision
 
 
-def _student_weights(residuals: Array, floor: float) -> Array:
-    """Weights of the contacts, (n,): all 1 where no residual is outlying."""
-    deviation = max(floor, 1.4826 * float(np.median(np.abs(residuals))))
-    ratios = np.abs(residuals) / deviation
-    if ratios.max() <= OUTLYING:
-        return np.ones(len(residuals))
-    return (STUDENT + 1.0) / (STUDENT + ratios**2)
+def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
+    """Weights of the contacts, (b, n): all 1 where none of a touch is outlying; 0 where there is none."""
+    misses = np.abs(residuals)
+    ordered, row = np.sort(np.where(present, misses, np.inf), axis=1), np.arange(len(misses))
+    count = np.count_nonzero(present, axis=1)
+    median = 0.5 * (ordered[row, (count - 1) // 2] + ordered[row, count // 2])
+    deviation = np.maximum(floor, 1.4826 * median)
+    if np.all(ordered[row, count - 1] <= OUTLYING * deviation):
+        return present.astype(float)
+    ratios = misses / deviation[:, None]
+    outlying = ordered[row, count - 1] > OUTLYING * deviation
+    return present * np.where(outlying[:, None], (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
 
 
 def _turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:

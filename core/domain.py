@@ -104,10 +104,12 @@ def closed_spline_domain(ends: ArrayLike, radius: float) -> Domain:
     Ends within 1e-3 radius of the origin (a curve that runs to one side only) or of another end
     do not count. Raises ValueError where fewer than three are left.
     """
-    points = np.asarray(ends, dtype=float)
-    points = points[np.hypot(*points.T) > 1e-3 * radius]
-    points = points[np.argsort(np.arctan2(points[:, 1], points[:, 0]), kind="stable")]
-    apart = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 1e-3 * radius
-    if np.count_nonzero(apart) < 3:
-        raise ValueError(f"ends: wanted three or more apart from each other, got {np.count_nonzero(apart)}")
-    return Domain(points[apart])
+    x, y = np.asarray(ends, dtype=float).T
+    out = np.flatnonzero(x * x + y * y > (1e-3 * radius) ** 2)
+    x, y = np.array([x, y])[:, out[np.argsort(np.arctan2(y[out], x[out]), kind="stable")]]
+    before = np.arange(-1, len(x) - 1)
+    apart = (x - x[before]) ** 2 + (y - y[before]) ** 2 > (1e-3 * radius) ** 2
+    count = np.count_nonzero(apart)
+    if count < 3:
+        raise ValueError(f"ends: wanted three or more apart from each other, got {count}")
+    return Domain(np.array([x[apart], y[apart]]).T)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .arguments import Array
 from .tracking import Contour, cross
@@ -15,6 +15,7 @@ from .tracking import Contour, cross
 WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
 LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
 LEAST_ANGLE = math.radians(1.0)  # between tangents that count as distinct
+OFF_PLANE = math.sin(math.radians(25.0))  # of a tangent, against the tangent plane
 UMBILIC = 1e-9  # the difference of curvatures, in unit radius, that is none
 
 
@@ -43,115 +44,187 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Curve:
-    """A contour as seen from the reference point, which is its origin.
+class Curves:
+    """The contours of b touches as seen from their reference points, c curves a touch, n contacts a curve.
 
-    points : (n, 3), the contacts other than the reference point, relative to it, in running order
-    along : (n,), their signed distances from the point along the curve's direction, ascending
-    tangent : (3,), unit, pointing the way the contour's points were given
-    curvature : (3,), the curvature vector r''(s) at the point, in 1/length
+    What a touch or a curve has less of is filled up.
+
+    points : (b, c, n, 3), contacts other than the reference point, relative to it, in running order
+    present : (b, c, n), which of them are contacts
+    along : (b, c, n), their signed distances from the point along the curve's direction, ascending
+    tangents : (b, c, 3), unit, pointing the way the contour's points were given; 0 where there is no curve
+    curvatures : (b, c, 3), the curvature vectors r''(s) at the point, in 1/length
     """
 
     points: Array
+    present: NDArray[np.bool_]
     along: Array
-    tangent: Array
-    curvature: Array
+    tangents: Array
+    curvatures: Array
 
-
-def curve_through(contour: Contour, point: Array, name: str = "the curve") -> Curve:
-    """Fits r(s) = t s + r'' s^2 / 2, through the point, to the nearest contacts (III-C).
-
-    s is the chord to the contact, the arc length up to its cube. Raises DegenerateCurvesError where
-    the contour has too few contacts.
-    """
-    r = contour.points - point
-    distance = np.sqrt(np.einsum("ij,ij->i", r, r))
-    largest = distance.max(initial=0.0)
-    kept = distance > 1e-9 * largest
-    r, distance = r[kept], distance[kept]
-    if len(r) < LEAST_CONTACTS:
-        why = f" (it ended by: {', '.join(contour.stops)})" if contour.stops else ""
-        raise DegenerateCurvesError(
-            f"{name} has {len(r)} of the {LEAST_CONTACTS} contacts it needs besides the reference point"
-            f"{why}: move the point away from the crease or edge there, or take a shorter step"
+    def at(self, index: int | NDArray[np.intp]) -> "Curves":
+        """Those of one touch, without the leading dimension, or of several."""
+        return Curves(
+            self.points[index],
+            self.present[index],
+            self.along[index],
+            self.tangents[index],
+            self.curvatures[index],
         )
-    near = np.argsort(distance, kind="stable")[:WINDOW]
-    along = np.copysign(distance, r @ r[near[-1]])
-    given = np.arange(len(along)) - (len(along) - 1) / 2.0
-    if given @ along < 0.0:
-        along = -along
-    scale = distance[near[-1]]
-    s = along[near] / scale
-    (t, c), *_ = np.linalg.lstsq(np.column_stack([s, 0.5 * s**2]), r[near] / scale, rcond=None)
-    speed = np.linalg.norm(t)
-    order = np.argsort(along, kind="stable")
-    return Curve(r[order], along[order], t / speed, c / (scale * speed**2))
 
 
-def surface_normal(tangents: ArrayLike, outward: ArrayLike) -> Array:
-    """The unit n that minimises sum (n . t)^2 over tangents (m, 3), on the side of `outward` (III-C)."""
-    n = np.linalg.svd(np.asarray(tangents, dtype=float), full_matrices=True)[2][2]
-    return n if n @ np.asarray(outward) >= 0.0 else -n
+def stacked(points: Array, touches: Sequence[Sequence[Contour]]) -> tuple[Array, NDArray[np.bool_]]:
+    """Contacts relative to their reference points (b, 3), (b, c, n, 3), and which of them there are."""
+    curves = max((len(contours) for contours in touches), default=0)
+    longest = max((len(contour.points) for contours in touches for contour in contours), default=0)
+    r = np.zeros((len(touches), curves, longest, 3))
+    present = np.zeros(r.shape[:3], dtype=bool)
+    for i, contours in enumerate(touches):
+        for j, contour in enumerate(contours):
+            r[i, j, : len(contour.points)] = contour.points - points[i]
+            present[i, j, : len(contour.points)] = True
+    return r, present
 
 
-def principal_curvatures(angles: ArrayLike, curvatures: ArrayLike) -> tuple[float, float, float]:
-    """kappa1 <= kappa2 and the angle of d1, in (-90, 90] degrees, from normal curvatures (m,) at angles (m,).
+def curves_through(r: Array, present: NDArray[np.bool_]) -> Curves:
+    """Fits r(s) = t s + r'' s^2 / 2, through the point, to the nearest contacts of each curve (III-C).
 
-    Euler's formula (2) as kappa_i = H + A cos 2 phi_i + B sin 2 phi_i: linear, exact for three
-    curves and least squares for more. At an umbilic (A and B within rounding of 0, measured against
-    1 and the curvatures: pass them in unit radius) d1 is at angle 0.
+    r : (b, c, n, 3), contacts relative to the point; present : (b, c, n). s is the chord to the
+    contact, the arc length up to its cube.
+    """
+    shape, curve = present.shape, np.arange(present[..., 0].size)[:, None]
+    r, present = r.reshape(len(curve), -1, 3), present.reshape(len(curve), -1)
+    distance = np.sqrt(np.einsum("cni,cni->cn", r, r))
+    present = present & (distance > 1e-9 * distance.max(axis=1, initial=0.0, keepdims=True))
+    distance = np.where(present, distance, np.inf)
+    near = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
+    counts = np.count_nonzero(present, axis=1)[:, None]
+    farthest = near[curve, np.clip(counts, 1, WINDOW) - 1]
+    along = np.copysign(np.where(present, distance, 0.0), np.einsum("cni,cji->cn", r, r[curve, farthest]))
+    given = np.cumsum(present, axis=1) - (counts + 1) / 2.0
+    along[np.einsum("cn,cn->c", given, along) < 0.0] *= -1.0
+    scale = np.where(counts > 0, distance[curve, farthest], 1.0)
+    tangents, curvatures = _parabola(along[curve, near] / scale, r[curve, near] / scale[..., None])
+    speed = np.maximum(np.sqrt(np.einsum("ci,ci->c", tangents, tangents)), 1e-9)[:, None]  # 1 but for noise
+    along[~present] = np.inf
+    order = np.argsort(along, axis=1, kind="stable")
+    return Curves(
+        r[curve, order].reshape(*shape, 3),
+        present[curve, order].reshape(shape),
+        along[curve, order].reshape(shape),
+        (tangents / speed).reshape(*shape[:2], 3),
+        (curvatures / (scale * speed**2)).reshape(*shape[:2], 3),
+    )
+
+
+def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
+    """t and r'' of r = t s + r'' s^2 / 2 by least squares, (..., 3) each, from (..., k) and (..., k, 3).
+
+    Where all s are one the two cannot be told apart: then the shortest solution.
+    """
+    half = 0.5 * s**2
+    a, b, d = np.sum(s * s, axis=-1), np.sum(s * half, axis=-1), np.sum(half * half, axis=-1)
+    det, trace = a * d - b * b, a + d
+    alike = det <= 1e-13 * trace**2
+    inverse = np.where(alike, [a, b, d], [d, -b, a]) / np.where(alike, np.maximum(trace**2, 1e-300), det)
+    sr, hr = (np.einsum("...k,...ki->...i", weights, r) for weights in (s, half))
+    ss, sh, hh = inverse[..., None]
+    return ss * sr + sh * hr, sh * sr + hh * hr
+
+
+def surface_normals(tangents: Array, outward: Array) -> Array:
+    """The unit n (..., 3) that minimise sum (n . t)^2 over tangents (..., c, 3), on the side of `outward`."""
+    n = np.linalg.eigh(np.swapaxes(tangents, -1, -2) @ tangents)[1][..., 0]
+    return np.where(np.sum(n * outward, axis=-1, keepdims=True) >= 0.0, n, -n)
+
+
+def principal_curvatures(
+    angles: ArrayLike, curvatures: ArrayLike, known: NDArray[np.bool_] | bool = True
+) -> tuple[Array, Array, Array]:
+    """kappa1 <= kappa2 and the angle of d1, in (-90, 90] degrees; (...) each.
+
+    From normal curvatures (..., c) at angles (..., c), those that are `known`. Euler's formula (2) as
+    kappa_i = H + A cos 2 phi_i + B sin 2 phi_i: linear, exact for three curves and least squares for
+    more. At an umbilic (A and B within rounding of 0, measured against 1 and the curvatures: pass them
+    in unit radius) d1 is at angle 0.
     """
     phi, kappa = np.asarray(angles, dtype=float), np.asarray(curvatures, dtype=float)
-    system = np.column_stack([np.ones_like(phi), np.cos(2.0 * phi), np.sin(2.0 * phi)])
-    (mean, a, b), *_ = np.linalg.lstsq(system, kappa, rcond=None)
-    half = math.hypot(a, b)
-    umbilic = half <= UMBILIC * max(1.0, float(np.abs(kappa).max()))
-    theta = 0.0 if umbilic else 0.5 * math.atan2(-b, -a)
-    return float(mean - half), float(mean + half), theta
+    rows = known * np.array([np.ones_like(phi), np.cos(2.0 * phi), np.sin(2.0 * phi)])
+    seen, kappa = np.einsum("i...c,j...c->...ij", rows, rows), known * kappa
+    solution = np.linalg.solve(seen, np.einsum("i...c,...c->...i", rows, kappa)[..., None])
+    mean, a, b = solution[..., 0, 0], solution[..., 1, 0], solution[..., 2, 0]
+    half = np.hypot(a, b)
+    umbilic = half <= UMBILIC * np.maximum(1.0, np.abs(kappa).max(axis=-1))
+    return mean - half, mean + half, np.where(umbilic, 0.0, 0.5 * np.arctan2(-b, -a))
 
 
-def darboux_frame(
-    point: Array, curves: Sequence[Curve], outward: ArrayLike
-) -> tuple[Frame, float, float, float]:
-    """The Darboux frame, kappa1, kappa2 and the radius L of curves through `point`.
+def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array]:
+    """Darboux frames about normals (b, 3), (b, 3, 3); kappa1 and kappa2 in unit radius and the radii L, (b,).
 
     d1 is within 90 degrees of the first curve's tangent, and that tangent at an umbilic. L is the
-    largest distance of a contact from the point in the tangent plane. Raises DegenerateCurvesError
-    where there are fewer than three distinct tangent directions.
+    largest distance of a contact from the point in the tangent plane.
     """
-    if len(curves) < 3:
-        raise DegenerateCurvesError(
-            f"three curves are needed, got {len(curves)}: add a sampling plane in another direction"
-        )
-    tangents = np.array([curve.tangent for curve in curves])
-    _require_distinct(tangents)
-    n = surface_normal(tangents, outward)
-    e1 = tangents[0] - (tangents[0] @ n) * n
-    e1 /= np.linalg.norm(e1)
-    e2 = np.array(cross(n, e1))
-    points = np.vstack([curve.points for curve in curves])
-    radius = float(np.hypot(points @ e1, points @ e2).max())
+    tangents = curves.tangents
+    e1 = tangents[:, 0] - np.sum(tangents[:, 0] * n, axis=1, keepdims=True) * n
+    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    e2 = np.array(cross(n.T, e1.T)).T
+    plane = np.array([e1.T, e2.T]).transpose(2, 1, 0)
+    flat = curves.points @ plane[:, None]
+    radius = np.sqrt(
+        np.max(np.einsum("...i,...i->...", flat, flat), axis=(1, 2), where=curves.present, initial=0.0)
+    )
     # Meusnier with its sign: the normal curvature is the normal part of the curvature vector,
     # kappa' cos(theta) in the paper's words.
-    kappas = [radius * float(curve.curvature @ n) for curve in curves]
-    k1, k2, theta = principal_curvatures(np.arctan2(tangents @ e2, tangents @ e1), kappas)
-    d1 = math.cos(theta) * e1 + math.sin(theta) * e2
-    return Frame(point, np.column_stack([d1, cross(n, d1), n])), k1 / radius, k2 / radius, radius
+    kappas = radius[:, None] * np.einsum("bci,bi->bc", curves.curvatures, n)
+    flat = tangents @ plane
+    angles = np.arctan2(flat[..., 1], flat[..., 0])
+    k1, k2, theta = principal_curvatures(angles, kappas, curves.present.any(axis=2))
+    c, s = np.cos(theta), np.sin(theta)
+    turn = np.array([[c, -s], [s, c]]).transpose(2, 0, 1)
+    return np.concatenate([plane @ turn, n[:, :, None]], axis=2), k1, k2, radius
 
 
-def _require_distinct(tangents: Array) -> None:
-    """Three tangents that differ as lines by LEAST_ANGLE; or an error that names two that do not."""
+def degeneracy(
+    contours: Sequence[Contour], present: NDArray[np.bool_], tangents: Array, normal: Array
+) -> DegenerateCurvesError | None:
+    """Why one touch of Curves carries no frame, and what to move; None where it carries one."""
+    for i, (contour, count) in enumerate(zip(contours, np.count_nonzero(present, axis=1), strict=False), 1):
+        if count < LEAST_CONTACTS:
+            why = f" (it ended by: {', '.join(contour.stops)})" if contour.stops else ""
+            return DegenerateCurvesError(
+                f"curve {i} has {count} of the {LEAST_CONTACTS} contacts it needs besides the reference "
+                f"point{why}: move the point away from the crease or edge there, or take a shorter step"
+            )
+    if len(contours) < 3:
+        return DegenerateCurvesError(
+            f"three curves are needed, got {len(contours)}: add a sampling plane in another direction"
+        )
+    tangents = tangents[: len(contours)]
+    heights = tangents @ normal
+    off_plane = np.abs(heights)
+    if not off_plane.max() < OFF_PLANE:
+        return DegenerateCurvesError(
+            "the tangents of the curves at the point lie in no plane, that of curve "
+            f"{np.argmax(off_plane) + 1} least of all: move the point away from the edge or corner, or give "
+            "each curve in its running order"
+        )
+    in_plane = tangents - heights[:, None] * normal
+    return _indistinct(in_plane / np.sqrt(np.einsum("ci,ci->c", in_plane, in_plane))[:, None])
+
+
+def _indistinct(tangents: Array) -> DegenerateCurvesError | None:
+    """An error that names two curves, unless three of these unit tangents differ as lines by LEAST_ANGLE."""
+    least = math.sin(LEAST_ANGLE)
     sines = np.sqrt(np.maximum(1.0 - (tangents @ tangents.T) ** 2, 0.0))
-    distinct: list[int] = []
-    for i in range(len(tangents)):
-        if all(sines[i, j] >= math.sin(LEAST_ANGLE) for j in distinct):
+    rows, distinct = sines.tolist(), [0]
+    for i in range(1, len(rows)):
+        if all(rows[i][j] >= least for j in distinct):
             distinct.append(i)
-    if len(distinct) < 3:
-        alike = next(
-            (i, j) for i in range(len(sines)) for j in range(i) if sines[i, j] < math.sin(LEAST_ANGLE)
-        )
-        angle = math.degrees(math.asin(min(1.0, sines[alike])))
-        raise DegenerateCurvesError(
-            f"curves {alike[1] + 1} and {alike[0] + 1} run in one direction ({angle:.2g} degrees apart), "
-            f"which leaves {len(distinct)} distinct ones of the three needed: turn one of their planes"
-        )
+    if len(distinct) >= 3:
+        return None
+    j, i = next((j, i) for i in range(len(rows)) for j in range(i) if rows[i][j] < least)
+    angle = math.degrees(math.asin(min(1.0, rows[i][j])))
+    return DegenerateCurvesError(
+        f"curves {j + 1} and {i + 1} run in one direction ({angle:.2g} degrees apart), "
+        f"which leaves {len(distinct)} distinct ones of the three needed: turn one of their planes"
+    )

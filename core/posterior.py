@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What contacts say of a surface and what they leave open: a Gaussian over polynomials of degree 6."""
 
-import math
-from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from .arguments import Array
 from .monge import MongePatch, exponents, monomials
@@ -19,22 +19,40 @@ DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curv
 INVISIBLE = 0.9  # of the prior's variance, left over
 
 
-@dataclass(frozen=True)
-class Posterior:
-    """A Gaussian over the heights sum b_ij x^i y^j, degree 1 to 6, in unit radius.
+class Posterior(NamedTuple):
+    """A Gaussian over the heights sum b_ij x^i y^j, degree 1 to 6, in unit radius; or a stack (...) of such.
 
-    mean : (27,), b_10 b_01 b_20 b_11 b_02 b_30 ...
-    covariance : (27, 27)
-    noise : standard deviation of a contact
-    visibility : (22, 22), upper triangular: its singular values are what the contacts show of directions
-        among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1; those of a
-        leading block, of the terms to a lower degree
+    mean : (..., 27), b_10 b_01 b_20 b_11 b_02 b_30 ...
+    covariance : (..., 27, 27)
+    noise : (...), standard deviation of a contact
+    visibility : (..., 22, 22), upper triangular: its singular values are what the contacts show of
+        directions among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1;
+        those of a leading block, of the terms to a lower degree
     """
 
     mean: Array
     covariance: Array
-    noise: float
+    noise: Array
     visibility: Array
+
+    def at(self, index: int | NDArray[np.bool_]) -> "Posterior":
+        """One of the stack, or several."""
+        return Posterior(*(values[index] for values in self))
+
+    def scaled(self, factor: ArrayLike) -> "Posterior":
+        """The same surfaces with every length multiplied by `factor` (...)."""
+        f = np.asarray(factor)
+        factors = f[..., None] ** (1.0 - ORDERS)
+        covariance = factors[..., :, None] * factors[..., None, :] * self.covariance
+        return self._replace(mean=factors * self.mean, covariance=covariance, noise=f * self.noise)
+
+    def turned(self, angle: Array) -> "Posterior":
+        """The same surfaces in axes turned by `angle` (...) about the normal."""
+        turn = _turn(angle)
+        mean = (turn @ self.mean[..., None])[..., 0]
+        return self._replace(mean=mean, covariance=turn @ self.covariance @ np.swapaxes(turn, -1, -2))
+
+    # What follows is of one only.
 
     def height_std(self, x: Array, y: Array) -> Array:
         """Of the height at n points, (n,)."""
@@ -44,17 +62,6 @@ class Posterior:
     def height(self, x: Array, y: Array) -> Array:
         """The mean height at n points, (n,)."""
         return monomials(x, y, TERMS) @ self.mean
-
-    def scaled(self, factor: float) -> "Posterior":
-        """The same surfaces with every length multiplied by `factor`."""
-        factors = factor ** (1.0 - ORDERS)
-        covariance = np.outer(factors, factors) * self.covariance
-        return replace(self, mean=factors * self.mean, covariance=covariance, noise=factor * self.noise)
-
-    def turned(self, angle: float) -> "Posterior":
-        """The same surfaces in axes turned by `angle` about the normal."""
-        turn = _turn(angle)
-        return replace(self, mean=turn @ self.mean, covariance=turn @ self.covariance @ turn.T)
 
     def patch(self, degree: int) -> MongePatch:
         """The patch (1) of this degree nearest to the mean over the disk, with its curvatures."""
@@ -82,18 +89,25 @@ def terms_to(degree: int) -> int:
     return (degree + 1) * (degree + 2) // 2 - 1
 
 
-def _turn(angle: float) -> Array:
-    """(27, 27): coefficients in axes turned by `angle` about the normal, from what both say at nodes."""
-    x, y, _ = _nodes()
-    c, s = math.cos(angle), math.sin(angle)
-    return _from_heights() @ monomials(c * x - s * y, s * x + c * y, TERMS)
+def _turn(angle: Array) -> Array:
+    """(..., 27, 27): coefficients in axes turned by `angle` about the normal.
+
+    Of z = x + iy and its conjugate z' a turn changes nothing but the phase of the terms z^i z'^j.
+    """
+    to_complex, from_complex = _complex_terms()
+    phases = np.exp(1j * np.asarray(angle)[..., None] * (TERMS[:, 0] - TERMS[:, 1]))
+    turn: Array = ((from_complex * phases[..., None, :]) @ to_complex).real
+    return turn
 
 
 @cache
-def _from_heights() -> Array:
-    """(27, 52): coefficients from heights at the nodes."""
+def _complex_terms() -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Coefficients of x^i y^j to those of z^i z'^j and back, (27, 27) each."""
     x, y, _ = _nodes()
-    return np.asarray(np.linalg.pinv(monomials(x, y, TERMS)))
+    z, (i, j) = (x + 1j * y)[:, None], TERMS.T
+    complex_terms: NDArray[np.complex128] = z**i * z.conj() ** j
+    to_complex = np.linalg.lstsq(complex_terms, monomials(x, y, TERMS).astype(complex), rcond=None)[0]
+    return to_complex, np.linalg.inv(to_complex)
 
 
 @cache

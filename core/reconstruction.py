@@ -3,8 +3,9 @@
 """From contours to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +14,16 @@ from . import fitting, tagc
 from .arguments import Array, finite_array, number, unit_vector
 from .bayes import joint_fit, posterior_of
 from .domain import Domain, closed_spline_domain
-from .local_geometry import Curve, DegenerateCurvesError, Frame, curve_through, darboux_frame
+from .local_geometry import (
+    Curves,
+    DegenerateCurvesError,
+    Frame,
+    curves_through,
+    darboux_frames,
+    degeneracy,
+    stacked,
+    surface_normals,
+)
 from .monge import MongePatch
 from .posterior import Posterior, terms_to
 from .tracking import Contour
@@ -24,6 +34,7 @@ SOLVERS = ("fast", "descent")
 DEFAULT_WEIGHT = 1000.0  # lambda L^2: the paper's 9.99/mm^2 at L = 10 mm
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
+STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache
 DOMAIN_POINTS = 150  # of a mean over the domain
 
 
@@ -35,9 +46,10 @@ class Reconstruction:
     radius : L, the largest distance of a contact from the point in the tangent plane
     patch, domain : the surface (1) and the part of the tangent plane it is meant for
     contacts : (n, 3), what was fitted, in the frame
-    posterior : what the contacts leave open, in the frame and in units of L
+    accuracy : standard deviation of a contact, at least, in units of L
     method : of the fit
     converged : whether its solver did
+    joint_posterior : what "bayes" has found
 
     All else follows from these, once it is asked for.
     """
@@ -47,9 +59,18 @@ class Reconstruction:
     patch: MongePatch
     domain: Domain
     contacts: Array
-    posterior: Posterior
+    accuracy: float
     method: str
     converged: bool = True
+    joint_posterior: Posterior | None = None
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """What the contacts leave open, in the frame and in units of L."""
+        if self.joint_posterior is not None:
+            return self.joint_posterior
+        unit = 1.0 / self.radius
+        return posterior_of(self.patch.scaled(unit), unit * self.contacts, self.accuracy)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
@@ -158,100 +179,202 @@ def reconstruct(
     method. A fit in doubt comes back with a status.
     """
     p, up = finite_array("point", point, (3,)), unit_vector("outward", outward)
-    _require_choice("method", method, METHODS)
-    _require_choice("solver", solver, SOLVERS)
-    _require_degree(degree)
-    weight = DEFAULT_WEIGHT if weight is None else number("weight", weight, above=0.0)
-    sensor_std = _sensor_std(contours) if sensor_std is None else number("sensor_std", sensor_std, least=0.0)
+    options = _options(method, degree, sensor_std, weight, solver)
+    (result,) = _stack(p[None], [contours], up[None], options)
+    if isinstance(result, DegenerateCurvesError):
+        raise result
+    return result
 
-    curves = [curve_through(contour, p, f"curve {i}") for i, contour in enumerate(contours, 1)]
-    frame, k1, k2, radius = darboux_frame(p, curves, up)
-    contacts = np.vstack([curve.points for curve in curves]) @ frame.axes / radius
-    accuracy, converged = sensor_std / radius, True
-    if method == "bayes" or degree == "auto":
-        tangent = curves[0].tangent @ frame.axes
-        turn, posterior = joint_fit(contacts, k1 * radius, k2 * radius, tangent, accuracy)
-        if degree == "auto":
-            degree = posterior.degree_shown(contacts @ turn)
-    d = int(degree)
-    if method == "bayes":
-        frame, contacts = Frame(p, frame.axes @ turn), contacts @ turn
-        farthest = float(np.hypot(contacts[:, 0], contacts[:, 1]).max())
-        radius, contacts, posterior = radius * farthest, contacts / farthest, posterior.scaled(1.0 / farthest)
-    domain = _domain(curves, frame, radius)
-    if method == "bayes":
-        patch = posterior.patch(d)
-    else:
-        data = fitting.problem(k1 * radius, k2 * radius, d, contacts)
-        half_curves = _half_curves(curves, frame, radius)
-        a, converged = _coefficients(data, domain, half_curves, method, weight, solver)
-        patch = MongePatch(k1 * radius, k2 * radius, a)
-        posterior = posterior_of(patch, contacts, accuracy)
-    return Reconstruction(
-        frame=frame,
-        radius=radius,
-        patch=patch.scaled(radius),
-        domain=Domain(domain.ends * radius),
-        contacts=contacts * radius,
-        posterior=posterior,
-        method=method,
-        converged=converged,
+
+def reconstruct_many(
+    points: ArrayLike,
+    contours_list: Sequence[Sequence[Contour]],
+    *,
+    outward: ArrayLike,
+    method: str = "bayes",
+    degree: int | str = 4,
+    sensor_std: float | None = None,
+    weight: float | None = None,
+    solver: str = "fast",
+) -> list[Reconstruction | DegenerateCurvesError]:
+    """What `reconstruct` gives for each of n touches; in stacks, which makes "bayes" some times as fast.
+
+    points : (n, 3); contours_list : n lists of contours; outward : (n, 3)
+
+    In the place of a touch that cannot carry the method stands its DegenerateCurvesError. Raises
+    ValueError for bad arguments.
+    """
+    p = finite_array("points", points, (None, 3))
+    if len(contours_list) != len(p):
+        raise ValueError(f"contours_list: wanted {len(p)} lists of contours, got {len(contours_list)}")
+    up = finite_array("outward", outward, (len(p), 3))
+    up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
+    options = _options(method, degree, sensor_std, weight, solver)
+    # Touches of like size together: a stack has room for its longest contour in all places.
+    sizes = [len(c) * max((len(contour.points) for contour in c), default=0) for c in contours_list]
+    order = sorted(range(len(p)), key=sizes.__getitem__, reverse=True)
+    results: dict[int, Reconstruction | DegenerateCurvesError] = {}
+    while order:
+        count = max(1, STACK // max(sizes[order[0]], 1))
+        chosen, order = order[:count], order[count:]
+        found = _stack(p[chosen], [contours_list[i] for i in chosen], up[chosen], options)
+        results.update(zip(chosen, found, strict=True))
+    return [results[i] for i in range(len(p))]
+
+
+class _Options(NamedTuple):
+    method: str
+    degree: int | None  # None for "auto"
+    sensor_std: float | None  # None for the contours' own
+    weight: float
+    solver: str
+
+
+class _Touch(NamedTuple):
+    """What a patch follows from: the curves of one touch, in the frame; all but the radius in its unit."""
+
+    frame: Frame
+    radius: float
+    curves: Curves
+    k1: float
+    k2: float
+    accuracy: float
+    degree: int
+
+
+def _options(
+    method: str, degree: int | str, sensor_std: float | None, weight: float | None, solver: str
+) -> _Options:
+    for name, value, choices in (("method", method, METHODS), ("solver", solver, SOLVERS)):
+        if value not in choices:
+            raise ValueError(f"{name}: wanted one of {', '.join(choices)}, got {value!r}")
+    if degree != "auto" and (not isinstance(degree, int) or degree not in range(2, 7)):
+        raise ValueError(f'degree: wanted a whole number from 2 to 6 or "auto", got {degree!r}')
+    return _Options(
+        method,
+        None if isinstance(degree, str) else degree,
+        None if sensor_std is None else number("sensor_std", sensor_std, least=0.0),
+        DEFAULT_WEIGHT if weight is None else number("weight", weight, above=0.0),
+        solver,
     )
 
 
-def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise ValueError(f"{name}: wanted one of {', '.join(choices)}, got {value!r}")
+def _stack(
+    points: Array, touches: Sequence[Sequence[Contour]], outward: Array, options: _Options
+) -> list[Reconstruction | DegenerateCurvesError]:
+    """Results of touches, whose arguments are in order."""
+    curves = curves_through(*stacked(points, touches))
+    normals = surface_normals(curves.tangents, outward)
+    each = zip(touches, curves.present, curves.tangents, normals, strict=True)
+    errors = [degeneracy(*touch) for touch in each]
+    good = np.flatnonzero([error is None for error in errors])
+    std = options.sensor_std
+    stds = [max(c.noise or 0.0 for c in touches[i]) if std is None else std for i in good]
+    found = iter(
+        _framed(points[good], curves.at(good), normals[good], np.array(stds), options) if len(good) else ()
+    )
+    return [error or _result(*next(found), options) for error in errors]
 
 
-def _require_degree(degree: int | str) -> None:
-    if degree != "auto" and (not isinstance(degree, int) or degree not in range(2, 7)):
-        raise ValueError(f'degree: wanted a whole number from 2 to 6 or "auto", got {degree!r}')
+def _framed(
+    points: Array, curves: Curves, normals: Array, stds: Array, options: _Options
+) -> list[tuple[_Touch, Posterior | None]]:
+    """Touches in the Darboux frames that the method finds, with what the joint fit says of them."""
+    axes, k1, k2, radii = darboux_frames(curves, normals)
+    local, tangents = curves.points @ axes[:, None] / radii[:, None, None, None], curves.tangents @ axes
+    count, posteriors = len(points), None
+    degrees = [options.degree or 0] * count
+    if options.method == "bayes" or options.degree is None:
+        contacts, present = local.reshape(count, -1, 3), curves.present.reshape(count, -1)
+        turns, fitted = joint_fit(contacts, present.astype(float), k1, k2, tangents[:, 0], stds / radii)
+        if options.degree is None:
+            degrees = [fitted.at(i).degree_shown((contacts[i] @ turns[i])[present[i]]) for i in range(count)]
+        if options.method == "bayes":
+            axes, local, tangents = axes @ turns, local @ turns[:, None], tangents @ turns
+            farthest = np.hypot(local[..., 0], local[..., 1]).max(axis=(1, 2))
+            radii, local = radii * farthest, local / farthest[:, None, None, None]
+            posteriors = fitted.scaled(1.0 / farthest)
+    curves = replace(curves, points=local, tangents=tangents)
+    return [
+        (
+            _Touch(
+                Frame(points[i], axes[i]),
+                float(radii[i]),
+                curves.at(i),
+                float(k1[i]),
+                float(k2[i]),
+                float(stds[i] / radii[i]),
+                degrees[i],
+            ),
+            posteriors and posteriors.at(i),
+        )
+        for i in range(count)
+    ]
 
 
-def _sensor_std(contours: Sequence[Contour]) -> float:
-    return max((contour.noise or 0.0 for contour in contours), default=0.0)
+def _result(
+    touch: _Touch, posterior: Posterior | None, options: _Options
+) -> Reconstruction | DegenerateCurvesError:
+    try:
+        domain = _domain(touch.curves)
+    except ValueError:
+        return DegenerateCurvesError(
+            "the curves end in fewer than three places apart from each other, so they bound no patch: "
+            "turn the sampling planes, or move the point away from the edge"
+        )
+    contacts, converged = touch.curves.points[touch.curves.present], True
+    if posterior is None:
+        data = fitting.problem(touch.k1, touch.k2, touch.degree, contacts)
+        a, converged = _coefficients(data, domain, touch.curves, options)
+        patch = MongePatch(touch.k1, touch.k2, a)
+    else:
+        patch = posterior.patch(touch.degree)
+    return Reconstruction(
+        frame=touch.frame,
+        radius=touch.radius,
+        patch=patch.scaled(touch.radius),
+        domain=Domain(domain.ends * touch.radius),
+        contacts=contacts * touch.radius,
+        accuracy=touch.accuracy,
+        method=options.method,
+        converged=converged,
+        joint_posterior=posterior,
+    )
 
 
-def _half_curves(curves: Sequence[Curve], frame: Frame, radius: float) -> list[Array]:
-    """The contacts (n_i, 3) on either side of the point, outward, local in unit radius, by azimuth."""
+def _domain(curves: Curves) -> Domain:
+    """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing."""
+    last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
+    rows = np.arange(len(last))
+    before, after = curves.present[:, 0] & (curves.along[:, 0] < 0.0), curves.along[rows, last] > 0.0
+    ends = np.vstack([curves.points[before, 0], curves.points[rows, last][after & curves.present[:, 0]]])
+    return closed_spline_domain(ends[:, :2], 1.0)
+
+
+def _half_curves(curves: Curves) -> list[Array]:
+    """The contacts (n_i, 3) on either side of the point, outward, by azimuth."""
     halves = []
-    for curve in curves:
-        local, tangent = curve.points @ frame.axes / radius, curve.tangent @ frame.axes
-        for half, sign in ((local[curve.along < 0.0][::-1], -1.0), (local[curve.along > 0.0], 1.0)):
+    each = zip(curves.points, curves.present, curves.along, curves.tangents, strict=True)
+    for points, present, along, tangent in each:
+        for half, sign in (
+            (points[present & (along < 0.0)][::-1], -1.0),
+            (points[present & (along > 0.0)], 1.0),
+        ):
             if len(half):
                 halves.append((np.arctan2(sign * tangent[1], sign * tangent[0]), half))
     return [half for _, half in sorted(halves, key=lambda half: half[0])]
 
 
-def _domain(curves: Sequence[Curve], frame: Frame, radius: float) -> Domain:
-    """Through the curves' ends on either side of the point, in unit radius."""
-    sides = ((0, -1.0), (-1, 1.0))
-    ends = [curve.points[i] for curve in curves for i, sign in sides if sign * curve.along[i] > 0.0]
-    try:
-        return closed_spline_domain((np.array(ends) @ frame.axes)[:, :2] / radius, 1.0)
-    except ValueError:
-        raise DegenerateCurvesError(
-            "the curves end in fewer than three places apart from each other, so they bound no patch: "
-            "turn the sampling planes, or move the point away from the edge"
-        ) from None
-
-
 def _coefficients(
-    data: fitting.Problem,
-    domain: Domain,
-    half_curves: Sequence[Array],
-    method: str,
-    weight: float,
-    solver: str,
+    data: fitting.Problem, domain: Domain, curves: Curves, options: _Options
 ) -> tuple[Array, bool]:
-    """a of (1) by the method, and whether its solver converged."""
-    if method == "least-squares":
+    """a of (1) by one of the paper's methods, and whether its solver converged."""
+    if options.method == "least-squares":
         return fitting.least_squares(data), True
-    if method == "quadratic-variation":
-        return fitting.quadratic_variation(data, domain, weight), True
-    objective = tagc.Objective(data, domain, weight)
-    if solver == "descent":
-        return tagc.descent_minimum(objective, fitting.tagc_start(data, half_curves))
+    if options.method == "quadratic-variation":
+        return fitting.quadratic_variation(data, domain, options.weight), True
+    objective = tagc.Objective(data, domain, options.weight)
+    if options.solver == "descent":
+        return tagc.descent_minimum(objective, fitting.tagc_start(data, _half_curves(curves)))
     # On convex surfaces (9) has many minima: from the quadric they are lower than from the paper's start.
     return tagc.newton_minimum(objective, np.zeros(data.basis.shape[1]))

@@ -259,7 +259,7 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 def cross(a: Vector | Array, b: Vector | Array) -> Vector:
-    """a x b of two vectors; np.cross is made for many, and slow for one."""
+    """a x b, of vectors or of arrays of which the first axis has three elements; np.cross is slow."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 

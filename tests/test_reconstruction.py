@@ -19,6 +19,7 @@ from core import (
     distances,
     overlapped,
     reconstruct,
+    reconstruct_many,
     track,
 )
 
@@ -192,6 +193,81 @@ def test_bad_arguments_are_named(change, message):
     arguments = {"point": surfaces.sphere(25).point, "outward": surfaces.sphere(25).normal} | change
     with pytest.raises(ValueError, match=message):
         reconstruct(arguments.pop("point"), GOOD, **arguments)
+
+
+MANY = [
+    (surface, planes, noise)
+    for surface in (
+        surfaces.sphere(25),
+        surfaces.torus(40, 20, 0.6),
+        surfaces.bottle_neck(),
+        surfaces.plane(),
+    )
+    for planes in (UPRIGHT, TILTED, [SamplingPlane(a) for a in np.radians([0, 45, 90, 135])])
+    for noise in (0.0, 0.05)
+]
+
+
+@pytest.mark.parametrize("options", [{}, {"degree": "auto"}, {"method": "tagc"}, {"sensor_std": 0.3}])
+def test_many_at_once_are_what_they_are_one_by_one(options):
+    """Touches that differ in curves, contacts and outliers, so that their stacks have gaps."""
+    rng = np.random.default_rng(7)
+    points, outward, touches = [], [], []
+    for i, (s, planes, noise) in enumerate(MANY):
+        contours = track(
+            s,
+            s.point,
+            s.normal,
+            planes,
+            extent=rng.uniform(6, 12),
+            step=rng.uniform(0.7, 1.5),
+            noise=noise,
+            rng=i,
+        )
+        if i % 3 == 0:
+            contours[1].points[2] += 1.0
+        if i % 5 == 0:
+            contours[2] = Contour(contours[2].points[:-3], noise=noise)
+        points.append(s.point)
+        outward.append(s.normal)
+        touches.append(contours)
+    many = reconstruct_many(points, touches, outward=outward, **options)
+    for point, up, contours, one_of_many in zip(points, outward, touches, many, strict=True):
+        one = reconstruct(point, contours, outward=up, **options)
+        assert one_of_many.frame.axes == pytest.approx(one.frame.axes, abs=1e-9)
+        assert one_of_many.radius == pytest.approx(one.radius, rel=1e-12)
+        assert one_of_many.contacts == pytest.approx(one.contacts, abs=1e-9)
+        assert one_of_many.patch.degree == one.patch.degree
+        x, y = one.domain.grid(60)[0].T
+        assert one_of_many.patch.height(x, y) == pytest.approx(one.patch.height(x, y), abs=1e-7)
+        assert one_of_many.height_std(x, y) == pytest.approx(one.height_std(x, y), rel=1e-6)
+        assert one_of_many.domain.area == pytest.approx(one.domain.area)
+        assert one_of_many.status == one.status
+
+
+def test_a_touch_that_carries_nothing_does_not_spoil_the_others():
+    ball = surfaces.sphere(25)
+    results = reconstruct_many([ball.point] * 4, [GOOD, GOOD[:2], [], GOOD], outward=[ball.normal] * 4)
+    assert [isinstance(r, DegenerateCurvesError) for r in results] == [False, True, True, False]
+    assert "three curves are needed, got 2" in str(results[1])
+    assert results[0].patch.k1 == pytest.approx(-0.04, abs=1e-3)
+    assert reconstruct_many(np.empty((0, 3)), [], outward=np.empty((0, 3))) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"points": [(0, 0, 0)] * 2}, "contours_list: wanted 2 lists of contours, got 1"),
+        ({"points": (0, 0, 0)}, r"points: wanted shape \(n, 3\), got \(3,\)"),
+        ({"outward": (0, 0, 1)}, r"outward: wanted shape \(1, 3\), got \(3,\)"),
+        ({"outward": [(0, 0, 0)]}, "outward: wanted a vector with a direction"),
+        ({"degree": 9}, "degree: wanted a whole number"),
+    ],
+)
+def test_bad_arguments_of_many_are_named(change, message):
+    arguments = {"points": [surfaces.sphere(25).point], "outward": [surfaces.sphere(25).normal]} | change
+    with pytest.raises(ValueError, match=message):
+        reconstruct_many(arguments.pop("points"), [GOOD], **arguments)
 
 
 def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():
