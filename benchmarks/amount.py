@@ -1,0 +1,290 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How few contacts, and how few sampling planes, are enough: the error against the amount of data.
+
+`python -m benchmarks.amount [--quick]`, from the root of a checkout. Prints Markdown tables of the errors,
+and for each noise how many contacts make a patch as good as the most do; draws build/charts/amount.png.
+
+The surfaces are those of benchmarks.accuracy and random shapes like its own. Each plane is tracked with
+contacts close together, of which evenly spread ones are taken: noise and extent stay as they are. The
+error is the mean |dz| over a hold-out, the same for all rows of a surface: some 300 points above the
+domain of the curves in three planes. Lengths are in mm, errors in micrometres.
+"""
+
+import argparse
+from collections import defaultdict
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import cache, partial
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullLocator
+
+from core import SamplingPlane, track
+from core.domain import closed_spline_domain
+from core.monge import exponents, monomials
+
+from . import accuracy, plot
+from .plot import plt
+
+FINE = 96  # steps of a half curve, as tracked
+STEPS = (2, 3, 4, 6, 8, 12, 16, 24, 32)  # and as taken in three planes: 12 to 192 contacts
+PLANES = (3, 4, 5, 6)
+TOTAL, EACH = 72, 24  # contacts of all curves, or of each, against the number of planes
+ENOUGH = 1.25
+BAYES, TAGC, BOUND = "Bayes, degree 4", "TAGC", "Cramér-Rao bound, degree 4"
+METHODS = {BAYES: accuracy.ours, TAGC: partial(accuracy.ours, method="tagc")}
+LOOKS = {  # by noise: colour, mark, and how the label stands to the line's end
+    0.0: (plot.BLUE, "o", "top"),
+    0.02: (plot.GREEN, "s", "bottom"),
+    0.1: (plot.VERMILION, "^", "center"),
+}
+TAGC_NOISE = 0.02  # of its line in the chart; the table has all
+BEST = {degree: f"best polynomial of degree {degree}" for degree in (4, 6)}
+CAPTION = (
+    "Marks: the default fit, medians and quartiles over {} exact surfaces and {} random shapes, radii of "
+    "curvature from 15 mm, extents of 10 to 15 mm; seeds of noise: {}. Contacts are spread evenly, whatever "
+    "their number over the same extent, and counted without the reference point; planes are at equal turns. "
+    "Hold-out: some 300 points above the domain of the curves in three planes, the same whatever was "
+    "touched. Limits: the polynomial nearest to the hold-out itself, and the Cramér-Rao bound of unbiased "
+    "fits of the visible terms to degree 4 ({} contacts on the right), below which a prior may go. Without "
+    "noise the error stays at what three planes cannot show; a fourth shows most of that. TAGC takes its "
+    "curvatures from the ten contacts nearest to the point, which span less the more there are."
+)
+
+
+class Touch(NamedTuple):
+    """How much was touched: planes, and contacts on each half curve."""
+
+    planes: int
+    steps: int
+
+    @property
+    def contacts(self):
+        return 2 * self.planes * self.steps
+
+
+BY_CONTACTS = [Touch(3, steps) for steps in STEPS]
+SAME_TOTAL = [Touch(planes, round(TOTAL / (2 * planes))) for planes in PLANES]
+SAME_EACH = [Touch(planes, EACH // 2) for planes in PLANES]
+TOUCHES = sorted({*BY_CONTACTS, *SAME_TOTAL, *SAME_EACH})
+
+
+class Place(NamedTuple):
+    """Where a surface is touched, how far, and what is true there; see accuracy.Case."""
+
+    surface: object
+    point: np.ndarray
+    extent: float
+    axes: np.ndarray
+    kappas: tuple[float, float]
+
+    def tracked(self, planes, noise, seed):
+        """Contours in planes at equal turns, fine."""
+        azimuths = np.radians(accuracy.TURN) + np.pi * np.arange(planes) / planes
+        sampling = [SamplingPlane(azimuth) for azimuth in azimuths]
+        lengths = {"extent": self.extent, "step": self.extent / FINE, "tangent": self.axes[:, 0]}
+        return track(self.surface, self.point, self.axes[:, 2], sampling, noise=noise, rng=seed, **lengths)
+
+
+class Remembering:
+    """A surface that answers a ray once: from touch to touch only the noise differs."""
+
+    def __init__(self, surface):
+        self.ray_cast = cache(surface.ray_cast)
+
+
+def find(key):
+    """The place and its hold-out, by an exact surface's name or the seed of a random shape."""
+    if key in accuracy.SURFACES:
+        return _at(*accuracy.SURFACES[key])
+    rng = np.random.default_rng(key)
+    while True:
+        surface, extent = accuracy._random_shape(rng), rng.uniform(10.0, 13.0)
+        # As curved as in accuracy.random_cases.
+        kappas = None if surface is None else accuracy._darboux(surface)[1]
+        if kappas is None or max(-kappas[0], kappas[1]) > 1.0 / 15.0:
+            continue
+        if (kappas[0] * kappas[1] < 0.0) == (key % 3 == 0) and (there := _at(surface, extent)) is not None:
+            return there
+
+
+def _at(surface, extent):
+    """None where a curve ends early or the surface is no graph over the domain."""
+    place = Place(Remembering(surface), surface.point, extent, *accuracy._darboux(surface))
+    contours = {m: place.tracked(m, 0.0, 0) for m in PLANES}
+    if any(c.stops != ("extent", "extent") for m in PLANES for c in contours[m]):
+        return None
+    ends = np.vstack([c.points[[0, -1]] for c in contours[PLANES[0]]]) - place.point
+    domain = closed_spline_domain((ends @ place.axes)[:, :2], extent)
+    points, _ = domain.grid(accuracy.HOLD_OUT)
+    hold_out = accuracy._above(surface, place.axes, place.kappas, points)
+    return None if hold_out is None else (place, hold_out)
+
+
+def spread(contour, steps):
+    """The contour with `steps` contacts on either side of the point."""
+    kept = FINE + np.round(FINE * np.arange(-steps, steps + 1) / steps).astype(int)
+    return replace(contour, points=contour.points[kept], normals=contour.normals[kept])
+
+
+def cases(place, hold_out, noise, seed):
+    """What was touched, as (touch, accuracy.Case), all from the same fine contours."""
+    rng = np.random.default_rng(seed)
+    fine = {planes: place.tracked(planes, noise, rng) for planes in PLANES}
+    for touch in TOUCHES:
+        contours = [spread(contour, touch.steps) for contour in fine[touch.planes]]
+        yield touch, accuracy.Case(place.point, place.axes, place.kappas, contours, noise, hold_out)
+
+
+def errors(key, seeds):
+    """((noise, touch, method or limit), the error in um) for all touches of a surface."""
+    place, hold_out = find(key)
+    over = hold_out @ place.axes
+    rows = [((None, None, name), best_polynomial(over, degree)) for degree, name in BEST.items()]
+    for noise in accuracy.NOISES:
+        for seed in range(seeds if noise else 1):
+            for touch, case in cases(place, hold_out, noise, [seed, *str(key).encode()]):
+                scores = {name: accuracy.score(fit(case), case).error for name, fit in METHODS.items()}
+                scores[BOUND] = cramer_rao(case)
+                rows += [((noise, touch, name), error) for name, error in scores.items()]
+    return rows
+
+
+def best_polynomial(over, degree):
+    """The least mean |dz| (um) of a polynomial through the reference point: a linear programme."""
+    from scipy.optimize import linprog
+
+    radius = np.abs(over).max()
+    basis, z = monomials(*over[:, :2].T / radius, exponents(1, degree)), over[:, 2] / radius
+    (points, terms), slack = basis.shape, np.eye(len(basis))
+    least = linprog(
+        np.repeat([0.0, 1.0 / points], [terms, points]),
+        A_ub=np.block([[basis, -slack], [-basis, -slack]]),
+        b_ub=np.concatenate([z, -z]),
+        bounds=[(None, None)] * terms + [(0.0, None)] * points,
+    )
+    return 1e3 * radius * least.fun
+
+
+def cramer_rao(case):
+    """The mean |dz| (um) of an unbiased estimate of the terms to degree 4, of those that are visible."""
+    contacts = np.vstack([c.points for c in case.contours]) - case.point
+    contacts = contacts[np.linalg.norm(contacts, axis=1) > 0.0] @ case.axes
+    over, radius, terms = case.hold_out @ case.axes, np.abs(contacts).max(), exponents(1, 4)
+    # Blind directions are 0 but for rounding, the faintest visible one is 0.04 of the clearest.
+    inverse = np.linalg.pinv(monomials(*contacts[:, :2].T / radius, terms), rcond=1e-2)
+    std = case.noise * np.linalg.norm(monomials(*over[:, :2].T / radius, terms) @ inverse, axis=1)
+    return 1e3 * np.sqrt(2.0 / np.pi) * std.mean()
+
+
+def medians(found, touches, noise, name, quantile=0.5):
+    return [float(np.quantile(found[noise, touch, name], quantile)) for touch in touches]
+
+
+def print_tables(found):
+    """Medians by noise and method, and how many contacts are enough."""
+
+    def rows(touches, *between):
+        for name in (*METHODS, BOUND):
+            for noise in accuracy.NOISES if name in METHODS else accuracy.NOISES[1:]:
+                cells = (f"{error:.1f}" for error in medians(found, touches, noise, name))
+                yield [name, f"{noise:g}", *between, *cells]
+
+    print("Mean |dz| in um, medians over surfaces and seeds. Three planes, by the number of contacts:\n")
+    contacts = [touch.contacts for touch in BY_CONTACTS]
+    accuracy.table(["method", "noise, mm", *map(str, contacts)], rows(BY_CONTACTS))
+    print("By the number of planes:\n")
+    sets = {f"{TOTAL} in all": SAME_TOTAL, f"{EACH} a curve": SAME_EACH}
+    head = ["method", "noise, mm", "contacts", *(f"{planes} planes" for planes in PLANES)]
+    accuracy.table(head, [row for name, touches in sets.items() for row in rows(touches, name)])
+    for noise in accuracy.NOISES:
+        error = np.array(medians(found, BY_CONTACTS, noise, BAYES))
+        enough = contacts[np.flatnonzero(error > ENOUGH * error[-1]).max(initial=-1) + 1]
+        print(
+            f"Noise {noise:g} mm: from {enough} contacts on, the error of {BAYES} is within {ENOUGH:g} "
+            f"of that with {contacts[-1]}."
+        )
+    print(*(f"The {name} is {np.median(found[None, None, name]):.2g} um off." for name in BEST.values()))
+
+
+def draw_lines(axes, found, touches, at):
+    """Medians and quartiles for each noise, TAGC's medians, and the limits."""
+    for noise, (colour, mark, _) in LOOKS.items():
+        axes.plot(at, medians(found, touches, noise, BAYES), color=colour, marker=mark, markersize=5)
+        quartiles = (medians(found, touches, noise, BAYES, q) for q in (0.25, 0.75))
+        axes.fill_between(at, *quartiles, color=colour, alpha=0.13, linewidth=0)
+        if noise:
+            axes.plot(at, medians(found, touches, noise, BOUND), color=colour, linestyle=":", linewidth=1.3)
+    tagc = medians(found, touches, TAGC_NOISE, TAGC)
+    axes.plot(at, tagc, color=plot.PURPLE, marker="x", markersize=4, linewidth=0.9)
+    axes.axhline(np.median(found[None, None, BEST[4]]), color=plot.BLACK, linestyle="--", linewidth=1)
+
+
+def draw(found):
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(8.2, 4.4), sharey=True, width_ratios=(3, 2), layout="constrained"
+    )
+    contacts = [touch.contacts for touch in BY_CONTACTS]
+    draw_lines(left, found, BY_CONTACTS, contacts)
+    draw_lines(right, found, SAME_TOTAL, PLANES)
+    for noise, (colour, mark, _) in LOOKS.items():
+        each = medians(found, SAME_EACH, noise, BAYES)
+        right.plot(PLANES, each, "-.", color=colour, marker=mark, mfc="white", markersize=5, linewidth=1)
+    left.set(title="Three planes, more contacts", xlabel="contacts", ylabel="mean |dz|, µm")
+    left.set(xscale="log", yscale="log", xlim=(11, 400), ylim=(0.4, 400))
+    left.set_xticks(contacts, contacts)
+    left.xaxis.set_minor_locator(NullLocator())
+    left.set_yticks([1, 10, 100], [1, 10, 100])
+    right.set(title="More planes", xlabel="sampling planes", xticks=PLANES, xlim=(2.8, 6.2))
+    label(left, right, found)
+    return figure
+
+
+def label(left, right, found):
+    """Names at the lines' ends, and what the line styles mean."""
+    last = BY_CONTACTS[-1:]
+    at = 1.07 * last[0].contacts
+    for noise, (colour, _, align) in LOOKS.items():
+        name = f"noise {noise:g} mm" if noise else "no noise"
+        left.text(at, *medians(found, last, noise, BAYES), name, color=colour, va=align, fontsize=8)
+    tagc = medians(found, last, TAGC_NOISE, TAGC)
+    left.text(at, *tagc, f"TAGC,\n{TAGC_NOISE:g} mm", color=plot.PURPLE, va="center", fontsize=8)
+    four, six = (np.median(found[None, None, name]) for name in BEST.values())
+    left.text(
+        11.5, 0.92 * four, f"best polynomial of degree 4 (of degree 6: {six:.2g} µm)", va="top", fontsize=8
+    )
+    lines = {
+        f"{TOTAL} contacts in all": {"marker": "o"},
+        f"{EACH} contacts a curve": {"marker": "o", "mfc": "white", "ls": "-.", "lw": 1},
+        "Cramér-Rao bound": {"ls": ":"},
+    }
+    handles = [Line2D([], [], color="#555555", label=name, **style) for name, style in lines.items()]
+    right.legend(handles=handles, loc="upper right", fontsize=8)
+
+
+def csv_rows(found):
+    for (noise, touch, name), values in found.items():
+        amount = ("", "", "") if touch is None else (touch.planes, touch.contacts, noise)
+        yield [*amount, name, *(f"{value:.4g}" for value in np.quantile(values, (0.5, 0.25, 0.75)))]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="fewer shapes and seeds")
+    seeds, shapes = (2, 4) if parser.parse_args().quick else (8, 24)
+    found = defaultdict(list)
+    with ProcessPoolExecutor(2) as pool:
+        for rows in pool.map(partial(errors, seeds=seeds), [*accuracy.SURFACES, *range(shapes)]):
+            for key, error in rows:
+                found[key].append(error)
+    print_tables(found)
+    header = ["planes", "contacts", "noise, mm", "method", "median, um", "lower quartile", "upper quartile"]
+    caption = CAPTION.format(len(accuracy.SURFACES), shapes, seeds, TOTAL)
+    plot.save(draw(found), "amount", caption, header, csv_rows(found))
+
+
+if __name__ == "__main__":
+    main()

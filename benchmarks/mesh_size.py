@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a larger mesh costs: a touch against the number of faces, beside sections of the whole mesh.
+
+`python -m benchmarks.mesh_size ZIP [--quick]`, from the root of a checkout; ZIP is the built extension.
+Prints Markdown tables, times in milliseconds, and draws build/charts/mesh_size.png.
+
+The mesh is the wavy sheet of benchmarks.live, a touch is three contours of 22 steps and the default fit.
+`Blender's ray casts` are the rays of tracking alone, cast once more; `ray casts of the surface` have the
+extension's part of them. `read mesh` is what each touch does before it tracks, `first touch` is all of a
+touch while Blender builds its tree of the faces. The peers cut the whole mesh by the same three planes,
+without a fit; what it takes to hand the mesh to them is apart. Without trimesh its columns are left out.
+"""
+
+import argparse
+import math
+import os
+import sys
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+from matplotlib.ticker import NullLocator
+
+from tools import blender
+
+from . import live, machine, plot
+from .plot import plt
+
+FACES = (10_000, 40_000, 160_000, 490_000, 1_000_000, 4_000_000)  # squares, as the sheet is one
+QUICK_FACES = (10_000, 160_000, 1_000_000)
+LOCATION, EXTENT, STEPS = (0.2, 0.1, 0.05), 0.3, 11  # steps of a half contour
+TOUCHES = 51
+FIT, TRACKING, CASTS, OURS = "tracking and fit", "tracking", "Blender's ray casts", "ray casts of the surface"
+READ, FIRST = "read mesh", "first touch"
+BISECT, TO_BMESH = "bmesh.ops.bisect_plane", "to bmesh"
+SECTION, SEGMENTS, TO_TRIMESH = "trimesh section", "trimesh mesh_plane", "to trimesh"
+LOOKS = {  # of the lines: colour, mark, style and label
+    FIRST: (plot.BLACK, "v", ":", "first touch, once"),
+    BISECT: (plot.VERMILION, "D", "--", BISECT),
+    SECTION: (plot.PURPLE, "x", "--", "trimesh: section (x),\nmesh_plane (+)"),
+    SEGMENTS: (plot.PURPLE, "+", "--", ""),
+    READ: (plot.ORANGE, "P", "-", READ),
+    FIT: (plot.BLUE, "o", "-", FIT),
+    TRACKING: (plot.SKY, "s", "-", TRACKING),
+    CASTS: (plot.GREEN, "^", "-", CASTS),
+}
+COLUMNS = (FIT, TRACKING, OURS, CASTS, READ, FIRST, TO_BMESH, BISECT, TO_TRIMESH, SECTION, SEGMENTS)
+CAPTION = (
+    "Solid: what each touch takes, three contours of 22 steps and the default fit, medians of {} azimuths; "
+    "the ray casts are a part of tracking, cast once more on their own. Dotted: the first touch of a mesh, "
+    "when Blender builds its tree of the faces. Dashed: three sections of the whole mesh by the same planes, "
+    "without a fit and without handing the mesh over; {}."
+)
+
+
+class Recorder:
+    """A surface that keeps the rays it is asked for."""
+
+    def __init__(self, surface):
+        self.surface, self.rays = surface, []
+
+    def ray_cast(self, *ray):
+        self.rays.append(ray)
+        return self.surface.ray_cast(*ray)
+
+
+def seconds(call, *args, **kwargs):
+    start = perf_counter()
+    value = call(*args, **kwargs)
+    return perf_counter() - start, value
+
+
+def touch(core, surface, point, normal, azimuth=0.0):
+    """Seconds of tracking three contours, and of that with the fit."""
+    planes = [core.SamplingPlane(azimuth + math.pi * i / 3) for i in range(3)]
+    lengths = {"extent": EXTENT, "step": EXTENT / STEPS}
+    tracking, contours = seconds(core.track, surface, point, normal, planes, **lengths)
+    if any(len(contour.points) != 2 * STEPS + 1 for contour in contours):
+        raise RuntimeError("a contour of the sheet ended early")
+    return tracking, tracking + seconds(core.reconstruct, point, contours, outward=normal)[0]
+
+
+def first_touch(extension, obj, depsgraph):
+    """The surface, and where and how it was touched."""
+    surface = extension.tactile_addon.surface.MeshSurface(obj, depsgraph)
+    point, normal, _ = surface.project(LOCATION)
+    touch(extension.core, surface, point, normal)
+    return surface, point, normal
+
+
+def recorded(extension, surface, point, normal, azimuth):
+    recorder = Recorder(surface)
+    touch(extension.core, recorder, point, normal, azimuth)
+    return recorder.rays
+
+
+def touches(extension, obj, depsgraph, surface, point, normal):
+    """Medians in seconds by stage, all stages in turns, and of the number of rays."""
+    azimuths = [math.pi / 3 * i / TOUCHES for i in range(TOUCHES)]
+    rays = [recorded(extension, surface, point, normal, azimuth) for azimuth in azimuths]
+    bare = partial(obj.evaluated_get(depsgraph).ray_cast, depsgraph=depsgraph)
+    runs = {name: [] for name in (TRACKING, FIT, OURS, CASTS, READ)}
+    for i, azimuth in enumerate(azimuths):
+        tracking, both = touch(extension.core, surface, point, normal, azimuth)
+        runs[TRACKING].append(tracking)
+        runs[FIT].append(both)
+        # The rays of other azimuths: where these ran, the processor's cache is still warm.
+        runs[OURS].append(seconds(cast_all, surface.ray_cast, rays[i - TOUCHES // 3])[0])
+        runs[CASTS].append(seconds(cast_bare, bare, rays[i - 2 * TOUCHES // 3])[0])
+        if i % 10 == 0:
+            runs[READ].append(seconds(extension.tactile_addon.surface.MeshSurface, obj, depsgraph)[0])
+    return {name: median(values) for name, values in runs.items()}, round(median(map(len, rays)))
+
+
+def cast_all(cast, rays):
+    for ray in rays:
+        cast(*ray)
+
+
+def cast_bare(cast, rays):
+    for origin, direction, distance in rays:
+        cast(origin, direction, distance=distance)
+
+
+def bisect(mesh, planes):
+    """Seconds to make a bmesh of the whole mesh, and to cut it by all planes."""
+    import bmesh
+
+    whole = bmesh.new()
+    making, _ = seconds(whole.from_mesh, mesh)
+    start = perf_counter()
+    for point, normal in planes:
+        geometry = whole.verts[:] + whole.edges[:] + whole.faces[:]
+        bmesh.ops.bisect_plane(whole, geom=geometry, dist=1e-7, plane_co=point, plane_no=normal)
+    cutting = perf_counter() - start
+    whole.free()
+    return {TO_BMESH: making, BISECT: cutting}
+
+
+def section(mesh, planes):
+    """Seconds to make a Trimesh of the whole mesh, and for curves or bare segments in all planes."""
+    from trimesh.intersections import mesh_plane
+
+    making, whole = seconds(triangles, mesh)
+    curves = sum(seconds(whole.section, normal, point)[0] for point, normal in planes)
+    segments = sum(seconds(mesh_plane, whole, normal, point)[0] for point, normal in planes)
+    return {TO_TRIMESH: making, SECTION: curves, SEGMENTS: segments}
+
+
+def triangles(mesh):
+    import trimesh
+
+    co = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", co.ravel())
+    corners = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners.ravel())
+    return trimesh.Trimesh(co, corners, process=False)
+
+
+PEERS = (bisect, section) if find_spec("trimesh") else (bisect,)
+
+
+def measure(bpy, extension, faces):
+    """Seconds by stage on a sheet of that many faces; and its true number of faces, and of rays."""
+    obj = live.sheet(bpy, faces)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    first, (surface, point, normal) = seconds(first_touch, extension, obj, depsgraph)
+    stages, rays = touches(extension, obj, depsgraph, surface, point, normal)
+    planes = [(point, extension.core.SamplingPlane(math.pi * i / 3).axes(normal)[:, 2]) for i in range(3)]
+    for peer in PEERS:
+        runs = [peer(obj.data, planes) for _ in range(max(1, min(5, 2_000_000 // faces)))]
+        stages |= {name: median(run[name] for run in runs) for name in runs[0]}
+    return stages | {FIRST: first, "faces": len(obj.data.polygons), "rays": rays}
+
+
+def print_table(rows):
+    columns = [name for name in COLUMNS if name in rows[0]]
+    print(f"Milliseconds.\n\n| faces | rays | {' | '.join(columns)} |\n|--:|--:|{'--:|' * len(columns)}")
+    for row in rows:
+        cells = (f"{1e3 * row[name]:.2f}" for name in columns)
+        print(f"| {row['faces']} | {row['rays']} | {' | '.join(cells)} |")
+    (row,) = (row for row in rows if row["faces"] == 1_000_000)
+    total, cast = 1e3 * row[FIT], 1e3 * row[CASTS]
+    print(
+        "\n| three contours of 22 steps on a mesh of 1M faces | total, ms | in Blender's ray casts | share |"
+    )
+    print(f"|---|--:|--:|--:|\n| tracking and fit | {total:.2f} | {cast:.2f} | {100 * cast / total:.0f} % |")
+    total = 1e3 * row[TRACKING]
+    print(f"| tracking | {total:.2f} | {cast:.2f} | {100 * cast / total:.0f} % |\n")
+
+
+def draw(rows):
+    figure, axes = plt.subplots(figsize=(8.2, 4.8), layout="constrained")
+    faces = [row["faces"] for row in rows]
+    for name, (colour, mark, style, label) in LOOKS.items():
+        if name in rows[0]:
+            times = [1e3 * row[name] for row in rows]
+            axes.plot(faces, times, style, color=colour, marker=mark, markersize=5)
+            axes.text(1.12 * faces[-1], times[-1], label, color=colour, va="center", fontsize=8)
+    axes.set(xscale="log", yscale="log", xlabel="faces of the mesh", ylabel="time, ms")
+    axes.set_xlim(0.85 * faces[0], faces[-1] * (faces[-1] / faces[0]) ** 0.3)
+    axes.set_xticks(faces, [f"{n // 1_000_000}M" if n >= 1_000_000 else f"{n // 1000}k" for n in faces])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_title("Three section curves through a point: tracked, and by cutting the whole mesh")
+    return figure
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("zip", type=Path, metavar="ZIP")
+    parser.add_argument("--quick", action="store_true", help="up to a million faces")
+    options = parser.parse_args()
+    with blender.quiet():
+        extension = blender.start(options.zip)
+        import bpy
+
+        measure(bpy, extension, 1000)  # imports
+        rows = [measure(bpy, extension, faces) for faces in (QUICK_FACES if options.quick else FACES)]
+    if section not in PEERS:
+        print("trimesh is not installed and left out.\n")
+    print_table(rows)
+    header = ["faces", "rays", *(f"{name}, ms" for name in COLUMNS if name in rows[0])]
+    table = [
+        [row["faces"], row["rays"], *(f"{1e3 * row[name]:.4g}" for name in COLUMNS if name in row)]
+        for row in rows
+    ]
+    plot.save(draw(rows), "mesh_size", CAPTION.format(TOUCHES, machine("bpy")), header, table)
+    sys.stdout.flush()
+    os._exit(0)  # Blender as a module may hang at exit
+
+
+if __name__ == "__main__":
+    main()
