@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches on scans of real objects, beside the paper's on its own objects (Table II, Figures 3 and 4).
+"""Patches on scans of real objects.
 
 `python -m benchmarks.scans ZIP`, from the root of a checkout; ZIP is the built extension.
 
@@ -50,17 +50,6 @@ SCANS = (
     Scan("bottle neck", "bottle_bleach.ply", (-0.0341, 0.0128, 0.2233), 0.010, 9, 5e-5, "mm", 1e3),
     Scan("Eros", "asteroid_eros.ply", (2.87, 4.68, 0.09), 3.0, 10, 0.0163, "km", 1.0),
 )
-# The paper's contacts, its mean misses of them and of the mesh vertices in mm.
-PAPER = {
-    ("shell", "tagc"): ("97", "0.2782", "0.2283"),
-    ("shell", "quadratic-variation"): ("97", "0.2420", "0.2391"),
-    ("pear", "tagc"): ("63", "0.0613", "0.0991"),
-    ("pear", "quadratic-variation"): ("63", "0.0664", "0.0946"),
-    ("lemon (pebble)", "tagc"): ("81", "0.0998", "0.1308"),
-    ("lemon (pebble)", "quadratic-variation"): ("81", "0.1065", "0.1327"),
-    ("bottle neck", "tagc"): ("57", "0.0514", "0.130"),
-    ("bottle neck", "least-squares"): ("57", "0.0461", ""),
-}
 
 
 def main():
@@ -104,14 +93,13 @@ def _rows(extension, scan, data):
         reports = [_report(extension, *touched, planes, **lengths, **fit) for _ in range(RUNS + 1)]
         seconds = [report["seconds"] for report in reports[1:]]
         report = reports[0]
-        contacts, fit_error, distance = PAPER.get((scan.name, method), ("", "", ""))
         cells = (
             f"{scan.name}, {scan.scale * scan.extent:g} {scan.unit}",
             method,
-            _beside(f"{report['contacts']}", contacts),
-            _beside(f"{scan.scale * report['fit_error']:.4f}", fit_error),
+            f"{report['contacts']}",
+            f"{scan.scale * report['fit_error']:.4f}",
             f"{report['vertices']}",
-            _beside(f"{scan.scale * report['vertex_distance_mean']:.4f}", distance),
+            f"{scan.scale * report['vertex_distance_mean']:.4f}",
             f"{scan.scale * report['vertex_distance_max']:.3f}",
             f"{1e3 * median(s['track'] + s['fit'] for s in seconds):.1f}",
         )
@@ -178,15 +166,10 @@ def _report(extension, *place, **inputs):
     return touched.report
 
 
-def _beside(ours, paper):
-    return f"{ours} ({paper})" if paper else ours
-
-
 def _caption():
     return (
         "Lengths in mm, of Eros in km; sensor noise 0.05 mm, of Eros 0.0163 km; seed 0; contacts without the "
-        "reference point. In brackets: the paper, on its own objects, where a fit took 10 minutes. "
-        f"ms: tracking and fit, median of {RUNS} runs, {machine('bpy', 'numpy', 'scipy')}."
+        f"reference point. ms: tracking and fit, median of {RUNS} runs, {machine('bpy', 'numpy', 'scipy')}."
     )
 
 

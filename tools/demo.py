@@ -106,7 +106,7 @@ def compose(extension, patch, unit):
             f"standard deviation {std:.1f} %"
         )
         put.text(sentence, -3.3, -2.48, 0.14)
-    _look(scene, bpy.data.objects[report["source"]])
+    look(scene, bpy.data.objects[report["source"]])
 
 
 class _Overlay:
@@ -155,7 +155,7 @@ def _colour_bar(extension, put, limit, unit):
         put.text(f"{share * limit:+.3g}" if share else "0", 2.62, BAR_REACH * share - 0.05, 0.15)
 
 
-def _look(scene, source):
+def look(scene, source):
     """Clay for the mesh, a light background, and colours that reach the file as they are."""
     import bpy
 
