@@ -134,12 +134,12 @@ FRAME_METHODS = [
     _curves("paper", "the paper's section III", accuracy.METHODS[accuracy.QUADRIC]),
     *(_curves(f"jet {d}", "polynomial in the paper's frame, degree", peers.jet, degree=d) for d in (3, 4)),
     *(_mesh(f"igl {r}", "libigl, quadric over so many rings", peers.igl_curvature, "igl", rings=r)
-      for r in (5, 10)),
+      for r in (5, 10, 15)),
     _mesh("meshlab q", f"pymeshlab, {QUADRICS}", peers.meshlab_curvature, "pymeshlab", method=QUADRICS),
     _mesh("meshlab s", f"pymeshlab, Scale Dependent {QUADRICS}", peers.meshlab_curvature, "pymeshlab",
           method=f"Scale Dependent {QUADRICS}"),
-    _mesh("trimesh", "trimesh, ball of half the extent", peers.trimesh_curvature, "trimesh", "rtree",
-          radius=0.5),
+    _mesh("trimesh", "trimesh, ball of two thirds of the extent", peers.trimesh_curvature, "trimesh", "rtree",
+          radius=2.0 / 3.0),
 ]  # fmt: skip
 
 
@@ -415,7 +415,7 @@ def draw_frame(table, methods, bounds, caption):
             normal.set_yticklabels([])
             kappa.axhline(bounds[noise], color="#777777", ls=":", lw=1.2)
             look = {"ha": "center", "va": "bottom", "fontsize": 7, "color": "#555555"}
-            kappa.text(7.0, 1.08 * bounds[noise], "Cramér-Rao", **look)
+            kappa.text(8.0, 1.08 * bounds[noise], "Cramér-Rao", **look)
         else:
             kappa.set_ylabel("larger of the errors of kappa, 1/mm")
             normal.set_ylabel("error of the normal, degrees")
@@ -458,7 +458,7 @@ def captions(methods, quick):
     )
     heights = (
         f"Error: mean |dz| at some {accuracy.HOLD_OUT} points of the true surface. Time: from the contacts "
-        "to the heights there, with the frame. Dashed: Pareto front, given three curves. Grey: off the scale. "
+        "to the heights there, with the frame. Dashed: Pareto front, given three curves. Grey: off scale. "
     )
     frame = (
         "Time: of meshes, for all vertices, and of pymeshlab for two calls, as it gives one kappa a call; "

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What people would use instead: from a case of benchmarks.accuracy to a surface, from a mesh to curvatures.
 
-Those that fit the contacts start from the paper's frame, in unit radius. Where a peer asks for a setting,
-several were tried on the exact surfaces at all three noise levels, and the best is the default here. Optional
-packages are imported where they are used.
+Those that fit the contacts start from the paper's frame, in unit radius. Where one asks for a setting that
+its user would have to find, several were tried on the exact surfaces at all three noise levels, and what came
+out best over these is the default here. Optional packages are imported where they are used.
 """
 
 import warnings
@@ -63,7 +63,7 @@ def radial_basis(case, kernel):
 def moving_least_squares(case, width=0.5):
     """A quadric for each point asked for, weighted by a Gaussian of `width`, in L.
 
-    A width below 0.35 sees one curve at a time, and errs by half as much again or more.
+    Narrow weights see one curve at a time, which carries no quadric.
     """
     r, contacts, _ = _start(case)
     terms = exponents(0, 2)
@@ -99,7 +99,7 @@ def jet(case, degree):
 def smoothing_spline(case, degree=2, misfit=5e-3):
     """FITPACK's surfit, told the noise and a misfit, in L, of its own: without one it adds knots for ever.
 
-    Quadratic: on three lines the cubic spline is 0.1 to 100 mm off.
+    Quadratic: between three lines a cubic spline is as free as a jet.
     """
     from scipy.interpolate import SmoothBivariateSpline
 
