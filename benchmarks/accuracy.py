@@ -13,7 +13,6 @@ frame it found itself (the peers in the paper's). Lengths are in mm, errors in m
 """
 
 import argparse
-import warnings
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -30,6 +29,7 @@ from core.monge import exponents, monomials
 from tests import surfaces
 
 from . import machine
+from .peers import Fit, gaussian_process, jet, radial_basis
 
 # Surfaces and extents of their half curves. The sizes are such that the peers' errors come out like those
 # measured on other surfaces when this fit was planned, so that these are as hard.
@@ -78,15 +78,6 @@ class Case(NamedTuple):
     contours: list
     noise: float
     hold_out: np.ndarray  # (m, 3) on the surface, relative to the point
-
-
-class Fit(NamedTuple):
-    """A fitted surface in its own frame; kappas and height_std where the method has them."""
-
-    axes: np.ndarray
-    height: object
-    kappas: tuple[float, float] | None = None
-    height_std: object = None
 
 
 # What was touched ------------------------------------------------------------------------------------
@@ -201,48 +192,6 @@ def _random_shape(rng, waves=40):
 def ours(case, **options):
     r = reconstruct(case.point, case.contours, outward=case.axes[:, 2], **options)
     return Fit(r.frame.axes, r.patch.height, (r.patch.k1, r.patch.k2), r.height_std)
-
-
-def _start(case):
-    """What the peers start from: the paper's frame and quadric, the contacts there with the point, and L."""
-    r = reconstruct(case.point, case.contours, outward=case.axes[:, 2], method="least-squares", degree=2)
-    return r, np.vstack([np.zeros(3), r.contacts]) / r.radius, r.radius
-
-
-def gaussian_process(case):
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-
-    r, contacts, radius = _start(case)
-    kernel = ConstantKernel(1.0, (1e-4, 1e4)) * Matern(1.0, (0.05, 20.0), nu=2.5)
-    process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-9, 0.1)), normalize_y=True)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of hyperparameters at their bounds
-        process.fit(contacts[:, :2], contacts[:, 2])
-    return Fit(r.frame.axes, lambda x, y: radius * process.predict(np.column_stack([x, y]) / radius))
-
-
-def radial_basis(case, kernel):
-    from scipy.interpolate import RBFInterpolator
-
-    r, contacts, radius = _start(case)
-    surface = RBFInterpolator(contacts[:, :2], contacts[:, 2], kernel=kernel)
-    return Fit(r.frame.axes, lambda x, y: radius * surface(np.column_stack([x, y]) / radius))
-
-
-def jet(case, degree):
-    """All terms by least squares in the paper's frame, as a jet fit does; kappas by the shape operator."""
-    r, contacts, radius = _start(case)
-    terms = exponents(1, degree)
-    x, y, z = contacts.T
-    b = np.linalg.lstsq(monomials(x, y, terms), z, rcond=1e-10)[0]
-    slopes, second = b[:2], np.array([[2.0 * b[2], b[3]], [b[3], 2.0 * b[4]]])
-    first = np.eye(2) + np.outer(slopes, slopes)
-    operator = np.linalg.solve(first, second) / np.sqrt(1.0 + slopes @ slopes)
-    kappas = np.sort(np.linalg.eigvals(operator).real) / radius
-    return Fit(
-        r.frame.axes, lambda x, y: radius * monomials(x / radius, y / radius, terms) @ b, tuple(kappas)
-    )
 
 
 METHODS = {

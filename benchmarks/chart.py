@@ -1,0 +1,483 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Speed against accuracy: each fit of this project, and what else one could take, on the same contacts.
+
+`python -m benchmarks.chart [--quick]`, from the root of a checkout; a peer whose package is missing is left
+out with a word. Writes to build/charts
+
+speed_accuracy.png, .csv        from contacts to the heights of the hold-out: milliseconds and micrometres
+speed_accuracy_frame.png, .csv  normal and principal curvatures at the point: milliseconds, degrees and 1/mm
+
+for the exact surfaces, plane sets and noise levels of benchmarks.accuracy. The methods take turns, case by
+case, in one process on one thread.
+"""
+
+import argparse
+import sys
+from functools import partial
+from importlib.util import find_spec
+from itertools import groupby
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.patheffects import withStroke
+
+from core import SamplingPlane, track
+from core.domain import closed_spline_domain
+from tools import blender
+
+from . import accuracy, machine, peers, plot
+
+QUICK_PLANES = accuracy.EXACT_PLANES[:1]
+SEEDS = 4  # of the noise, in the full run
+RINGS = 25  # of the dense meshes: 1951 vertices
+REPEATED = 0.02  # seconds; a faster method is run three times more, for a median
+LEAST_COVERED = 0.9  # of the hold-out; a surface with less has failed
+DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}  # of modules that are called otherwise
+KAPPA, NORMAL = "kappa 1/mm", "normal degrees"
+LABEL_SIZE = 7.5
+TIME_LIMITS = (0.5, 300.0)  # of the axes
+OFF_SCALE = 400.0  # um; above are only names and values
+HEIGHT_LIMITS, KAPPA_LIMITS, NORMAL_LIMITS = (2.5, 1500.0), (5e-6, 0.3), (4e-4, 30.0)
+
+
+class Method(NamedTuple):
+    """A fit: from a case to a peers.Fit; in the frame's chart, to the normal and both kappas."""
+
+    label: str
+    family: str
+    run: object
+    says: str  # what the label stands for
+    needs: tuple = ()
+    planes: int = 3
+
+
+OURS, PAPER, INTERPOLATION = "bayes: this project's default", "the paper's fits", "interpolation"
+PROCESSES, SPLINES, MESHES = "Gaussian processes", "splines", "meshes"
+CONTACTS = "75 contacts on three curves"
+DENSE = "dense mesh: 1951 vertices with the same noise"
+LOOKS = {
+    OURS: (plot.BLUE, "o"),
+    PAPER: (plot.VERMILION, "s"),
+    INTERPOLATION: (plot.GREEN, "^"),
+    PROCESSES: (plot.PURPLE, "D"),
+    SPLINES: (plot.ORANGE, "v"),
+    MESHES: (plot.BLACK, "X"),
+    CONTACTS: (plot.BLUE, "o"),
+    DENSE: (plot.BLACK, "X"),
+}
+
+
+def _bayes(label, says, planes=3, **options):
+    return Method(label, OURS, partial(accuracy.ours, **options), says, planes=planes)
+
+
+def _paper(label, says, method, **options):
+    return Method(label, PAPER, partial(accuracy.ours, method=method, **options), says)
+
+
+def _powers(label, method, weights, says, **options):
+    return [
+        _paper(f"{label} {w:.0e}".replace("e+0", "e"), says, method, weight=w, **options) for w in weights
+    ]
+
+
+def _peer(label, family, says, fit, *needs, **options):
+    return Method(label, family, partial(fit, **options), says, needs)
+
+
+METHODS = [
+    *(_bayes(f"d{d}", "degree", degree=d) for d in (2, 3, 4, 6)),
+    _bayes("auto", "degree by evidence", degree="auto"),
+    *(_bayes(f"{m} planes", "degree 4, from more contacts (hollow)", planes=m, degree=4) for m in (4, 5)),
+    *_powers("TAGC", "tagc", (1e2, 1e3, 1e4), "total |K|, weight; by L-BFGS"),
+    *_powers("desc.", "tagc", (1e2, 1e3, 1e4), "the same by steepest descent", solver="descent"),
+    *_powers("QV", "quadratic-variation", (1e3, 1e5), "quadratic variation, weight"),
+    _paper("LS", "least squares, degree 4", "least-squares"),
+    _paper("quadric", "frame and curvatures alone", "least-squares", degree=2),
+    _peer("RBF tp", INTERPOLATION, "scipy, thin plate", peers.radial_basis, kernel="thin_plate_spline"),
+    _peer("RBF cubic", INTERPOLATION, "scipy", peers.radial_basis, kernel="cubic"),
+    _peer("MLS", INTERPOLATION, "moving least squares, quadrics", peers.moving_least_squares),
+    *(_peer(f"jet {d}", INTERPOLATION, "one free polynomial, degree", peers.jet, degree=d) for d in (3, 4)),
+    _peer("GP Matérn", PROCESSES, "scikit-learn, nu = 5/2", peers.gaussian_process, "sklearn"),
+    _peer("GP RBF", PROCESSES, "squared exponential", peers.gaussian_process, "sklearn", nu=np.inf),
+    _peer("spline", SPLINES, "scipy, SmoothBivariateSpline", peers.smoothing_spline),
+    _peer("NURBS", SPLINES, "geomdl, rings by half curves", peers.nurbs, "geomdl"),
+    _peer("Poisson+n", MESHES, "pymeshlab, told the true normals", peers.screened_poisson, "pymeshlab",
+          true_normals=True),
+    _peer("Poisson", MESHES, "normals estimated from the contacts", peers.screened_poisson, "pymeshlab",
+          true_normals=False),
+]  # fmt: skip
+
+
+def _curves(label, says, fit, **options):
+    def of(touch):
+        found = fit(touch.case, **options)
+        return found.axes[:, 2], found.kappas
+
+    return Method(label, CONTACTS, of, says)
+
+
+def _mesh(label, says, curvature, *needs, radius=None, **options):
+    def of(touch):
+        given = options if radius is None else {"radius": radius * touch.extent}
+        return curvature(touch.vertices, touch.triangles, **given)
+
+    return Method(label, DENSE, of, says, needs)
+
+
+QUADRICS = "Quadric Fitting"
+FRAME_METHODS = [
+    _curves("bayes", "this project's default", accuracy.ours),
+    _curves("paper", "the paper's section III", accuracy.METHODS[accuracy.QUADRIC]),
+    *(_curves(f"jet {d}", "polynomial in the paper's frame, degree", peers.jet, degree=d) for d in (3, 4)),
+    *(_mesh(f"igl {r}", "libigl, quadric over so many rings", peers.igl_curvature, "igl", rings=r)
+      for r in (5, 10, 15)),
+    _mesh("meshlab q", f"pymeshlab, {QUADRICS}", peers.meshlab_curvature, "pymeshlab", method=QUADRICS),
+    _mesh("meshlab s", f"pymeshlab, Scale Dependent {QUADRICS}", peers.meshlab_curvature, "pymeshlab",
+          method=f"Scale Dependent {QUADRICS}"),
+    _mesh("trimesh", "trimesh, ball of two thirds of the extent", peers.trimesh_curvature, "trimesh", "rtree",
+          radius=2.0 / 3.0),
+]  # fmt: skip
+
+
+class Touch(NamedTuple):
+    """A case, the contours of more planes through its point, and the true surface around as a mesh."""
+
+    case: accuracy.Case
+    contours: dict  # by number of planes
+    vertices: np.ndarray  # the point first
+    triangles: np.ndarray
+    extent: float  # of the half curves
+
+
+class Result(NamedTuple):
+    label: str
+    noise: float
+    ms: float
+    errors: tuple  # nan where it failed
+
+
+# Measurement -----------------------------------------------------------------------------------------
+
+
+def touch_of(name, planes, noise, seed):
+    surface, extent = accuracy.SURFACES[name]
+    number = 1000 * seed + list(accuracy.SURFACES).index(name)
+    case = accuracy.exact_case(name, planes, noise, number)
+    contours = {3: case.contours}
+    lengths = {"extent": extent, "step": extent / accuracy.STEPS, "tangent": case.axes[:, 0], "noise": noise}
+    for count in (4, 5):
+        azimuths = np.pi * np.arange(count) / count + np.radians(accuracy.TURN)
+        sampling = [SamplingPlane(azimuth) for azimuth in azimuths]
+        contours[count] = track(surface, case.point, case.axes[:, 2], sampling, rng=number, **lengths)
+    ends = np.vstack([contour.points[[0, -1]] for contour in case.contours]) - case.point
+    flat, triangles = closed_spline_domain((ends @ case.axes)[:, :2], extent).triangulation(RINGS)
+    vertices = accuracy._above(surface, case.axes, case.kappas, flat)
+    offsets = np.random.default_rng(number).normal(0.0, noise, len(vertices))
+    offsets[0] = 0.0  # the point is exact, as in the contours
+    return Touch(case, contours, vertices + np.outer(offsets, case.axes[:, 2]), triangles, extent)
+
+
+def fit_result(method, touch):
+    """Seconds, and the mean |dz| (um) over the covered part of the hold-out, which must be most of it."""
+    case = touch.case._replace(contours=touch.contours[method.planes])
+
+    def heights():
+        fit = method.run(case)
+        x, y, z = (case.hold_out @ fit.axes).T
+        return fit.height(x, y) - z
+
+    seconds, miss = timed(heights)
+    covered = np.isfinite(miss)
+    return seconds, (1e3 * np.abs(miss[covered]).mean() if covered.mean() >= LEAST_COVERED else np.nan,)
+
+
+def frame_result(method, touch):
+    """Seconds, the larger error of the kappas (1/mm), the normal's (degrees)."""
+    seconds, (normal, kappas) = timed(lambda: method.run(touch))
+    axis = touch.case.axes[:, 2]
+    angle = np.arctan2(np.linalg.norm(np.cross(normal, axis)), normal @ axis)
+    return seconds, (np.abs(np.subtract(kappas, touch.case.kappas)).max(), np.degrees(angle))
+
+
+def timed(run):
+    """Seconds of a run, the median of three more where it is quick, and what it returned."""
+    start = perf_counter()
+    found = run()
+    seconds = [perf_counter() - start]
+    if seconds[0] < REPEATED:
+        seconds = []
+        for _ in range(3):
+            start = perf_counter()
+            run()
+            seconds.append(perf_counter() - start)
+    return float(np.median(seconds)), found
+
+
+def measure(methods, result, errors, touch):
+    """The results of all methods on one touch; an exception is a failure."""
+    for method in methods:
+        try:
+            seconds, found = result(method, touch)
+        except Exception as problem:  # whatever a peer raises where it can give nothing
+            print(f"{method.label}: {problem}", file=sys.stderr)
+            seconds, found = np.nan, (np.nan,) * errors
+        yield Result(method.label, touch.case.noise, 1e3 * seconds, found)
+
+
+def available(methods):
+    missing = {module for method in methods for module in method.needs if find_spec(module) is None}
+    for module in sorted(missing):
+        out = ", ".join(method.label for method in methods if module in method.needs)
+        print(f"{DISTRIBUTIONS.get(module, module)} is not installed: {out} left out")
+    return [method for method in methods if not missing & set(method.needs)]
+
+
+def rows_of(methods, results, measures):
+    """The table: a row for each method and noise, medians and quartiles of the cases that did not fail."""
+    head = ["method", "family", "meaning", "noise mm", "planes", "cases", "failed share"]
+    head += [f"{measure} {part}" for measure in ("ms", *measures) for part in ("q1", "median", "q3")]
+    rows = []
+    for noise in accuracy.NOISES:
+        for method in methods:
+            of = [(r.ms, *r.errors) for r in results if (r.label, r.noise) == (method.label, noise)]
+            good = [values for values in of if np.isfinite(values).all()] or [np.full(len(of[0]), np.nan)]
+            failed = np.mean([not np.isfinite(values).all() for values in of])
+            quartiles = np.quantile(good, (0.25, 0.5, 0.75), axis=0).T.ravel()
+            of_what = [method.label, method.family, method.says, noise, method.planes, len(of)]
+            rows.append([*of_what, round(failed, 3), *(float(f"{value:.4g}") for value in quartiles)])
+    return head, rows
+
+
+# Drawing ---------------------------------------------------------------------------------------------
+
+
+class Mark(NamedTuple):
+    """A method in a panel: quartiles of time and of error."""
+
+    label: str
+    family: str
+    more: bool  # data than the others have
+    x: tuple
+    y: tuple
+
+
+def marks_of(table, noise, measure):
+    """Of those that did not always fail."""
+    head, rows = table
+    time, error = (head.index(f"{what} q1") for what in ("ms", measure))
+    return [
+        Mark(row[0], row[1], row[4] > 3, row[time : time + 3], row[error : error + 3])
+        for row in rows
+        if row[3] == noise and np.isfinite(row[time])
+    ]
+
+
+def panel(axes, marks, noise, limits, off_scale=np.inf):
+    """Marks with their quartiles and labels; those off the scale are in a band at the top, with values."""
+    axes.set(xscale="log", yscale="log", xlim=TIME_LIMITS, ylim=limits)
+    axes.set_title(f"noise {noise:g} mm" if noise else "no noise")
+    for ticks in (axes.xaxis, axes.yaxis):
+        ticks.set_major_formatter(lambda value, _: f"{value:g}" if value < off_scale else "")
+    texts, places, beyond = [], [], 0
+    for mark in marks:
+        colour, shape = LOOKS[mark.family]
+        x, y, text = mark.x[1], mark.y[1], mark.label
+        if y > off_scale:
+            text = f"{text} ↑ {y / 1e3:.1f} mm" if y < 1e4 else f"{text} ↑ {y / 1e3:.0f} mm"
+            y, beyond = limits[1] * 0.84 * 0.7**beyond, beyond + 1
+        else:
+            axes.plot([x, x], mark.y[::2], color=colour, lw=0.8, alpha=0.35, zorder=2)
+            axes.plot(mark.x[::2], [y, y], color=colour, lw=0.8, alpha=0.35, zorder=2)
+        face, edge = ("white", colour) if mark.more else (colour, "white")
+        axes.plot(x, y, shape, mfc=face, mec=edge, ms=7.0, mew=0.8, zorder=3)
+        places.append((x, y))
+        texts.append((text, dark(colour)))
+    if beyond:
+        axes.axhspan(off_scale, limits[1], color="#f3f3f3", zorder=0)
+    label(axes, texts, np.array(places))
+
+
+def dark(colour):
+    """For text, which is thinner than a mark."""
+    return tuple(0.72 * part for part in to_rgb(colour))
+
+
+def pareto(axes, marks):
+    """Steps along the methods, of the same data and on the scale, that none beats in both time and error."""
+    best, front = np.inf, []
+    for mark in sorted((m for m in marks if not m.more and m.y[1] <= OFF_SCALE), key=lambda m: m.x[1]):
+        if mark.y[1] < best:
+            best = mark.y[1]
+            front.append((mark.x[1], best))
+    x, y = zip(*front, (axes.get_xlim()[1], best), strict=True)
+    axes.plot(x, y, drawstyle="steps-post", color="#999999", lw=1.2, ls="--", zorder=1)
+
+
+def label(axes, texts, places):
+    """Texts beside their places, joined to them by a line where it is seen."""
+    line = {"arrowstyle": "-", "lw": 0.4, "shrinkA": 0, "shrinkB": 2}
+    look = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": LABEL_SIZE}
+    halo = [withStroke(linewidth=1.8, foreground="white")]
+    moves = _moves(axes, [text for text, _ in texts], places)
+    for (text, colour), place, move in zip(texts, places, moves, strict=True):
+        arrow = {**line, "color": colour}
+        axes.annotate(text, place, move, color=colour, arrowprops=arrow, path_effects=halo, zorder=4, **look)
+
+
+def _moves(axes, texts, places):
+    """From the places to the centres of their texts, in points, so that these cover little else.
+
+    Each text in turn, four times over, takes the nearest of 80 positions that overlaps least.
+    """
+    to_points = 72.0 / axes.figure.dpi
+    marks = axes.transData.transform(places) * to_points
+    frame = np.array(axes.get_window_extent().extents) * to_points
+    sizes = LABEL_SIZE * np.array([(0.58 * len(text) + 0.3, 1.15) for text in texts])
+    turns = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    rings = np.array([[r, a] for r in (0.0, 5.0, 11.0, 18.0, 26.0) for a in turns])
+    directions = np.column_stack([np.cos(rings[:, 1]), np.sin(rings[:, 1])])
+    centres = marks.copy()
+    for _ in range(4):
+        for i, size in enumerate(sizes):
+            spots = marks[i] + directions * (size / 2.0 + 4.5 + rings[:, :1])
+            others = np.arange(len(sizes)) != i
+            cost = 3.0 * _overlap(spots, size, centres[others], sizes[others])
+            cost += 2.0 * _overlap(spots, size, marks, np.full(marks.shape, 7.0)) + rings[:, 0]
+            outside = np.maximum(frame[:2] - (spots - size / 2.0), spots + size / 2.0 - frame[2:])
+            centres[i] = spots[np.argmin(cost + 50.0 * np.maximum(outside, 0.0).sum(axis=1))]
+    return centres - marks
+
+
+def _overlap(spots, size, centres, sizes):
+    """The area of a box at each spot (m, 2) that other boxes cover."""
+    apart = np.abs(spots[:, None] - centres)
+    return np.prod(np.maximum((size + sizes) / 2.0 - apart, 0.0), axis=2).sum(axis=1)
+
+
+def key(axes, methods, columns=False):
+    """What the labels stand for, family by family: below each other, or in columns."""
+    axes.axis("off")
+    families = [(family, list(of)) for family, of in groupby(methods, key=lambda method: method.family)]
+    lines = []
+    for i, (family, of) in enumerate(families):
+        line = 0 if columns else len(lines)
+        lines.append((i, line, family, family))
+        for j, (says, same) in enumerate(groupby(of, key=lambda method: method.says), 1):
+            lines.append((i, line + j, family, f"{_listed([method.label for method in same])}: {says}"))
+    height = 1.0 / (1 + max(line for _, line, _, _ in lines))
+    for i, line, family, text in lines:
+        (colour, shape), heading = LOOKS[family], text == family
+        x, y = i / len(families) if columns else 0.0, 1.0 - (line + 0.5) * height
+        look = {"color": dark(colour), "weight": "bold" if heading else "normal", "fontsize": 8}
+        axes.text(x + 0.04, y, text, transform=axes.transAxes, va="center", **look)
+        if heading:
+            axes.plot(x + 0.01, y, shape, color=colour, ms=7.0, transform=axes.transAxes, clip_on=False)
+
+
+def _listed(labels):
+    """TAGC 1e2, 1e3: what all begin with is said once."""
+    first = labels[0].split()[0] + " "
+    return ", ".join([labels[0], *(text.removeprefix(first) for text in labels[1:])])
+
+
+def draw_heights(table, methods, caption):
+    figure, grid = plot.plt.subplots(2, 2, figsize=(8.6, 8.6))
+    figure.subplots_adjust(left=0.07, right=0.99, top=0.92, bottom=0.07, hspace=0.22, wspace=0.13)
+    figure.suptitle("Surface patches from three curves: speed and accuracy", fontsize=12, weight="bold")
+    for axes, noise in zip(grid.flat, accuracy.NOISES, strict=False):
+        marks = marks_of(table, noise, "um")
+        panel(axes, marks, noise, HEIGHT_LIMITS, OFF_SCALE)
+        pareto(axes, marks)
+        axes.set_xlabel("time, ms")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("error of the height, µm")
+    key(grid[1, 1], methods)
+    plot.save(figure, "speed_accuracy", caption, *table)
+
+
+def draw_frame(table, methods, bounds, caption):
+    """bounds : of Cramér and Rao on the error of kappa, by noise"""
+    figure = plot.plt.figure(figsize=(8.6, 7.4))
+    edges = {"left": 0.08, "right": 0.99, "top": 0.9, "bottom": 0.02}
+    grid = figure.add_gridspec(3, 3, height_ratios=(1, 1, 0.34), hspace=0.34, wspace=0.08, **edges)
+    figure.suptitle("Normal and curvatures at the point: speed and accuracy", fontsize=12, weight="bold")
+    for j, noise in enumerate(accuracy.NOISES):
+        kappa, normal = (figure.add_subplot(grid[i, j]) for i in (0, 1))
+        panel(kappa, marks_of(table, noise, KAPPA), noise, KAPPA_LIMITS)
+        panel(normal, marks_of(table, noise, NORMAL), noise, NORMAL_LIMITS)
+        normal.set_xlabel("time, ms")
+        if j:
+            kappa.set_yticklabels([])
+            normal.set_yticklabels([])
+            kappa.axhline(bounds[noise], color="#777777", ls=":", lw=1.2)
+            look = {"ha": "center", "va": "bottom", "fontsize": 7, "color": "#555555"}
+            kappa.text(8.0, 1.08 * bounds[noise], "Cramér-Rao", **look)
+        else:
+            kappa.set_ylabel("larger of the errors of kappa, 1/mm")
+            normal.set_ylabel("error of the normal, degrees")
+    key(figure.add_subplot(grid[2, :]), methods, columns=True)
+    plot.save(figure, "speed_accuracy_frame", caption, *table)
+
+
+# Command ---------------------------------------------------------------------------------------------
+
+
+def touches(quick):
+    for name in accuracy.SURFACES:
+        for planes in QUICK_PLANES if quick else accuracy.EXACT_PLANES:
+            for noise in accuracy.NOISES:
+                for seed in range(SEEDS if noise and not quick else 1):
+                    yield touch_of(name, planes, noise, seed)
+
+
+def measured(methods, frame_methods, quick):
+    """The results of both charts, and medians of the Cramér-Rao bound by noise."""
+    heights, frames, bounds = [], [], {noise: [] for noise in accuracy.NOISES}
+    with blender.quiet():  # one of MeshLab's filters prints
+        for i, touch in enumerate([touch_of("pear", QUICK_PLANES[0], 0.02, 0), *touches(quick)]):
+            of_heights = list(measure(methods, fit_result, 1, touch))
+            of_frames = list(measure(frame_methods, frame_result, 2, touch))
+            if i:  # the first is to warm up
+                heights += of_heights
+                frames += of_frames
+                bounds[touch.case.noise].append(accuracy.cramer_rao(touch.case))
+    return heights, frames, {noise: float(np.median(of)) for noise, of in bounds.items()}
+
+
+def captions(methods, quick):
+    modules = {module for method in methods for module in method.needs}
+    packages = sorted(DISTRIBUTIONS.get(module, module) for module in modules)
+    sets, seeds = (1, 1) if quick else (len(accuracy.EXACT_PLANES), SEEDS)
+    cases = (
+        f"Medians and quartiles over {len(accuracy.SURFACES)} exact surfaces, patches of 24 to 30 mm, plane "
+        f"sets ({sets}) and seeds of the noise ({seeds}); all methods in turns, after a warm-up. "
+    )
+    heights = (
+        f"Error: mean |dz| at some {accuracy.HOLD_OUT} points of the true surface. Time: from the contacts "
+        "to the heights there, with the frame. Dashed: Pareto front, given three curves. Grey: off scale. "
+    )
+    frame = (
+        "Time: of meshes, for all vertices, and of pymeshlab for two calls, as it gives one kappa a call; "
+        "their normals are the vertex's. Cramér-Rao: of unbiased fits of degree 4 to the contacts. "
+    )
+    known = f"On {machine('numpy', 'scipy', *packages)}."
+    return cases + heights + known, cases + frame + known
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="one plane set and seed")
+    options = parser.parse_args()
+    methods, frame_methods = available(METHODS), available(FRAME_METHODS)
+    heights, frames, bounds = measured(methods, frame_methods, options.quick)
+    of_heights, of_frame = captions([*methods, *frame_methods], options.quick)
+    draw_heights(rows_of(methods, heights, ["um"]), methods, of_heights)
+    draw_frame(rows_of(frame_methods, frames, [KAPPA, NORMAL]), frame_methods, bounds, of_frame)
+
+
+if __name__ == "__main__":
+    main()
