@@ -92,7 +92,7 @@ METHODS = [
     *(_bayes(f"d{d}", "degree", degree=d) for d in (2, 3, 4, 6)),
     _bayes("auto", "degree by evidence", degree="auto"),
     *(_bayes(f"{m} planes", "degree 4, from more contacts (hollow)", planes=m, degree=4) for m in (4, 5)),
-    *_powers("TAGC", "tagc", (1e2, 1e3, 1e4), "total |K|, weight; by L-BFGS"),
+    *_powers("TAGC", "tagc", (1e2, 1e3, 1e4), "total |K|, weight; by Newton"),
     *_powers("desc.", "tagc", (1e2, 1e3, 1e4), "the same by steepest descent", solver="descent"),
     *_powers("QV", "quadratic-variation", (1e3, 1e5), "quadratic variation, weight"),
     _paper("LS", "least squares, degree 4", "least-squares"),

@@ -133,7 +133,8 @@ def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Po
         weights = np.where(level[:, None], _student_weights(residuals, weights > 0.0, touches.floor), weights)
         settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED)
     if settled.any():
-        posterior = _posterior(mean, system, hyper).at(settled).turned(angle[settled])
+        which = slice(None) if settled.all() else settled
+        posterior = _posterior(mean, system, hyper).at(which).turned(angle[which])
         posterior.mean[:, [0, 1, 3]] = 0.0
         posterior.mean[:, 2], posterior.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
     return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, posterior

@@ -118,18 +118,19 @@ def curves_through(r: Array, present: NDArray[np.bool_]) -> Curves:
 
 
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
-    """t and r'' of r = t s + r'' s^2 / 2 by least squares, (..., 3) each, from (..., k) and (..., k, 3).
+    """t and r'' of r = t s + r'' s^2 / 2 by least squares, (c, 3) each, from (c, k) and (c, k, 3).
 
     Where all s are one the two cannot be told apart: then the shortest solution.
     """
-    half = 0.5 * s**2
-    a, b, d = np.sum(s * s, axis=-1), np.sum(s * half, axis=-1), np.sum(half * half, axis=-1)
-    det, trace = a * d - b * b, a + d
-    alike = det <= 1e-13 * trace**2
-    inverse = np.where(alike, [a, b, d], [d, -b, a]) / np.where(alike, np.maximum(trace**2, 1e-300), det)
-    sr, hr = (np.einsum("...k,...ki->...i", weights, r) for weights in (s, half))
-    ss, sh, hh = inverse[..., None]
-    return ss * sr + sh * hr, sh * sr + hh * hr
+    powers = np.stack([s, 0.5 * s * s], axis=1)
+    gram = powers @ np.swapaxes(powers, 1, 2)
+    a, b, d = gram[:, 0, 0], gram[:, 0, 1], gram[:, 1, 1]
+    det, square = a * d - b * b, np.maximum((a + d) ** 2, 1e-300)
+    alike = det <= 1e-13 * square
+    adjugate = np.array([[d, -b], [-b, a]]).transpose(2, 0, 1)
+    inverse = np.where(alike[:, None, None], gram, adjugate) / np.where(alike, square, det)[:, None, None]
+    solution = inverse @ (powers @ r)
+    return solution[:, 0], solution[:, 1]
 
 
 def surface_normals(tangents: Array, outward: Array) -> Array:
@@ -149,12 +150,13 @@ def principal_curvatures(
     in unit radius) d1 is at angle 0.
     """
     phi, kappa = np.asarray(angles, dtype=float), np.asarray(curvatures, dtype=float)
-    rows = known * np.array([np.ones_like(phi), np.cos(2.0 * phi), np.sin(2.0 * phi)])
-    seen, kappa = np.einsum("i...c,j...c->...ij", rows, rows), known * kappa
-    solution = np.linalg.solve(seen, np.einsum("i...c,...c->...i", rows, kappa)[..., None])
+    rows = np.stack(
+        [known * np.ones_like(phi), known * np.cos(2.0 * phi), known * np.sin(2.0 * phi)], axis=-2
+    )
+    solution = np.linalg.solve(rows @ np.swapaxes(rows, -1, -2), rows @ kappa[..., None])
     mean, a, b = solution[..., 0, 0], solution[..., 1, 0], solution[..., 2, 0]
     half = np.hypot(a, b)
-    umbilic = half <= UMBILIC * np.maximum(1.0, np.abs(kappa).max(axis=-1))
+    umbilic = half <= UMBILIC * np.maximum(1.0, np.abs(known * kappa).max(axis=-1))
     return mean - half, mean + half, np.where(umbilic, 0.0, 0.5 * np.arctan2(-b, -a))
 
 

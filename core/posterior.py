@@ -35,7 +35,7 @@ class Posterior(NamedTuple):
     noise: Array
     visibility: Array
 
-    def at(self, index: int | NDArray[np.bool_]) -> "Posterior":
+    def at(self, index: int | slice | NDArray[np.bool_]) -> "Posterior":
         """One of the stack, or several."""
         return Posterior(*(values[index] for values in self))
 

@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the time of a fit goes, what its solvers gain, and what fitting many at once gains.
+
+`python -m benchmarks.speed`, from the root of a checkout. On the touches of benchmarks.accuracy (eleven exact
+surfaces, three plane sets, three noise levels, 75 contacts) it prints Markdown tables:
+
+(a) the minimisation of (9), by Newton's method, by scipy's L-BFGS-B from the same start and on the same grid,
+    and by the paper's steepest descent from the paper's start;
+(b) fits a second, one by one and by core.reconstruct_many;
+(c) the parts of one fit.
+"""
+
+from statistics import median
+from time import perf_counter
+from typing import NamedTuple
+from unittest.mock import patch
+
+import numpy as np
+from scipy.optimize import minimize
+
+from core import Domain, bayes, reconstruct, reconstruct_many, reconstruction, tagc
+
+from . import accuracy, machine
+
+WITHIN = 1e-6  # of an objective
+TIGHT = {"maxiter": 1000, "ftol": 1e-12, "gtol": 1e-9}
+WEIGHT = 1000.0
+COPIES = 7  # of the touches, for (b)
+RUNS = 5
+
+
+class Minimum(NamedTuple):
+    seconds: float
+    value: float
+
+
+def touches():
+    return [
+        accuracy.exact_case(name, planes, noise, i)
+        for i, name in enumerate(accuracy.SURFACES)
+        for planes in accuracy.EXACT_PLANES
+        for noise in accuracy.NOISES
+    ]
+
+
+def fit(case, **options):
+    return reconstruct(case.point, case.contours, outward=case.axes[:, 2], **options)
+
+
+def timed(run, *arguments):
+    start = perf_counter()
+    value = run(*arguments)
+    return perf_counter() - start, value
+
+
+# (a) -------------------------------------------------------------------------------------------------
+
+
+def problem(case):
+    """The objective of a touch as its fit has it, and the paper's start."""
+    starts = []
+
+    def caught(objective, start):
+        starts.append(start)
+        return start, True
+
+    with patch.object(tagc, "descent_minimum", caught):
+        r = fit(case, method="tagc", solver="descent", weight=WEIGHT)
+    unit = Domain(r.domain.ends / r.radius)
+    return tagc.Objective(r._problem, unit, WEIGHT), starts[0]
+
+
+def minima(case):
+    """By solver and start; of a touch."""
+    objective, papers = problem(case)
+
+    def value_and_gradient(a):
+        at = objective.fields(a)
+        return objective.value(at), objective.gradient(at)
+
+    def general(start):
+        options = {"jac": True, "method": "L-BFGS-B", "options": TIGHT}
+        return minimize(value_and_gradient, start, **options).x, True
+
+    def found(solver, *start):
+        seconds, (a, _) = timed(solver, *start)
+        return Minimum(seconds, objective.value(objective.fields(a)))
+
+    quadric = np.zeros_like(papers)
+    return {
+        "Newton": found(tagc.newton_minimum, objective, quadric),
+        "L-BFGS-B (scipy), same start": found(general, quadric),
+        "Newton, the paper's start": found(tagc.newton_minimum, objective, papers),
+        "steepest descent, the paper's start": found(tagc.descent_minimum, objective, papers),
+    }
+
+
+def solvers(cases):
+    runs = [minima(case) for case in cases]
+    newton, general, elsewhere, descent = runs[0]
+    lower, same, higher, another = [], [], [], []
+    for run in runs:
+        ours, theirs = run[newton].value, run[general].value
+        change = (ours - theirs) / max(theirs, 1e-12)
+        (lower if change < -WITHIN else higher if change > WITHIN else same).append(change)
+        if run[elsewhere].value < ours * (1.0 - WITHIN):
+            another.append(1.0 - run[elsewhere].value / ours)
+    slow = median(run[descent].seconds for run in runs)
+    print(f"(a) Minima of (9), weight {WEIGHT:g}, 600 grid points, {len(cases)} touches: medians.\n")
+    rows = []
+    for name in runs[0]:
+        seconds = median(run[name].seconds for run in runs)
+        mean = np.mean([run[name].value for run in runs])
+        rows.append([name, f"{1e3 * seconds:.1f}", f"{slow / seconds:.1f}", f"{mean:.4f}"])
+    accuracy.table(["solver", "ms", "times as fast as the descent", "mean objective"], rows)
+    print(
+        f"Newton against L-BFGS-B: within {WITHIN:g} of it in {len(same)} of {len(cases)}, lower in "
+        f"{len(lower)}, higher, in another minimum, in {len(higher)}. From the paper's start Newton finds a "
+        f"lower minimum in {len(another)}, by {100 * median(another or [0.0]):.1f} % in the median.\n"
+    )
+
+
+# (b) -------------------------------------------------------------------------------------------------
+
+
+def many(cases):
+    copies = COPIES * cases
+    points, outward = (
+        np.array([get(c) for c in copies]) for get in (lambda c: c.point, lambda c: c.axes[:, 2])
+    )
+    contours = [c.contours for c in copies]
+    runs = []
+    for _ in range(RUNS):
+        seconds, stacked = timed(lambda: reconstruct_many(points, contours, outward=outward))
+        alone, single = timed(lambda: [fit(case) for case in copies])
+        runs.append((len(copies) / seconds, len(copies) / alone))
+    off = max(_departure(a, b) for a, b in zip(stacked, single, strict=True))
+    at_once, one_by_one = np.median(runs, axis=0)
+    print(f"(b) {len(copies)} fits of the default.\n")
+    rows = [["reconstruct", f"{one_by_one:.0f}"], ["reconstruct_many", f"{at_once:.0f}"]]
+    accuracy.table(["", "fits a second"], rows)
+    print(f"The heights of the two differ by {off:.1g} of the radius at most.\n")
+
+
+def _departure(one, other):
+    x, y = one.contacts[:, :2].T
+    return np.abs(one.patch.height(x, y) - other.patch.height(x, y)).max() / one.radius
+
+
+# (c) -------------------------------------------------------------------------------------------------
+
+PARTS = {
+    "curves through the point": (reconstruction, "curves_through"),
+    "Darboux frame": (reconstruction, "darboux_frames"),
+    "contacts' equations and QR": (bayes, "_system"),
+    "waviness and noise": (bayes, "_evidence"),
+    "posterior": (bayes, "_posterior"),
+    "patch and domain": (reconstruction, "_result"),
+}
+
+
+def parts(cases):
+    spent, totals = {name: [] for name in PARTS}, []
+
+    def clocked(inner, name):
+        def run(*arguments):
+            seconds, value = timed(inner, *arguments)
+            spent[name][-1] += seconds
+            return value
+
+        return run
+
+    for case in cases:
+        for times in spent.values():
+            times.append(0.0)
+        patches = [patch.object(m, f, clocked(getattr(m, f), name)) for name, (m, f) in PARTS.items()]
+        for each in patches:
+            each.start()
+        totals.append(timed(lambda case=case: fit(case))[0])
+        for each in patches:
+            each.stop()
+    print("(c) One fit of the default: medians in ms.\n")
+    rows = [[name, f"{1e3 * median(times):.2f}"] for name, times in spent.items()]
+    accuracy.table(["part", "ms"], [*rows, ["all", f"{1e3 * median(totals):.2f}"]])
+
+
+def main():
+    cases = touches()
+    for case in cases:
+        fit(case)
+    solvers(cases)
+    many(cases)
+    parts(cases)
+    print(f"{machine('numpy', 'scipy')}.")
+
+
+if __name__ == "__main__":
+    main()
