@@ -331,7 +331,7 @@ def _between_the_curves(measured):
     nearest = min(LEANS, key=lambda lean: abs(np.log(off[lean] / paper.nine)))
     yield "**No constraint.** A polynomial along three lines shows three numbers of each degree, so planes"
     yield "through one line show three of the four cubic coefficients and three of the five quartic ones. The"
-    yield "other three come from how far the planes lean from the normal as it is found, and nothing else:"
+    yield "other three come from how far the planes lean from the normal as it is found:"
     yield f"off by {', '.join(f'{off[lean]:.3g} mm ({_degrees(lean)})' for lean in LEANS)}."
     yield f"The paper's {paper.nine} mm is nearest to {_degrees(nearest)}; its planes are vertical, and it"
     yield "does not tell how far from the normal that is. The total absolute curvature of the upright fit is"
@@ -398,7 +398,7 @@ def _time(neck):
     runs = [[fitted(neck, TAGC, seed, solver=s).milliseconds for s in core.SOLVERS] for seed in range(SEEDS)]
     quick, descent = np.median(runs, axis=0)
     share = round(6e4 * PAPER_MINUTES / descent, -3)
-    yield f"**Time.** The paper's steepest descent takes {descent:.0f} ms here, L-BFGS {quick:.0f} ms,"
+    yield f"**Time.** The paper's steepest descent takes {descent:.0f} ms here, Newton's {quick:.0f} ms,"
     yield f"against {PAPER_MINUTES:.0f} minutes: the former 1/{share:.0f} of it."
 
 

@@ -153,8 +153,9 @@ def _departure(one, other):
 PARTS = {
     "curves through the point": (reconstruction, "curves_through"),
     "Darboux frame": (reconstruction, "darboux_frames"),
-    "contacts' equations and QR": (bayes, "_system"),
-    "waviness and noise": (bayes, "_evidence"),
+    "equations of the contacts": (bayes, "_system"),
+    "their QR": (bayes, "restricted"),
+    "waviness and noise": (bayes, "evidence"),
     "posterior": (bayes, "_posterior"),
     "patch and domain": (reconstruction, "_result"),
 }

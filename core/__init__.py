@@ -10,7 +10,8 @@ from .domain import Domain
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import azimuth_of, suggest_plane
-from .reconstruction import METHODS, SOLVERS, Reconstruction, reconstruct, reconstruct_many
+from .reconstruction import METHODS, SOLVERS, reconstruct, reconstruct_many
+from .result import Reconstruction
 from .tracking import Contour, SamplingPlane, Surface, track
 from .verification import distances, fit_error, overlapped
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The accurate fit: one Bayesian linear solve for everything at once, which knows what it cannot see.
 
-Of many touches at once, for most of the time goes into calling numpy and not into what it does.
-
 Beside the paper. Near the reference point the surface is taken for a polynomial of degree 6, in unit
 radius and in its Darboux frame. Slopes and second derivatives are free. The coefficient a_ij of a
 higher degree is a length^(1 - i - j): where the curvature changes over a length l it has the size
@@ -12,7 +10,9 @@ l^(1 - i - j), so its prior is
     a_ij ~ N(m_ij, (waviness^(i + j - 1) / 10)^2)    with waviness = L / l.
 
 m are the quartic and sextic of a surface that goes on with the curvatures it has at the point. The
-waviness and the noise of the contacts follow from their marginal likelihood on a grid.
+waviness and the noise of the contacts follow from their marginal likelihood (evidence.py).
+
+All functions fit b touches at once: of one, most of the time goes into calling numpy.
 """
 
 import math
@@ -22,18 +22,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import Array
+from .evidence import (
+    SCALE,
+    USUAL_WAVINESS,
+    Hyperparameters,
+    Restricted,
+    evidence,
+    noises,
+    prior_variances,
+    restricted,
+)
 from .monge import MongePatch, monomials
-from .posterior import FREE, ORDERS, TERMS, Posterior
+from .posterior import FREE, TERMS, Posterior
 from .tracking import cross
 
-POWERS = ORDERS[FREE:] - 1.0  # of the waviness
-# Chosen with benchmarks.accuracy.
-SCALE = 0.1
-WAVINESS = np.geomspace(0.15, 1.3, 6)
-USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
 MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
-NOISES = 5  # grid points, from the floor up
-GROUP = 4  # touches whose likelihoods are computed at once
 PASSES = 8  # at most: two that turn the frame to what they found, and more for what is outlying
 SETTLED = 0.1  # of a weight, between passes
 UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
@@ -43,26 +46,15 @@ STUDENT = 4.0  # degrees of freedom
 
 
 class _System(NamedTuple):
-    """Heights (b, n) ~ basis (b, n, 27) @ coefficients, less the prior's mean; the same after weighted QR.
+    """Heights (b, n) ~ basis (b, n, 27) @ coefficients, less the prior's mean; and its normal equations.
 
-    triangle (b, 27, 27) @ coefficients ~ target (b, 27) in the sense of least squares, which leaves
-    `square` (b,) over; so many `contacts` (b,) are weighed at all.
+    gram (b, 27, 27) and seen (b, 27) are basis' basis and basis' heights, weighted.
     """
 
     basis: Array
     heights: Array
-    triangle: Array
-    target: Array
-    square: Array
-    contacts: Array
-
-
-class _Hyperparameters(NamedTuple):
-    """Waviness (b,), its geometric mean; prior variances (b, 22), averaged over it; and noise (b,)."""
-
-    waviness: Array
-    variances: Array
-    noise: Array
+    gram: Array
+    seen: Array
 
 
 class _Touches(NamedTuple):
@@ -113,28 +105,28 @@ def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Po
     """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
     prior_mean = np.array([_prior_mean(*pair) for pair in zip(touches.k1, touches.k2, strict=True)])
     system = _system(touches.contacts @ touches.axes, touches.weights, prior_mean)
-    if step == 0:
+    data = None if step == 0 else restricted(system.basis, system.heights, touches.weights)
+    if data is None:
         waviness = np.full(len(prior_mean), USUAL_WAVINESS)
-        hyper = _Hyperparameters(waviness, (SCALE * waviness[:, None] ** POWERS) ** 2, touches.floor)
+        hyper = Hyperparameters(waviness, prior_variances(waviness), touches.floor)
     else:
-        hyper = _evidence(system, _noises(system, touches.floor))
+        hyper = evidence(data, noises(data, touches.floor))
     # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
-    prior = (SCALE * hyper.waviness[:, None] ** POWERS) ** 2
-    seen = (system.target[:, None] @ system.triangle)[:, 0] / hyper.noise[:, None] ** 2
-    solution = np.linalg.solve(_precision(system, prior, hyper.noise), seen[..., None])
+    precision = _precision(system, prior_variances(hyper.waviness), hyper.noise)
+    solution = np.linalg.solve(precision, (system.seen / hyper.noise[:, None] ** 2)[..., None])
     mean = prior_mean + solution[..., 0]
     turned = [_turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
     axes, k1, k2, angle = (np.array(values) for values in zip(*turned, strict=True))
     # Outliers show against a surface in level axes.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
     weights, settled, posterior = touches.weights, np.full(len(mean), step == PASSES - 1), None
-    if step > 0 and level.any():
+    if data is not None and level.any():
         residuals = system.heights - (system.basis @ solution)[..., 0]
         weights = np.where(level[:, None], _student_weights(residuals, weights > 0.0, touches.floor), weights)
         settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED)
-    if settled.any():
+    if data is not None and settled.any():
         which = slice(None) if settled.all() else settled
-        posterior = _posterior(mean, system, hyper).at(which).turned(angle[which])
+        posterior = _posterior(mean, system, data, hyper).at(which).turned(angle[which])
         posterior.mean[:, [0, 1, 3]] = 0.0
         posterior.mean[:, 2], posterior.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
     return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, posterior
@@ -145,14 +137,16 @@ def posterior_of(patch: MongePatch, contacts: Array, accuracy: float) -> Posteri
 
     All in unit radius. The noise is what the patch leaves over at the contacts, or `accuracy`.
     """
-    system = _system(contacts[None], np.ones((1, len(contacts))), np.zeros((1, len(TERMS))))
+    weights = np.ones((1, len(contacts)))
+    system = _system(contacts[None], weights, np.zeros((1, len(TERMS))))
+    data = restricted(system.basis, system.heights, weights)
     x, y, z = contacts.T
     residual = math.sqrt(np.mean((z - patch.height(x, y)) ** 2))
-    hyper = _evidence(system, np.array([[max(residual, accuracy, MISFIT)]]))
+    hyper = evidence(data, np.array([[max(residual, accuracy, MISFIT)]]))
     mean = np.zeros((1, len(TERMS)))
     mean[0, [2, 4]] = patch.k1 / 2.0, patch.k2 / 2.0
     mean[0, FREE : FREE + len(patch.coefficients)] = patch.coefficients
-    return _posterior(mean, system, hyper).at(0)
+    return _posterior(mean, system, data, hyper).at(0)
 
 
 def _prior_mean(k1: float, k2: float) -> Array:
@@ -177,86 +171,22 @@ def _prior_mean(k1: float, k2: float) -> Array:
 
 
 def _system(local: Array, weights: Array, prior_mean: Array) -> _System:
-    b, n = weights.shape
     flat = local.reshape(-1, 3)
-    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(b, n, -1)
+    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
     heights = local[..., 2] - (basis @ prior_mean[..., None])[..., 0]
-    size = len(TERMS) + 1
-    rows = np.zeros((b, max(n, size), size))  # as many as QR needs for a whole triangle
-    rows[:, :n, :-1], rows[:, :n, -1] = basis, heights
-    rows[:, :n] *= np.sqrt(weights)[..., None]
-    triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
-    return _System(
-        basis,
-        heights,
-        triangle[:, :-1, :-1],
-        triangle[:, :-1, -1],
-        triangle[:, -1, -1] ** 2,
-        np.count_nonzero(weights, axis=1),
-    )
+    weighted = np.swapaxes(weights[..., None] * basis, 1, 2)
+    return _System(basis, heights, weighted @ basis, (weighted @ heights[..., None])[..., 0])
 
 
-def _noises(system: _System, floor: Array) -> Array:
-    """A grid of the noise, (b, 5), from the floor to beyond what the quadric leaves over."""
-    left = np.sum(system.target[:, FREE:] ** 2, axis=1) + system.square
-    largest = 2.0 * floor + 3.0 * np.sqrt(left / system.contacts)
-    return floor[:, None] * (largest / floor)[:, None] ** (np.arange(NOISES) / (NOISES - 1.0))
-
-
-def _evidence(system: _System, noises: Array) -> _Hyperparameters:
-    """Waviness and noise by their marginal likelihood, group by group: one fits into a processor's cache."""
-    groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
-    found = [_evidence_of(_System(*(part[group] for part in system)), noises[group]) for group in groups]
-    return _Hyperparameters(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
-
-
-def _evidence_of(system: _System, noises: Array) -> _Hyperparameters:
-    """Waviness and noise by their marginal likelihood, the free terms projected out (REML).
-
-    target ~ N(0, K), K = triangle prior triangle' + noise^2. One Cholesky factor of K bordered by the
-    target, [[K, t], [t', c]], has log |K| in its diagonal and t' K^-1 t in the last of it.
-    """
-    triangle, target = system.triangle[:, FREE:, FREE:], system.target[:, FREE:]
-    b, size = target.shape
-    variances = (SCALE * WAVINESS[:, None] ** POWERS) ** 2
-    explained = (triangle[:, None] * variances[:, None]) @ np.swapaxes(triangle, 1, 2)[:, None]
-    corner = 2.0 * np.sum(target**2, axis=1) / noises[:, 0] ** 2 + 1.0  # more than t' K^-1 t
-    bordered = np.zeros((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
-    bordered[..., :size, :size] = explained[:, :, None]
-    bordered[..., :size, size] = bordered[..., size, :size] = target[:, None, None]
-    bordered[..., size, size] = corner[:, None, None]
-    # Beside the noise, what rounding leaves of contacts that are no surface.
-    rounding = 1e-13 * np.trace(explained, axis1=2, axis2=3)
-    diagonal = np.arange(size)
-    bordered[..., diagonal, diagonal] += (noises[:, None] ** 2 + rounding[..., None])[..., None]
-    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
-    others = (system.contacts - len(TERMS))[:, None, None]  # directions no term explains
-    likelihood = -0.5 * (
-        2.0 * np.log(np.prod(factors[..., :size], axis=3))
-        + (corner[:, None, None] - factors[..., size] ** 2)
-        + others * np.log(noises[:, None] ** 2)
-        + (system.square[:, None] / noises**2)[:, None]
-        + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2
-    )
-    weights = np.exp(likelihood - likelihood.max(axis=(1, 2), keepdims=True))
-    weights /= weights.sum(axis=(1, 2), keepdims=True)
-    by_waviness = weights.sum(axis=2)
-    return _Hyperparameters(
-        np.exp(by_waviness @ np.log(WAVINESS)),
-        by_waviness @ variances,
-        np.sqrt(np.sum(weights.sum(axis=1) * noises**2, axis=1)),
-    )
-
-
-def _posterior(mean: Array, system: _System, hyper: _Hyperparameters) -> Posterior:
+def _posterior(mean: Array, system: _System, data: Restricted, hyper: Hyperparameters) -> Posterior:
     covariance = np.linalg.inv(_precision(system, hyper.variances, hyper.noise))
-    visibility = system.triangle[:, FREE:, FREE:] * (SCALE / hyper.noise)[:, None, None]
+    visibility = data.triangle * (SCALE / hyper.noise)[:, None, None]
     return Posterior(mean, covariance, hyper.noise, visibility)
 
 
 def _precision(system: _System, variances: Array, noise: Array) -> Array:
     """(b, 27, 27), the inverse of the covariance."""
-    precision = np.swapaxes(system.triangle, 1, 2) @ system.triangle / noise[:, None, None] ** 2
+    precision = system.gram / noise[:, None, None] ** 2
     diagonal = np.arange(len(TERMS))
     # A slope or second derivative of 100 is no surface; and with that no contacts make it singular.
     precision[:, diagonal[:FREE], diagonal[:FREE]] += 1e-4

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .arguments import unit_vector
 from .monge import monomials
 from .posterior import TERMS
-from .reconstruction import DOMAIN_POINTS, Reconstruction
+from .result import DOMAIN_POINTS, Reconstruction
 from .tracking import SamplingPlane
 
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How wavy a surface is, and how noisy its contacts are: by marginal likelihood, for the fit of bayes.py."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .arguments import Array
+from .posterior import FREE, ORDERS, TERMS
+
+POWERS = ORDERS[FREE:] - 1.0  # of the waviness
+# Chosen with benchmarks.accuracy.
+SCALE = 0.1
+WAVINESS = np.geomspace(0.15, 1.3, 6)
+USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
+NOISES = 5  # grid points, from the floor up
+GROUP = 4  # touches whose likelihoods are computed at once
+
+
+class Restricted(NamedTuple):
+    """What contacts say of the terms of degree 3 to 6, whatever the free ones are.
+
+    triangle (b, 22, 22) @ coefficients ~ target (b, 22) in the sense of least squares, which leaves
+    `square` (b,) over; there are so many `contacts` (b,).
+    """
+
+    triangle: Array
+    target: Array
+    square: Array
+    contacts: Array
+
+
+class Hyperparameters(NamedTuple):
+    """Waviness (b,), its geometric mean; prior variances (b, 22), averaged over it; and noise (b,)."""
+
+    waviness: Array
+    variances: Array
+    noise: Array
+
+
+def prior_variances(waviness: Array) -> Array:
+    """Of the coefficients of degree 3 to 6, (..., 22), for waviness (...)."""
+    return (SCALE * waviness[..., None] ** POWERS) ** 2
+
+
+def restricted(basis: Array, heights: Array, weights: Array) -> Restricted:
+    """Of heights (b, n) ~ basis (b, n, 27) @ coefficients, by QR."""
+    b, n = weights.shape
+    size = len(TERMS) + 1
+    rows = np.zeros((b, max(n, size), size))  # as many as QR needs for a whole triangle
+    rows[:, :n, :-1], rows[:, :n, -1] = basis, heights
+    rows[:, :n] *= np.sqrt(weights)[..., None]
+    triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
+    target, square = triangle[:, FREE:-1, -1], triangle[:, -1, -1] ** 2
+    return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, np.count_nonzero(weights, axis=1))
+
+
+def noises(data: Restricted, floor: Array) -> Array:
+    """A grid of the noise, (b, 5), from the floor to beyond what the quadric leaves over."""
+    left = np.sum(data.target**2, axis=1) + data.square
+    largest = 2.0 * floor + 3.0 * np.sqrt(left / data.contacts)
+    return floor[:, None] * (largest / floor)[:, None] ** (np.arange(NOISES) / (NOISES - 1.0))
+
+
+def evidence(data: Restricted, noises: Array) -> Hyperparameters:
+    """Waviness and noise by their marginal likelihood, group by group: one fits into a processor's cache."""
+    groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
+    found = [_evidence_of(Restricted(*(part[group] for part in data)), noises[group]) for group in groups]
+    return Hyperparameters(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
+    """Waviness and noise by the marginal likelihood of the restricted data (REML).
+
+    target ~ N(0, K), K = triangle prior triangle' + noise^2. One Cholesky factor of K bordered by the
+    target, [[K, t], [t', c]], has log |K| in its diagonal and t' K^-1 t in the last of it.
+    """
+    triangle, target = data.triangle, data.target
+    b, size = target.shape
+    variances = prior_variances(WAVINESS)
+    explained = (triangle[:, None] * variances[:, None]) @ np.swapaxes(triangle, 1, 2)[:, None]
+    corner = 2.0 * np.sum(target**2, axis=1) / noises[:, 0] ** 2 + 1.0  # more than t' K^-1 t
+    bordered = np.zeros((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
+    bordered[..., :size, :size] = explained[:, :, None]
+    bordered[..., :size, size] = bordered[..., size, :size] = target[:, None, None]
+    bordered[..., size, size] = corner[:, None, None]
+    # Beside the noise, what rounding leaves of contacts that are no surface.
+    rounding = 1e-13 * np.trace(explained, axis1=2, axis2=3)
+    diagonal = np.arange(size)
+    bordered[..., diagonal, diagonal] += (noises[:, None] ** 2 + rounding[..., None])[..., None]
+    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
+    others = (data.contacts - len(TERMS))[:, None, None]  # directions no term explains
+    likelihood = -0.5 * (
+        2.0 * np.log(np.prod(factors[..., :size], axis=3))
+        + (corner[:, None, None] - factors[..., size] ** 2)
+        + others * np.log(noises[:, None] ** 2)
+        + (data.square[:, None] / noises**2)[:, None]
+        + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2
+    )
+    weights = np.exp(likelihood - likelihood.max(axis=(1, 2), keepdims=True))
+    weights /= weights.sum(axis=(1, 2), keepdims=True)
+    by_waviness = weights.sum(axis=2)
+    return Hyperparameters(
+        np.exp(by_waviness @ np.log(WAVINESS)),
+        by_waviness @ variances,
+        np.sqrt(np.sum(weights.sum(axis=1) * noises**2, axis=1)),
+    )

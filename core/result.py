@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A patch with its frame, and everything one may ask of it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import fitting
+from .arguments import Array
+from .bayes import posterior_of
+from .domain import Domain
+from .local_geometry import Frame
+from .monge import MongePatch
+from .posterior import Posterior, terms_to
+from .verification import fit_error
+
+DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
+DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
+DOMAIN_POINTS = 150  # of a mean over the domain
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """A patch around a reference point, lengths in the caller's unit.
+
+    frame : the Darboux frame
+    radius : L, the largest distance of a contact from the point in the tangent plane
+    patch, domain : the surface (1) and the part of the tangent plane it is meant for
+    contacts : (n, 3), what was fitted, in the frame
+    accuracy : standard deviation of a contact, at least, in units of L
+    method : of the fit
+    converged : whether its solver did
+    joint_posterior : what "bayes" has found
+
+    All else follows from these, once it is asked for.
+    """
+
+    frame: Frame
+    radius: float
+    patch: MongePatch
+    domain: Domain
+    contacts: Array
+    accuracy: float
+    method: str
+    converged: bool = True
+    joint_posterior: Posterior | None = None
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """What the contacts leave open, in the frame and in units of L."""
+        if self.joint_posterior is not None:
+            return self.joint_posterior
+        unit = 1.0 / self.radius
+        return posterior_of(self.patch.scaled(unit), unit * self.contacts, self.accuracy)
+
+    def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
+        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        u, v = x_array.ravel() / self.radius, y_array.ravel() / self.radius
+        # A patch of lower degree than the posterior departs from its mean as well.
+        off = self.posterior.height(u, v) - self.patch.height(x_array, y_array).ravel() / self.radius
+        return (self.radius * np.hypot(self.posterior.height_std(u, v), off)).reshape(x_array.shape)
+
+    @cached_property
+    def mean_height_std(self) -> float:
+        """The mean of height_std over the domain."""
+        points, _ = self.domain.grid(DOMAIN_POINTS)
+        return float(np.mean(self.height_std(*points.T)))
+
+    @cached_property
+    def blind(self) -> int:
+        """How many of the coefficients of degree 1 to d, as directions, the contacts say nothing of."""
+        return self.posterior.blind(self.patch.degree)
+
+    @cached_property
+    def fit_error(self) -> float:
+        """(6), the mean of |dz| over the contacts."""
+        return fit_error(self.patch, self.contacts)
+
+    @cached_property
+    def total_absolute_curvature(self) -> float:
+        """(8), the integral of |K| over the patch."""
+        points, h = self.domain.grid(fitting.GRID)
+        d = self.patch.derivatives(*points.T)
+        w = 1.0 + d.x**2 + d.y**2
+        return h**2 * float(np.sum(np.abs(d.xx * d.yy - d.xy**2) * w**-1.5))
+
+    @cached_property
+    def condition_number(self) -> float:
+        """Of the least-squares system of the coefficients, in unit radius."""
+        return self._problem.condition_number
+
+    @cached_property
+    def _problem(self) -> fitting.Problem:
+        unit = self.patch.scaled(1.0 / self.radius)
+        return fitting.problem(unit.k1, unit.k2, unit.degree, self.contacts / self.radius)
+
+    @property
+    def status(self) -> str:
+        """ "ok", "uncertain" or "not_converged"."""
+        return self._judgement[0]
+
+    @property
+    def message(self) -> str:
+        """The status in a sentence, with advice; and the blind directions."""
+        return self._judgement[1]
+
+    @cached_property
+    def _judgement(self) -> tuple[str, str]:
+        status, message = self._doubt or ("ok", "The patch describes its contacts.")
+        if self.blind:
+            verb = "is" if self.blind == 1 else "are"
+            terms = terms_to(self.patch.degree)
+            message += f" {self.blind} of {terms} coefficients {verb} invisible to these planes."
+        return status, message
+
+    @property
+    def _doubt(self) -> tuple[str, str] | None:
+        if not self.converged:
+            return "not_converged", (
+                "The minimisation stopped at its step limit, the patch is its best so far: use the fast "
+                "solver, or a smaller weight."
+            )
+        if self.method == "least-squares" and self.condition_number > DOUBTFUL_CONDITION:
+            return "uncertain", (
+                "The contacts alone do not determine the surface between the curves (condition number "
+                f"{self.condition_number:.1e}): take another method, or add sampling planes."
+            )
+        share = self.mean_height_std / self.radius
+        if share > DOUBTFUL_STD:
+            return "uncertain", (
+                f"Heights are good to {100.0 * share:.1f} % of the radius in the mean: take a shorter "
+                "extent, or add sampling planes."
+            )
+        return None
