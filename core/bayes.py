@@ -205,7 +205,7 @@ def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array)
         return present.astype(float)
     ratios = misses / deviation[:, None]
     outlying = ordered[row, count - 1] > OUTLYING * deviation
-    return present * np.where(outlying[:, None], (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
+    return np.where(present, np.where(outlying[:, None], (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0), 0.0)
 
 
 def _turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:

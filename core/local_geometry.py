@@ -62,7 +62,7 @@ class Curves:
     tangents: Array
     curvatures: Array
 
-    def at(self, index: int | NDArray[np.intp]) -> "Curves":
+    def at(self, index: int | list[int]) -> "Curves":
         """Those of one touch, without the leading dimension, or of several."""
         return Curves(
             self.points[index],

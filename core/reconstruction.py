@@ -147,11 +147,11 @@ def _stack(
     normals = surface_normals(curves.tangents, outward)
     each = zip(touches, curves.present, curves.tangents, normals, strict=True)
     errors = [degeneracy(*touch) for touch in each]
-    good = np.flatnonzero([error is None for error in errors])
+    good = [i for i, error in enumerate(errors) if error is None]
     std = options.sensor_std
     stds = [max(c.noise or 0.0 for c in touches[i]) if std is None else std for i in good]
     found = iter(
-        _framed(points[good], curves.at(good), normals[good], np.array(stds), options) if len(good) else ()
+        _framed(points[good], curves.at(good), normals[good], np.array(stds), options) if good else ()
     )
     return [error or _result(*next(found), options) for error in errors]
 
