@@ -38,7 +38,7 @@ LEAST_COVERED = 0.9  # of the hold-out; a surface with less has failed
 DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}  # of modules that are called otherwise
 KAPPA, NORMAL = "kappa 1/mm", "normal degrees"
 LABEL_SIZE = 7.5
-TIME_LIMITS = (0.5, 300.0)  # of the axes
+TIME_LIMITS = (0.3, 300.0)  # of the axes
 OFF_SCALE = 400.0  # um; above are only names and values
 HEIGHT_LIMITS, KAPPA_LIMITS, NORMAL_LIMITS = (2.5, 1500.0), (5e-6, 0.3), (4e-4, 30.0)
 
