@@ -175,7 +175,7 @@ def touch_of(name, planes, noise, seed):
         contours[count] = track(surface, case.point, case.axes[:, 2], sampling, rng=number, **lengths)
     ends = np.vstack([contour.points[[0, -1]] for contour in case.contours]) - case.point
     flat, triangles = closed_spline_domain((ends @ case.axes)[:, :2], extent).triangulation(RINGS)
-    vertices = accuracy._above(surface, case.axes, case.kappas, flat)
+    vertices = accuracy.above(surface, case.axes, case.kappas, flat)
     offsets = np.random.default_rng(number).normal(0.0, noise, len(vertices))
     offsets[0] = 0.0  # the point is exact, as in the contours
     return Touch(case, contours, vertices + np.outer(offsets, case.axes[:, 2]), triangles, extent)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What contacts say of a surface and what they leave open: a Gaussian over polynomials of degree 6."""
 
+import math
 from functools import cache
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ TERMS = exponents(1, DEGREE)
 ORDERS = TERMS.sum(axis=1).astype(float)
 FREE = 5  # x, y, x^2, xy, y^2 have no prior
 DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L
+ALIKE = 0.045  # curvatures, that say nothing of directions
 INVISIBLE = 0.9  # of the prior's variance, left over
 
 
@@ -76,6 +78,19 @@ class Posterior(NamedTuple):
             if np.mean((self.patch(degree).height(x, y) - self.height(x, y)) ** 2) <= 0.25 * variance:
                 return degree
         return DEGREE
+
+    def turn(self) -> float:
+        """The angle (radians) that the Darboux frame may be off: two standard deviations, and the mean's.
+
+        0 where the curvatures differ by less than ALIKE, within a standard deviation.
+        """
+        x, y, xx, xy, yy = self.mean[:FREE]
+        c = self.covariance
+        difference = 2.0 * math.hypot(yy - xx, xy)
+        if difference + 2.0 * math.sqrt(max(c[2, 2] + c[4, 4] - 2.0 * c[2, 4], 0.0)) <= ALIKE:
+            return 0.0
+        std = math.sqrt(c[0, 0] + c[1, 1] + c[3, 3] / max(difference, 1e-9) ** 2)
+        return min(math.hypot(x, y, 0.5 * math.atan2(-xy, yy - xx), 2.0 * std), math.pi / 2.0)
 
     def blind(self, degree: int) -> int:
         """How many directions among the terms of degree 1 to `degree` keep 90 % of their prior variance."""

@@ -14,6 +14,7 @@ from .arguments import Array, finite_array, number, unit_vector
 
 MAX_TURN = math.cos(math.radians(45.0))  # between contacts; a sharper turn is a crease to a finger
 MAX_TILT = math.cos(math.radians(75.0))  # against the normal at the point; beyond, slopes exceed 3.7
+COARSE = 0.01  # of a curve's size; coordinates rounded by more say nothing about curvature
 LEAST_IN_PLANE = 1e-3  # of a surface normal
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 
@@ -82,7 +83,8 @@ class Contour:
     noise : standard deviation of the contacts, or None where it is not known
     stops : why tracking ended at the first and at the last point, or None
 
-    Raises ValueError for another shape or for numbers that are not finite.
+    Raises ValueError for another shape, for numbers that are not finite, and for numbers of single
+    precision too far from the origin.
     """
 
     points: Array
@@ -93,6 +95,14 @@ class Contour:
 
     def __post_init__(self) -> None:
         points = finite_array("points", self.points, (None, 3))
+        single = getattr(self.points, "dtype", None) == np.float32
+        if single and len(points):
+            spacing = float(np.spacing(np.abs(points).max().astype(np.float32)))
+            if spacing > COARSE * np.ptp(points, axis=0).max() > 0.0:
+                raise ValueError(
+                    f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
+                    "of this size: wanted coordinates relative to a point near by, or double precision"
+                )
         object.__setattr__(self, "points", points)
         if self.plane_normal is not None:
             object.__setattr__(self, "plane_normal", unit_vector("plane_normal", self.plane_normal))
