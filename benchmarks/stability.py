@@ -440,8 +440,8 @@ def main():
     caption = (
         f"Medians over ten exact surfaces (quadrics and quartics near the special points) and {seeds} seeds. "
         f"What is not said is harmless: planes 60 degrees apart, {STEPS} steps to a side, noise of {NOISE:g} "
-        "mm, radii L of 12 to 15 mm. Error: mean |dz| over the domain. Below it the condition number, and the "
-        f"share of the touches that were warned of or refused. {machine('numpy', 'scipy', 'bpy')}."
+        "mm, radii L of 12 to 15 mm. Error: mean |dz| over the domain. Below it the condition number, and "
+        f"the share of the touches that were warned of or refused. {machine('numpy', 'scipy', 'bpy')}."
     )
     draw(rows_of(results), caption)
 

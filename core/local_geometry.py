@@ -120,25 +120,23 @@ def curves_through(r: Array, present: NDArray[np.bool_]) -> Curves:
 def misses(curves: Curves) -> tuple[Array, Array]:
     """The distances at which the c curves of one touch pass its reference point, and their deviations.
 
-    (c,) each: the part across the curve of r0 in r(s) = r0 + t s + r'' s^2 / 2, fitted to the nearest
-    contacts. 0 where there are too few of them to tell.
+    (c,) each: the part across the tangent t of r0 in r = r0 + r1 s + r2 s^2, s along t, fitted to the
+    nearest contacts. 0 where there are too few of them to tell.
     """
     distances, stds = np.zeros(len(curves.points)), np.zeros(len(curves.points))
-    for i, (points, present, along) in enumerate(
-        zip(curves.points, curves.present, curves.along, strict=True)
-    ):
+    each = zip(curves.points, curves.present, curves.along, curves.tangents, strict=True)
+    for i, (points, present, along, tangent) in enumerate(each):
         near = np.argsort(np.where(present, np.abs(along), np.inf), kind="stable")[:WINDOW]
-        near = near[present[near]]
-        if len(near) <= LEAST_CONTACTS:
+        r = points[near[present[near]]]
+        s = r @ tangent
+        if len(r) <= LEAST_CONTACTS or not s.any():
             continue
-        basis = (along[near, None] / np.abs(along[near]).max()) ** np.arange(3)
+        basis = (s[:, None] / np.abs(s).max()) ** np.arange(3)
         inverse = np.linalg.pinv(basis)
-        solution = inverse @ points[near]
-        left = points[near] - basis @ solution
-        r0, t = solution[:2]
-        distances[i] = math.hypot(*cross(r0, t / max(math.sqrt(t @ t), 1e-9)))
-        variance = np.sum(left**2) / (len(near) - 3)
-        stds[i] = math.sqrt(variance * (inverse[0] @ inverse[0]))
+        solution = inverse @ r
+        left = r - basis @ solution
+        distances[i] = math.hypot(*cross(solution[0], tangent))
+        stds[i] = math.sqrt(np.sum(left**2) / (len(r) - 3) * (inverse[0] @ inverse[0]))
     return distances, stds
 
 

@@ -14,6 +14,7 @@ from .surface import MeshSurface
 
 EXTENT_SHARE = 1.0 / 8.0  # of the object's largest dimension, where no extent is given
 STEPS = 12  # of a half contour, where no step is given
+BEYOND = 3.0  # times its own deviation, that a patch is off the mesh in the mean: something is between the curves
 COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about curvature
 
 
@@ -97,6 +98,8 @@ def verify(touched, most=None):
     """
     clock = [perf_counter()]
     touched.report.update(_verification_report(touched.surface, touched.result, most))
+    if touched.report["status"] == "ok":
+        touched.report.update(_doubt(touched.report))
     clock.append(perf_counter())
     touched.report["suggested_plane"] = _suggestion_report(touched.result, np.array(touched.report["axes"]))
     clock.append(perf_counter())
@@ -169,6 +172,18 @@ def _verification_report(surface, result, most):
         "vertices": len(misses),
         "vertex_distance_mean": float(misses.mean()),
         "vertex_distance_max": float(misses.max()),
+    }
+
+
+def _doubt(report):
+    """Status and message where the mesh contradicts the patch."""
+    mean, std = report.get("vertex_distance_mean", 0.0), report["height_std"]
+    if mean <= BEYOND * std:
+        return {}
+    return {
+        "status": "uncertain",
+        "message": f"The mesh is {mean:.3g} off the patch in the mean, which expects {std:.3g}: there is something "
+        "between the curves that they do not show: take a shorter extent, or add sampling planes.",
     }
 
 
