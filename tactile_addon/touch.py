@@ -14,7 +14,7 @@ from .surface import MeshSurface
 
 EXTENT_SHARE = 1.0 / 8.0  # of the object's largest dimension, where no extent is given
 STEPS = 12  # of a half contour, where no step is given
-BEYOND = 3.0  # times its own deviation, that a patch is off the mesh in the mean: something is between the curves
+BEYOND = 3.0  # times its own deviation, that a patch may be off the mesh in the mean
 COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about curvature
 
 
@@ -182,8 +182,8 @@ def _doubt(report):
         return {}
     return {
         "status": "uncertain",
-        "message": f"The mesh is {mean:.3g} off the patch in the mean, which expects {std:.3g}: there is something "
-        "between the curves that they do not show: take a shorter extent, or add sampling planes.",
+        "message": f"The mesh is {mean:.3g} off the patch in the mean, which expects {std:.3g}, for between "
+        "the curves there is what they do not show: take a shorter extent, or add sampling planes.",
     }
 
 
