@@ -3,22 +3,34 @@
 """Checks of what callers pass in: a ValueError names the argument, what was wanted and what came."""
 
 import math
+import reprlib
+from collections.abc import Iterable
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
+LARGEST, SMALLEST = 1e50, 1e-50  # lengths whose sixth powers are numbers
 
 
-def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+def finite_array(
+    name: str, value: ArrayLike, shape: tuple[int | None, ...], largest: float = math.inf
+) -> Array:
     """`value` as a float64 array of `shape`, where None stands for any length.
 
-    Raises ValueError where the shape differs or a number is not finite.
+    Raises ValueError where the shape differs, or a number is not finite or beyond +-`largest`.
     """
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: wanted numbers of shape {_shape_text(shape)}, got {value!r}") from None
+        array = np.array(value)
+        if array.dtype.kind not in "biufO":  # text, and complex numbers
+            raise TypeError
+        array = array.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(
+            f"{name}: wanted numbers of shape {_shape_text(shape)}, got {shown(value)}"
+        ) from None
     fits = len(shape) == array.ndim and all(
         size in (None, got) for size, got in zip(shape, array.shape, strict=True)
     )
@@ -26,7 +38,28 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
         raise ValueError(f"{name}: wanted shape {_shape_text(shape)}, got {array.shape}")
     if not np.isfinite(array).all():
         raise ValueError(f"{name}: wanted finite numbers, got NaN or infinity among them")
+    if np.abs(array).max(initial=0.0) > largest:
+        raise ValueError(
+            f"{name}: wanted numbers up to {largest:g}, got larger ones: take another unit of length"
+        )
     return array
+
+
+def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:
+    """A list of `values`. Raises ValueError where they are none, or one of them is of another kind."""
+    try:
+        found = list(values)
+    except TypeError:
+        raise ValueError(f"{name}: wanted a list, got {shown(values)}") from None
+    for value in found:
+        if not isinstance(value, kind):
+            raise ValueError(f"{name}: wanted a list of {kind.__name__}, got {shown(value)} in it")
+    return found
+
+
+def shown(value: object) -> str:
+    """Any value in a line, cut short where it is long."""
+    return " ".join(reprlib.repr(value).split())
 
 
 def _shape_text(shape: tuple[int | None, ...]) -> str:
@@ -46,12 +79,16 @@ def unit_vector(name: str, value: ArrayLike) -> Array:
 def number(name: str, value: float, *, above: float | None = None, least: float | None = None) -> float:
     """`value` as a float, above one bound or at least the other. Raises ValueError elsewhere."""
     try:
+        if getattr(value, "ndim", 0) or isinstance(value, np.complexfloating):
+            raise TypeError
         result = float(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: wanted {_number_text(above, least)}, got {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name}: wanted {_number_text(above, least)}, got {shown(value)}") from None
     low = (above is not None and result <= above) or (least is not None and result < least)
     if low or not math.isfinite(result):
         raise ValueError(f"{name}: wanted {_number_text(above, least)}, got {result:g}")
+    if abs(result) > LARGEST:
+        raise ValueError(f"{name}: wanted a number up to {LARGEST:g}, got {result:g}")
     return result
 
 

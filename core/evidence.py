@@ -92,7 +92,7 @@ def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
     factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
     others = (data.contacts - len(TERMS))[:, None, None]  # directions no term explains
     likelihood = -0.5 * (
-        2.0 * np.log(np.prod(factors[..., :size], axis=3))
+        2.0 * np.sum(np.log(factors[..., :size]), axis=3)
         + (corner[:, None, None] - factors[..., size] ** 2)
         + others * np.log(noises[:, None] ** 2)
         + (data.square[:, None] / noises**2)[:, None]

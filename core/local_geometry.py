@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import Array
+from .arguments import SMALLEST, Array
 from .tracking import Contour, cross
 
 WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
@@ -75,8 +75,9 @@ class Curves:
 
 def stacked(points: Array, touches: Sequence[Sequence[Contour]]) -> tuple[Array, NDArray[np.bool_]]:
     """Contacts relative to their reference points (b, 3), (b, c, n, 3), and which of them there are."""
-    curves = max((len(contours) for contours in touches), default=0)
-    longest = max((len(contour.points) for contours in touches for contour in contours), default=0)
+    # At least one place, empty where there is nothing at all.
+    curves = max([1, *(len(contours) for contours in touches)])
+    longest = max([1, *(len(contour.points) for contours in touches for contour in contours)])
     r = np.zeros((len(touches), curves, longest, 3))
     present = np.zeros(r.shape[:3], dtype=bool)
     for i, contours in enumerate(touches):
@@ -95,7 +96,8 @@ def curves_through(r: Array, present: NDArray[np.bool_]) -> Curves:
     shape, curve = present.shape, np.arange(present[..., 0].size)[:, None]
     r, present = r.reshape(len(curve), -1, 3), present.reshape(len(curve), -1)
     distance = np.sqrt(np.einsum("cni,cni->cn", r, r))
-    present = present & (distance > 1e-9 * distance.max(axis=1, initial=0.0, keepdims=True))
+    least = np.maximum(1e-9 * distance.max(axis=1, initial=0.0, keepdims=True), SMALLEST)
+    present = present & (distance > least)
     distance = np.where(present, distance, np.inf)
     near = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
     counts = np.count_nonzero(present, axis=1)[:, None]

@@ -132,7 +132,8 @@ class MongePatch:
     def mean_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
         """H = (EN - 2FM + GL) / 2(EG - F^2), in 1/length."""
         (e, f, g), (ll, mm, nn) = self.first_form(x, y), self.second_form(x, y)
-        return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e * g - f**2))
+        # EG - F^2 is E + G - 1, which does not cancel where the patch is steep.
+        return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e + g - 1.0))
 
     def principal_curvatures(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """kappa1 <= kappa2 at (x, y), in 1/length."""
@@ -176,5 +177,5 @@ def _newton_step(patch: MongePatch, foot: Array, q: Array) -> Array:
     hxx = np.where(bowl, hxx, 1.0 + d.x**2)
     hxy = np.where(bowl, hxy, d.x * d.y)
     hyy = np.where(bowl, hyy, 1.0 + d.y**2)
-    det = hxx * hyy - hxy**2
+    det = np.where(bowl, hxx * hyy - hxy**2, 1.0 + d.x**2 + d.y**2)
     return np.column_stack([hxy * gy - hyy * gx, hxy * gx - hxx * gy]) / det[:, None]

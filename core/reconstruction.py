@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import fitting, tagc
-from .arguments import Array, finite_array, number, unit_vector
+from .arguments import LARGEST, Array, finite_array, list_of, number, shown, unit_vector
 from .bayes import joint_fit
 from .domain import Domain, closed_spline_domain
 from .local_geometry import (
@@ -31,6 +31,7 @@ from .tracking import Contour
 METHODS = ("bayes", "tagc", "quadratic-variation", "least-squares")
 SOLVERS = ("fast", "descent")
 DEFAULT_WEIGHT = 1000.0  # lambda L^2: the paper's 9.99/mm^2 at L = 10 mm
+COARSE = 1e-3  # of a touch: what rounding far from the origin may take; bayes.MISFIT has room for it
 STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache
 
 
@@ -58,9 +59,9 @@ def reconstruct(
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
     method. A fit in doubt comes back with a status.
     """
-    p, up = finite_array("point", point, (3,)), unit_vector("outward", outward)
+    p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     options = _options(method, degree, sensor_std, weight, solver)
-    (result,) = _stack(p[None], [contours], up[None], options)
+    (result,) = _stack(p[None], [list_of("contours", contours, Contour)], up[None], options)
     if isinstance(result, DegenerateCurvesError):
         raise result
     return result
@@ -84,20 +85,24 @@ def reconstruct_many(
     In the place of a touch that cannot carry the method stands its DegenerateCurvesError. Raises
     ValueError for bad arguments.
     """
-    p = finite_array("points", points, (None, 3))
-    if len(contours_list) != len(p):
-        raise ValueError(f"contours_list: wanted {len(p)} lists of contours, got {len(contours_list)}")
+    p = finite_array("points", points, (None, 3), LARGEST)
+    touches = [
+        list_of("contours", c, Contour)
+        for c in list_of("contours_list", contours_list, Sequence)  # type: ignore[type-abstract]
+    ]
+    if len(touches) != len(p):
+        raise ValueError(f"contours_list: wanted {len(p)} lists of contours, got {len(touches)}")
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
     options = _options(method, degree, sensor_std, weight, solver)
     # Touches of like size together: a stack has room for its longest contour in all places.
-    sizes = [len(c) * max((len(contour.points) for contour in c), default=0) for c in contours_list]
+    sizes = [len(c) * max((len(contour.points) for contour in c), default=0) for c in touches]
     order = sorted(range(len(p)), key=sizes.__getitem__, reverse=True)
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
     while order:
         count = max(1, STACK // max(sizes[order[0]], 1))
         chosen, order = order[:count], order[count:]
-        found = _stack(p[chosen], [contours_list[i] for i in chosen], up[chosen], options)
+        found = _stack(p[chosen], [touches[i] for i in chosen], up[chosen], options)
         results.update(zip(chosen, found, strict=True))
     return [results[i] for i in range(len(p))]
 
@@ -126,13 +131,13 @@ def _options(
     method: str, degree: int | str, sensor_std: float | None, weight: float | None, solver: str
 ) -> _Options:
     for name, value, choices in (("method", method, METHODS), ("solver", solver, SOLVERS)):
-        if value not in choices:
-            raise ValueError(f"{name}: wanted one of {', '.join(choices)}, got {value!r}")
-    if degree != "auto" and (not isinstance(degree, int) or degree not in range(2, 7)):
-        raise ValueError(f'degree: wanted a whole number from 2 to 6 or "auto", got {degree!r}')
+        if not isinstance(value, str) or value not in choices:
+            raise ValueError(f"{name}: wanted one of {', '.join(choices)}, got {shown(value)}")
+    if not isinstance(degree, int | np.integer | str) or degree not in ("auto", 2, 3, 4, 5, 6):
+        raise ValueError(f'degree: wanted a whole number from 2 to 6 or "auto", got {shown(degree)}')
     return _Options(
         method,
-        None if isinstance(degree, str) else degree,
+        None if isinstance(degree, str) else int(degree),
         None if sensor_std is None else number("sensor_std", sensor_std, least=0.0),
         DEFAULT_WEIGHT if weight is None else number("weight", weight, above=0.0),
         solver,
@@ -146,7 +151,11 @@ def _stack(
     curves = curves_through(*stacked(points, touches))
     normals = surface_normals(curves.tangents, outward)
     each = zip(touches, curves.present, curves.tangents, normals, strict=True)
-    errors = [degeneracy(*touch) for touch in each]
+    apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
+    errors = [
+        degeneracy(*touch) or (_coarse(gap, size) if gap > COARSE * size else None)
+        for touch, gap, size in zip(each, apart, reach, strict=True)
+    ]
     good = [i for i, error in enumerate(errors) if error is None]
     std = options.sensor_std
     stds = [max(c.noise or 0.0 for c in touches[i]) if std is None else std for i in good]
@@ -154,6 +163,13 @@ def _stack(
         _framed(points[good], curves.at(good), normals[good], np.array(stds), options) if good else ()
     )
     return [error or _result(*next(found), options) for error in errors]
+
+
+def _coarse(gap: float, size: float) -> DegenerateCurvesError:
+    return DegenerateCurvesError(
+        f"the coordinates at the point are {gap:.2g} apart in double precision, too coarse for curves of "
+        f"{size:.2g}: move the origin nearer to the point"
+    )
 
 
 def _framed(

@@ -10,12 +10,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import Array, finite_array, number, unit_vector
+from .arguments import LARGEST, Array, finite_array, list_of, number, shown, unit_vector
 
 MAX_TURN = math.cos(math.radians(45.0))  # between contacts; a sharper turn is a crease to a finger
 MAX_TILT = math.cos(math.radians(75.0))  # against the normal at the point; beyond, slopes exceed 3.7
 COARSE = 0.01  # of a curve's size; coordinates rounded by more say nothing about curvature
 LEAST_IN_PLANE = 1e-3  # of a surface normal
+MOST_CONTACTS = 10_000  # on half a contour
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 
 Vector = tuple[float, float, float]
@@ -94,7 +95,7 @@ class Contour:
     stops: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
-        points = finite_array("points", self.points, (None, 3))
+        points = finite_array("points", self.points, (None, 3), LARGEST)
         single = getattr(self.points, "dtype", None) == np.float32
         if single and len(points):
             spacing = float(np.spacing(np.abs(points).max().astype(np.float32)))
@@ -111,6 +112,8 @@ class Contour:
             object.__setattr__(self, "normals", normals)
         if self.noise is not None:
             object.__setattr__(self, "noise", number("noise", self.noise, least=0.0))
+        if self.stops is not None and len(list_of("stops", self.stops, str)) != 2:
+            raise ValueError(f"stops: wanted two words, got {shown(self.stops)}")
 
 
 def track(
@@ -135,14 +138,22 @@ def track(
     One Contour a plane, running from azimuth + 180 degrees to azimuth, the point itself in it, exact.
     Raises ValueError for bad numbers, and where there is no surface at the point.
     """
-    p = finite_array("point", point, (3,))
+    p = finite_array("point", point, (3,), LARGEST)
     n = unit_vector("normal", normal)
+    planes = list_of("planes", planes, SamplingPlane)
     step = number("step", step, above=0.0)
     extent = number("extent", extent, above=0.0)
     if extent < step:
         raise ValueError(f"step: wanted no more than the extent {extent:g}, got {step:g}")
+    if extent / step > MOST_CONTACTS:
+        raise ValueError(f"step: wanted at least a {MOST_CONTACTS}th of the extent {extent:g}, got {step:g}")
     noise = number("noise", noise, least=0.0)
-    generator = np.random.default_rng(rng)
+    try:
+        generator = np.random.default_rng(rng)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"rng: wanted a Generator or a whole number of 0 or more, got {shown(rng)}"
+        ) from None
     count = math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
     start, up, side = _first_contact(surface, _vector(p), _vector(n), step)
     contours = []
@@ -156,7 +167,8 @@ def track(
         normals = np.array([*back[1][::-1], up, *ahead[1]])
         if noise:
             in_plane = normals - np.outer(normals @ axes[:, 2], axes[:, 2])
-            in_plane /= np.linalg.norm(in_plane, axis=1, keepdims=True)
+            # The point, which stays where it is, may have no normal in the plane.
+            in_plane /= np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), LEAST_IN_PLANE)
             offsets = generator.normal(0.0, noise, len(points))
             offsets[len(back[0])] = 0.0
             points += offsets[:, None] * in_plane
@@ -174,8 +186,9 @@ def _first_contact(surface: Surface, p: Vector, n: Vector, step: float) -> tuple
             _along(_along(p, aside, length * step), n, reach), _scaled(n, -1.0), 2.0 * reach
         )
         if hit is not None:
-            side = math.copysign(1.0, _dot(_vector(hit[1]), n))
-            return _vector(hit[0]), _scaled(_vector(hit[1]), side), side
+            found, up = map(_vector, _answer(hit))
+            side = math.copysign(1.0, _dot(up, n))
+            return found, _scaled(up, side), side
     raise ValueError(
         f"point: wanted one on the surface, got one with no surface within {reach:g} along the normal"
     )
@@ -197,7 +210,7 @@ def _section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float
         )
         if hit is None:
             return None
-        (x, y, z), (nx, ny, nz) = hit
+        (x, y, z), (nx, ny, nz) = _answer(hit)
         nx, ny, nz = side * nx, side * ny, side * nz
         dx, dy, dz = x - x0, y - y0, z - z0
         at = complex(dx * tx + dy * ty + dz * tz, dx * ux + dy * uy + dz * uz)
@@ -205,6 +218,18 @@ def _section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float
         return _Contact(at, up, (x, y, z), (nx, ny, nz))
 
     return cast
+
+
+def _answer(hit: tuple[Sequence[float], Sequence[float]]) -> tuple[Vector, Vector]:
+    """A surface's point and normal. Raises ValueError where they are none."""
+    try:
+        (x, y, z), (nx, ny, nz) = hit
+        # Of NaN nothing is true.
+        if abs(x) + abs(y) + abs(z) <= LARGEST and abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-2:
+            return (x, y, z), (nx, ny, nz)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"surface: wanted a point and its unit normal of ray_cast, got {shown(hit)}")
 
 
 def _half_contour(
@@ -253,6 +278,10 @@ def _next_contact(cast: Cast, at: complex, ahead: complex, up: complex, step: fl
         if contact is None:
             return None
         chord = abs(contact.at - at)
+        if not 0.5 * step < chord < 2.0 * step:
+            raise ValueError(
+                f"surface: wanted hits on the rays, some {step:g} apart, got one {chord:g} from the last"
+            )
         if abs(chord - step) <= 1e-3 * step:
             break
         forward *= step / chord

@@ -1,15 +1,22 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixtures: a real Blender with the built zip installed, and an empty scene in it."""
+"""Fixtures: a real Blender with the built zip installed, an empty scene; and the fuzz tests' profiles."""
 
 import os
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from tools import blender
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
+
+# The short one asks the same every time, so that a test does not fail for what somebody else has changed.
+COMMON = {"deadline": None, "suppress_health_check": list(HealthCheck)}
+settings.register_profile("short", max_examples=60, derandomize=True, database=None, **COMMON)
+settings.register_profile("long", max_examples=2500, print_blob=True, **COMMON)
+settings.load_profile("short")
 
 
 @pytest.fixture(scope="session")

@@ -103,6 +103,14 @@ def test_distances_to_a_cylinder_are_known():
     assert distances(patch, np.empty((0, 3))).shape == (0,)
 
 
+def test_a_patch_as_steep_as_a_wall_has_its_curvature_and_distances():
+    """EG - F^2 there is the difference of numbers that agree to all digits."""
+    patch, x, y = MongePatch(1.0, 2.0, np.empty(0)), 1e9, 1e9
+    expected = ((1 + x**2) * 2 + (1 + 4 * y**2)) / (2 * (1 + x**2 + 4 * y**2) ** 1.5)
+    assert patch.mean_curvature(x, y) == pytest.approx(expected, rel=1e-6)
+    assert distances(patch, [[x, y, patch.height(x, y)]]) == pytest.approx(0.0, abs=1e-6)
+
+
 def test_fit_error_is_equation_6():
     patch = MongePatch(0.0, 0.0, np.empty(0))
     assert fit_error(patch, [[1, 1, 0.5], [2, 0, -1.5]]) == pytest.approx(1.0)

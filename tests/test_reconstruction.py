@@ -187,12 +187,51 @@ GOOD = track(
         ({"sensor_std": -1}, "sensor_std: wanted a finite number of 0 or more, got -1"),
         ({"outward": (0, 0, 0)}, "outward: wanted a vector with a direction"),
         ({"point": (np.nan, 0, 0)}, "point: wanted finite numbers"),
+        ({"point": (0, 0, 1e60)}, r"point: wanted numbers up to 1e\+50, got larger ones"),
+        ({"point": (0, 0, 10**400)}, "point: wanted numbers of shape"),
+        ({"point": np.array([1j, 0, 0])}, "point: wanted numbers of shape"),
+        ({"method": np.array(["bayes", "tagc"])}, "method: wanted one of"),
+        ({"degree": np.array([4, 5])}, "degree: wanted a whole number"),
+        ({"weight": np.array([1.0])}, r"weight: wanted a finite number above 0, got array\(\[1.\]\)"),
+        ({"weight": 10**400}, "weight: wanted a finite number above 0, got 1000"),
+        ({"weight": 1e60}, r"weight: wanted a number up to 1e\+50, got 1e\+60"),
+        ({"contours": None}, "contours: wanted a list, got None"),
+        ({"contours": [GOOD[0].points]}, "contours: wanted a list of Contour, got array"),
     ],
 )
 def test_bad_arguments_are_named(change, message):
-    arguments = {"point": surfaces.sphere(25).point, "outward": surfaces.sphere(25).normal} | change
-    with pytest.raises(ValueError, match=message):
-        reconstruct(arguments.pop("point"), GOOD, **arguments)
+    given = {"point": surfaces.sphere(25).point, "contours": GOOD, "outward": surfaces.sphere(25).normal}
+    with pytest.raises(ValueError, match=message) as caught:
+        reconstruct(**(given | change))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_touch_without_curves_and_whole_numbers_of_numpy():
+    ball = surfaces.sphere(25)
+    with pytest.raises(DegenerateCurvesError, match="three curves are needed, got 0"):
+        reconstruct(ball.point, [], outward=ball.normal)
+    assert reconstruct(ball.point, GOOD, outward=ball.normal, degree=np.int64(5)).patch.degree == 5
+
+
+def test_a_sensor_that_knows_nothing_leaves_a_patch_in_doubt():
+    ball = surfaces.sphere(25)
+    r = reconstruct(ball.point, GOOD, outward=ball.normal, sensor_std=1e20)
+    assert r.status == "uncertain"
+    assert np.isfinite([r.mean_height_std, r.patch.k1, r.patch.k2]).all()
+
+
+def test_curves_that_rounding_far_from_the_origin_spoils_are_refused():
+    ball = surfaces.sphere(25)
+    far = ball.point + 1e17
+    with pytest.raises(DegenerateCurvesError, match="16 apart in double precision, too coarse for curves of"):
+        reconstruct(far, [Contour(2000.0 * (c.points - ball.point) + far) for c in GOOD], outward=ball.normal)
+
+
+def test_lengths_too_small_to_be_raised_to_the_sixth_power_are_none():
+    ball = surfaces.sphere(25)
+    curves = [Contour(1e-60 * c.points) for c in GOOD]
+    with pytest.raises(DegenerateCurvesError, match="curve 1 has 0 of the 3 contacts"):
+        reconstruct(1e-60 * ball.point, curves, outward=ball.normal)
 
 
 MANY = [
@@ -261,13 +300,15 @@ def test_a_touch_that_carries_nothing_does_not_spoil_the_others():
         ({"points": (0, 0, 0)}, r"points: wanted shape \(n, 3\), got \(3,\)"),
         ({"outward": (0, 0, 1)}, r"outward: wanted shape \(1, 3\), got \(3,\)"),
         ({"outward": [(0, 0, 0)]}, "outward: wanted a vector with a direction"),
+        ({"contours_list": 5}, "contours_list: wanted a list, got 5"),
+        ({"contours_list": [[GOOD[0].points]]}, "contours: wanted a list of Contour, got array"),
         ({"degree": 9}, "degree: wanted a whole number"),
     ],
 )
 def test_bad_arguments_of_many_are_named(change, message):
-    arguments = {"points": [surfaces.sphere(25).point], "outward": [surfaces.sphere(25).normal]} | change
+    given = {"points": [surfaces.sphere(25).point], "outward": [surfaces.sphere(25).normal]}
     with pytest.raises(ValueError, match=message):
-        reconstruct_many(arguments.pop("points"), [GOOD], **arguments)
+        reconstruct_many(**(given | {"contours_list": [GOOD]} | change))
 
 
 def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():

@@ -145,6 +145,11 @@ def test_a_ball_ends_where_one_height_no_longer_describes_it():
         ({"tangent": (0, 0, 1)}, "tangent: wanted a direction across the normal"),
         ({"planes": [SamplingPlane(0.0, 1.6)]}, "tilt: wanted less than 90 degrees"),
         ({"planes": [SamplingPlane(float("nan"))]}, "azimuth: wanted a finite number, got nan"),
+        ({"planes": None}, "planes: wanted a list, got None"),
+        ({"planes": [0.5]}, "planes: wanted a list of SamplingPlane, got 0.5 in it"),
+        ({"step": 1e-7}, "step: wanted at least a 10000th of the extent 10, got 1e-07"),
+        ({"rng": "dice"}, "rng: wanted a Generator or a whole number of 0 or more, got 'dice'"),
+        ({"rng": -1}, "rng: wanted a Generator or a whole number of 0 or more, got -1"),
     ],
 )
 def test_bad_arguments_are_named(change, message):
@@ -166,6 +171,47 @@ def test_contours_take_lists_and_refuse_nonsense():
     for points in ([[0, 0]], [1, 2, 3], [[0, 0, np.nan]], "abc"):
         with pytest.raises(ValueError, match="points: wanted"):
             Contour(points)
+    for stops in (5, ("extent",), (1, 2)):
+        with pytest.raises(ValueError, match="stops: wanted"):
+            Contour([[0, 0, 0]], stops=stops)
+
+
+@pytest.mark.parametrize(
+    ("hit", "message"),
+    [
+        (((np.nan, 0, 0), (0, 0, 1)), "a point and its unit normal"),
+        (((1e60, 0, 0), (0, 0, 1)), "a point and its unit normal"),
+        (((0, 0, 0), (0, 0, 0)), "a point and its unit normal"),
+        (((0, 0, 0), (0, 0, 3)), "a point and its unit normal"),
+        ((None, None), "a point and its unit normal"),
+        (((0, 0, 0), (0, 0, 1)), "got one 0 from the last"),
+        (((9, 0, 0), (0, 0, 1)), "got one 9 from the last"),
+    ],
+)
+def test_a_surface_that_answers_nonsense_is_named(hit, message):
+    class Odd(Facets):
+        """Gives this one answer to every ray down the surface but the first."""
+
+        def ray_cast(self, origin, direction, distance):
+            return (
+                hit
+                if direction[2] < -0.5 and origin[0] > 0.5
+                else super().ray_cast(origin, direction, distance)
+            )
+
+    with pytest.raises(ValueError, match=f"surface: wanted .*{message}"):
+        track(Odd(*FLOOR), (0, 0, 0), (0, 0, 1), [SamplingPlane(0.0)], extent=5, step=1)
+
+
+def test_noise_at_a_point_whose_normal_is_across_the_plane():
+    class Leaning:
+        def ray_cast(self, origin, direction, distance):
+            return (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+
+    (contour,) = track(
+        Leaning(), (0, 0, 0), (0, 0, 1), [SamplingPlane(0.0)], extent=5, step=1, noise=0.1, rng=1
+    )
+    assert np.array_equal(contour.points, [(0, 0, 0)])
 
 
 def test_a_point_where_rays_slip_between_faces_is_still_on_the_surface():
