@@ -33,7 +33,7 @@ from .evidence import (
     restricted,
 )
 from .monge import MongePatch, monomials
-from .posterior import FREE, TERMS, Posterior
+from .posterior import FREE, TERMS, Posterior, coefficients_of
 from .tracking import cross
 
 MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
@@ -143,10 +143,7 @@ def posterior_of(patch: MongePatch, contacts: Array, accuracy: float) -> Posteri
     x, y, z = contacts.T
     residual = math.sqrt(np.mean((z - patch.height(x, y)) ** 2))
     hyper = evidence(data, np.array([[max(residual, accuracy, MISFIT)]]))
-    mean = np.zeros((1, len(TERMS)))
-    mean[0, [2, 4]] = patch.k1 / 2.0, patch.k2 / 2.0
-    mean[0, FREE : FREE + len(patch.coefficients)] = patch.coefficients
-    return _posterior(mean, system, data, hyper).at(0)
+    return _posterior(coefficients_of(patch)[None], system, data, hyper).at(0)
 
 
 def _prior_mean(k1: float, k2: float) -> Array:

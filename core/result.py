@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A patch with its frame, and everything one may ask of it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,13 +14,12 @@ from .arguments import Array
 from .bayes import posterior_of
 from .domain import Domain
 from .local_geometry import Frame
-from .monge import MongePatch
-from .posterior import Posterior, terms_to
+from .monge import MongePatch, exponents, monomials
+from .posterior import TERMS, Posterior, coefficients_of, terms_to
 from .verification import fit_error
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
-DOMAIN_POINTS = 150  # of a mean over the domain
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,7 @@ class Reconstruction:
     @cached_property
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
-        points, _ = self.domain.grid(DOMAIN_POINTS)
-        return float(np.mean(self.height_std(*points.T)))
+        return mean_height_stds([self])[0]
 
     @cached_property
     def blind(self) -> int:
@@ -91,12 +90,8 @@ class Reconstruction:
     @cached_property
     def condition_number(self) -> float:
         """Of the least-squares system of the coefficients, in unit radius."""
-        return self._problem.condition_number
-
-    @cached_property
-    def _problem(self) -> fitting.Problem:
-        unit = self.patch.scaled(1.0 / self.radius)
-        return fitting.problem(unit.k1, unit.k2, unit.degree, self.contacts / self.radius)
+        x, y, _ = self.contacts.T / self.radius
+        return fitting.condition_number(monomials(x, y, exponents(3, self.patch.degree)))
 
     @property
     def status(self) -> str:
@@ -136,3 +131,23 @@ class Reconstruction:
                 "extent, or add sampling planes."
             )
         return None
+
+
+def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
+    """mean_height_std of each, which keeps it: of many at once it is some times as fast as one by one."""
+    nodes = [r.domain.nodes for r in results]
+    most = max((len(weights) for _, weights in nodes), default=0)
+    points, weights = np.zeros((len(results), most, 2)), np.zeros((len(results), most))
+    for i, (r, (at, weight)) in enumerate(zip(results, nodes, strict=True)):
+        points[i, : len(at)], weights[i, : len(at)] = at / r.radius, weight
+    covariance = np.array([r.posterior.covariance for r in results]).reshape(-1, len(TERMS), len(TERMS))
+    # A patch of lower degree than the posterior departs from its mean as well.
+    off = np.array([r.posterior.mean - coefficients_of(r.patch.scaled(1.0 / r.radius)) for r in results])
+    x, y = points.reshape(-1, 2).T
+    basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
+    variance = np.einsum("bni,bni->bn", basis @ covariance, basis) + (basis @ off[..., None])[..., 0] ** 2
+    means = np.einsum("bn,bn->b", weights, np.sqrt(np.maximum(variance, 0.0)))
+    stds = [r.radius * float(mean) for r, mean in zip(results, means, strict=True)]
+    for r, std in zip(results, stds, strict=True):
+        vars(r)["mean_height_std"] = std
+    return stds
