@@ -74,6 +74,11 @@ class Reconstruction:
         """How many of the coefficients of degree 1 to d, as directions, the contacts say nothing of."""
         return self.posterior.blind(self.patch.degree)
 
+    @property
+    def blind_share(self) -> float:
+        """`blind` as a share of all the coefficients."""
+        return self.blind / terms_to(self.patch.degree)
+
     @cached_property
     def fit_error(self) -> float:
         """(6), the mean of |dz| over the contacts."""
