@@ -226,7 +226,8 @@ def _half_contour(
             return points, normals, CREASE
         contact = _next_contact(cast, at, ahead, up, step)
         if contact is None:
-            flank = cast(at + step * ahead - 0.5 * step * up, -ahead, step)
+            # A flank is found under the point, and behind it where the edge is sharper than 90 degrees.
+            flank = cast(at + step * ahead - 0.5 * step * up, -ahead, 2.0 * step)
             return points, normals, NO_CONTACT if flank is None else CREASE
         length = abs(contact.up)
         # Where the surface lies in the plane there is no curve to follow.

@@ -25,6 +25,7 @@ SHOWN = [
     ("blind_share", "Blind Share", "The share of the coefficients that the planes say nothing of", 0),
     ("reason", "Reason", "Whether there is a patch, and why there is none", 0),
 ]
+LOGARITHMIC = ("condition_number",)  # on a scale from 1
 POWERS = {name: power for name, _, _, power in SHOWN}
 REFUSED = (0.27, 0.27, 0.27, 1.0)
 # Of the reasons, sRGB: Okabe and Ito's, which colour-blind readers can tell apart.
@@ -42,6 +43,8 @@ def insert(context, obj, touched):
     painted = bpy.data.objects.new(f"{obj.name} Stability", mesh)
     mesh.name = painted.name
     painted.matrix_world = obj.matrix_world
+    # Under a parent the target may be sheared, which an object of its own cannot be.
+    mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
     painted.show_in_front = True  # it lies in the mesh it describes
     _paint(mesh, touched)
     mesh.materials.clear()
@@ -75,8 +78,10 @@ def recolour(painted):
     else:
         limit = _limit(shown, values[values != NOTHING], record["extent"])
         table = colours.diverging(np.arange(SHADES), SHADES - 1)
-        table = np.vstack([table, colours.linear([REFUSED])]).astype(np.float32)
-        place = np.minimum(values * ((SHADES - 1) / limit) + 0.5, SHADES - 1).astype(np.int32)
+        table = np.vstack([table, colours.linear([REFUSED])])
+        share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
+        share = np.log(share) / np.log(limit) if shown in LOGARITHMIC else share / limit
+        place = (np.minimum(share, 1.0) * (SHADES - 1) + 0.5).astype(np.int32)
         rgba = table[np.where(values == NOTHING, SHADES, place)]
     mesh.attributes[COLOUR].data.foreach_set("color", rgba.astype(np.float32).ravel())
     mesh.update()
@@ -84,10 +89,11 @@ def recolour(painted):
 
 
 def _limit(shown, values, extent):
-    """The end of the colours' range, which begins at 0."""
-    if shown == "blind_share" or not len(values):
+    """The end of the colours' range."""
+    if shown == "blind_share":
         return 1.0
-    return colours.symmetric_range(values, floor=patch_object.FLOOR * extent ** POWERS[shown])
+    floor = 10.0 if shown in LOGARITHMIC else patch_object.FLOOR * extent
+    return colours.symmetric_range(values, floor) if len(values) else floor
 
 
 def swatches(painted):

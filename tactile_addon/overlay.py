@@ -95,6 +95,8 @@ def draw_legend():
         bar = _scale(context, title, record, record["extent"], map_object.POWERS[shown], 0.0)
         if shown == "reason":
             bar = title, 0.0, []
+        elif shown in map_object.LOGARITHMIC:
+            bar = title, 0.0, [(at, f"{record['colour_limit'] ** at:.2g}") for at in (0.0, 0.5, 1.0)]
         _draw_box(context, *bar, map_object.swatches(obj))
 
 

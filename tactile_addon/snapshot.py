@@ -17,7 +17,7 @@ class MeshSnapshot:
     All is in the directions of the world, from the object's origin: so rounding knows no place in the world.
 
     points, normals : (n, 3), of the vertices; has_face : (n,), which of them are in a face
-    size : as in MeshSurface; spacing : how far apart neighbouring float32 numbers are, in the mesh
+    size : as in MeshSurface; spacing : how far apart neighbouring float32 numbers are at most, in the mesh
     checksum, matrix : another for another shape; the object's transform
     """
 
@@ -27,7 +27,8 @@ class MeshSnapshot:
         mesh = evaluated.data
         self.checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
         self.size = size_of(evaluated, linear)
-        self.spacing = float(np.spacing(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max())
+        farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
+        self.spacing = farthest * np.finfo(np.float32).eps
         normals = np.empty_like(co)
         mesh.vertex_normals.foreach_get("vector", normals.ravel())
         corners = np.empty(len(mesh.loops), dtype=np.int32)

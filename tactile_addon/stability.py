@@ -92,11 +92,11 @@ class StabilityMap:
         touched = []
         for number in numbers:
             contours = self._track(self.chosen[number])
-            if contours is not None:
-                ended = _reasons(contours, self.surface.points[self.chosen[number]])
-                self.reason[number] = ended if ended is not None else 0
-                if ended is None:
-                    touched.append((number, contours))
+            ended = contours and _ended(contours, self.surface.points[self.chosen[number]])
+            if ended:
+                self.reason[number] = _reason_of(ended)
+            elif contours:
+                touched.append((number, contours))
             yield
         if not touched:
             return
@@ -113,7 +113,8 @@ class StabilityMap:
             if isinstance(result, core.Reconstruction):
                 self._note(number, result)
             else:
-                self.reason[number] = _reason_of(stop for contour in contours for stop in contour.stops)
+                shortest = min(contours, key=lambda contour: len(contour.points))
+                self.reason[number] = _reason_of(shortest.stops)
             yield
 
     def _track(self, vertex):
@@ -200,19 +201,18 @@ def _height_off(surface, start, up, reach):
     return nearest
 
 
-def _reasons(contours, point):
-    """The code of the reason why a curve does not go on to both sides of the point, or None."""
-    ended = [
+def _ended(contours, point):
+    """Why curves do not go on to both sides of the point: it is on a crease or an edge."""
+    return [
         stop
         for contour in contours
         for end, stop in zip((0, -1), contour.stops, strict=True)
         if stop != core.EXTENT and np.array_equal(contour.points[end], point)
     ]
-    return _reason_of(ended) if ended else None
 
 
 def _reason_of(stops):
-    """The code of the commonest of these reasons; a curve without tangent plane is on a crease."""
+    """The code of the commonest of these; curves that go on, but have no tangent plane, are on a crease."""
     counts = Counter(stop for stop in stops if stop in STOPS)
     return STOPS[counts.most_common(1)[0][0] if counts else core.CREASE]
 
