@@ -125,21 +125,20 @@ def misses(curves: Curves) -> tuple[Array, Array]:
     (c,) each: the part across the tangent t of r0 in r = r0 + r1 s + r2 s^2, s along t, fitted to the
     nearest contacts. 0 where there are too few of them to tell.
     """
-    distances, stds = np.zeros(len(curves.points)), np.zeros(len(curves.points))
-    each = zip(curves.points, curves.present, curves.along, curves.tangents, strict=True)
-    for i, (points, present, along, tangent) in enumerate(each):
-        near = np.argsort(np.where(present, np.abs(along), np.inf), kind="stable")[:WINDOW]
-        r = points[near[present[near]]]
-        s = r @ tangent
-        if len(r) <= LEAST_CONTACTS or not s.any():
-            continue
-        basis = (s[:, None] / np.abs(s).max()) ** np.arange(3)
-        inverse = np.linalg.pinv(basis)
-        solution = inverse @ r
-        left = r - basis @ solution
-        distances[i] = math.hypot(*cross(solution[0], tangent))
-        stds[i] = math.sqrt(np.sum(left**2) / (len(r) - 3) * (inverse[0] @ inverse[0]))
-    return distances, stds
+    distance = np.where(curves.present, np.abs(curves.along), np.inf)
+    order = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
+    near = np.take_along_axis(curves.present, order, axis=1)
+    r = near[..., None] * np.take_along_axis(curves.points, order[..., None], axis=1)
+    s = np.einsum("cni,ci->cn", r, curves.tangents)
+    count, longest = np.count_nonzero(near, axis=1), np.abs(s).max(axis=1)
+    told = (count > LEAST_CONTACTS) & (longest > 0.0)
+    basis = near[..., None] * (s / np.where(told, longest, 1.0)[:, None])[..., None] ** np.arange(3)
+    inverse = np.linalg.pinv(basis)
+    solution = inverse @ r
+    variance = np.sum((r - basis @ solution) ** 2, axis=(1, 2)) / np.maximum(count - 3, 1)
+    stds = np.sqrt(variance * np.sum(inverse[:, 0] ** 2, axis=1))
+    distances = np.linalg.norm(cross(solution[:, 0].T, curves.tangents.T), axis=0)
+    return np.where(told, distances, 0.0), np.where(told, stds, 0.0)
 
 
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:

@@ -104,6 +104,14 @@ def terms_to(degree: int) -> int:
     return (degree + 1) * (degree + 2) // 2 - 1
 
 
+def coefficients_of(patch: MongePatch) -> Array:
+    """Of the terms of a Posterior, (27,)."""
+    b = np.zeros(len(TERMS))
+    b[2], b[4] = patch.k1 / 2.0, patch.k2 / 2.0
+    b[FREE : FREE + len(patch.coefficients)] = patch.coefficients
+    return b
+
+
 def _turn(angle: Array) -> Array:
     """(..., 27, 27): coefficients in axes turned by `angle` about the normal.
 

@@ -3,6 +3,7 @@
 """A patch with its frame, and everything one may ask of it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,8 +15,8 @@ from .arguments import Array
 from .bayes import posterior_of
 from .domain import Domain
 from .local_geometry import Curves, Frame, misses
-from .monge import MongePatch
-from .posterior import Posterior, terms_to
+from .monge import MongePatch, exponents, monomials
+from .posterior import TERMS, Posterior, coefficients_of, terms_to
 from .verification import fit_error
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
@@ -24,7 +25,6 @@ DOUBTFUL_TURN = math.radians(8.5)  # of the frame
 DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
-DOMAIN_POINTS = 150  # of a mean over the domain
 
 
 @dataclass(frozen=True)
@@ -77,13 +77,17 @@ class Reconstruction:
     @cached_property
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
-        points, _ = self.domain.grid(DOMAIN_POINTS)
-        return float(np.mean(self.height_std(*points.T)))
+        return mean_height_stds([self])[0]
 
     @cached_property
     def blind(self) -> int:
         """How many of the coefficients of degree 1 to d, as directions, the contacts say nothing of."""
         return self.posterior.blind(self.patch.degree)
+
+    @property
+    def blind_share(self) -> float:
+        """`blind` as a share of all the coefficients."""
+        return self.blind / terms_to(self.patch.degree)
 
     @cached_property
     def fit_error(self) -> float:
@@ -101,12 +105,8 @@ class Reconstruction:
     @cached_property
     def condition_number(self) -> float:
         """Of the least-squares system of the coefficients, in unit radius."""
-        return self._problem.condition_number
-
-    @cached_property
-    def _problem(self) -> fitting.Problem:
-        unit = self.patch.scaled(1.0 / self.radius)
-        return fitting.problem(unit.k1, unit.k2, unit.degree, self.contacts / self.radius)
+        x, y, _ = self.contacts.T / self.radius
+        return fitting.condition_number(monomials(x, y, exponents(3, self.patch.degree)))
 
     @property
     def status(self) -> str:
@@ -160,3 +160,23 @@ class Reconstruction:
                 "extent, or add sampling planes."
             )
         return None
+
+
+def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
+    """mean_height_std of each, which keeps it: of many at once it is some times as fast as one by one."""
+    nodes = [r.domain.nodes for r in results]
+    most = max((len(weights) for _, weights in nodes), default=0)
+    points, weights = np.zeros((len(results), most, 2)), np.zeros((len(results), most))
+    for i, (r, (at, weight)) in enumerate(zip(results, nodes, strict=True)):
+        points[i, : len(at)], weights[i, : len(at)] = at / r.radius, weight
+    covariance = np.array([r.posterior.covariance for r in results]).reshape(-1, len(TERMS), len(TERMS))
+    # A patch of lower degree than the posterior departs from its mean as well.
+    off = np.array([r.posterior.mean - coefficients_of(r.patch.scaled(1.0 / r.radius)) for r in results])
+    x, y = points.reshape(-1, 2).T
+    basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
+    variance = np.einsum("bni,bni->bn", basis @ covariance, basis) + (basis @ off[..., None])[..., 0] ** 2
+    means = np.einsum("bn,bn->b", weights, np.sqrt(np.maximum(variance, 0.0)))
+    stds = [r.radius * float(mean) for r, mean in zip(results, means, strict=True)]
+    for r, std in zip(results, stds, strict=True):
+        vars(r)["mean_height_std"] = std
+    return stds

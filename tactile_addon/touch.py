@@ -59,7 +59,7 @@ def touch(
     """
     clock = [perf_counter()]
     surface = MeshSurface(obj, depsgraph)
-    extent, step = _lengths(obj.name, surface, extent, step, noise)
+    extent, step = lengths(obj.name, surface.size, extent, step, noise)
     point, surface_normal = _reference_point(obj.name, surface, location, extent, step)
     outward = surface_normal if normal is None else normal
     if toward is not None and np.dot(outward, toward) < 0.0:
@@ -106,9 +106,8 @@ def verify(touched, most=None):
     touched.report["seconds"] |= dict(zip(("verify", "suggest"), np.diff(clock).tolist(), strict=True))
 
 
-def _lengths(name, surface, extent, step, noise):
-    """Extent and step, chosen by the object's size where they are 0."""
-    size = surface.size
+def lengths(name, size, extent, step, noise):
+    """Extent and step, chosen by the object's size where they are 0. Raises ValueError for bad ones."""
     if min(extent, step, noise) < 0.0:
         raise ValueError(
             f"Extent, step and noise are lengths of 0 or more, got {extent:g}, {step:g} and {noise:g}"
@@ -131,12 +130,17 @@ def _reference_point(name, surface, location, extent, step):
             f'The location is {distance:g} away from "{name}", farther than the extent {extent:g}: '
             "move it to the surface"
         )
-    if surface.spacing(point) > COARSE * step:
+    require_fine(surface.spacing(point), step)
+    return point, normal
+
+
+def require_fine(spacing, step):
+    """Raises ValueError where coordinates are too coarse for the step."""
+    if spacing > COARSE * step:
         raise ValueError(
-            f"Coordinates at the point are {surface.spacing(point):g} apart in single precision, too coarse "
+            f"Coordinates at the point are {spacing:g} apart in single precision, too coarse "
             f"for a step of {step:g}: move the object nearer to the origin of the world or of its own mesh"
         )
-    return point, normal
 
 
 def reference_axes(outward, tangent=None):
