@@ -357,7 +357,7 @@ def draw(rows, caption):
         lines, columns, left=0.08, right=0.99, top=0.95, bottom=0.02, hspace=0.45, wspace=0.2
     )
     for number, sweep in enumerate(SWEEPS):
-        cell = grid[divmod(number, columns)].subgridspec(3, 1, height_ratios=(3, 1.2, 1.1), hspace=0.08)
+        cell = grid[divmod(number, columns)].subgridspec(3, 1, height_ratios=(3, 1.2, 1.4), hspace=0.08)
         axes = [figure.add_subplot(part) for part in cell]
         of = {m: [row for row in rows if (row[0], row[2]) == (sweep.title, m)] for m in METHODS}
         panel(axes, sweep, of, number % columns == 0)
@@ -441,7 +441,7 @@ def main():
         f"Medians over ten exact surfaces (quadrics and quartics near the special points) and {seeds} seeds. "
         f"What is not said is harmless: planes 60 degrees apart, {STEPS} steps to a side, noise of {NOISE:g} "
         "mm, radii L of 12 to 15 mm. Error: mean |dz| over the domain. Below it the condition number, and "
-        f"the share of the touches that were warned of or refused. {machine('numpy', 'scipy', 'bpy')}."
+        f"the share of the touches that were warned of or refused. On {machine('numpy', 'scipy', 'bpy')}."
     )
     draw(rows_of(results), caption)
 
