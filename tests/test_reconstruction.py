@@ -313,8 +313,8 @@ def test_bad_arguments_of_many_are_named(change, message):
 
 def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():
     s = np.linspace(0.1, 1.0, 9)
-    curves = [Contour(np.outer(s, [1.0, slope, 0.0]) / np.hypot(1, slope)) for slope in (0.0, 1e-2, 0.0206)]
-    with pytest.raises(DegenerateCurvesError):
+    curves = [Contour(np.column_stack([s, bend * s * (1.0 - s), 0.0 * s])) for bend in (-0.1, 0.0, 0.1)]
+    with pytest.raises(DegenerateCurvesError, match="fewer than three places apart"):
         reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
 
 
