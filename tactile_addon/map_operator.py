@@ -15,6 +15,7 @@ from .settings import NAMES, TouchSettings, draw_all, touch_arguments
 from .stability import StabilityMap
 
 SLICE = 0.05  # seconds of work between two events
+SAY = 1.0  # seconds between two lines of progress
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
 
@@ -41,6 +42,11 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         description="Paint what has been touched so far when it is stopped by Esc",
         default=True,
     )
+    progress: BoolProperty(
+        name="Progress",
+        description="Say on standard error how far it is, where there is no window to show it",
+        options={"HIDDEN", *UNSAVED},
+    )
 
     @classmethod
     def poll(cls, context):
@@ -64,8 +70,7 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         except ValueError as error:
             return report_error(self, error)
         if not getattr(self, "_in_window", False):
-            for _ in self._steps:
-                pass
+            self._run()
             return self._finish(context)
         self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
         context.workspace.status_text_set(_progress(self._map, self.keep))
@@ -79,6 +84,14 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
             target, context.evaluated_depsgraph_get(), spacing=self.spacing, **touch_arguments(self)
         )
         self._steps = self._map.steps()
+
+    def _run(self):
+        """All steps at once; says now and then how far they are, where that is wanted."""
+        said = perf_counter()
+        for _ in self._steps:
+            if self.progress and perf_counter() > said + SAY:
+                said = perf_counter()
+                print(f"{self._map.done} of {len(self._map.chosen)} points", file=sys.stderr, flush=True)
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
@@ -155,7 +168,8 @@ def _progress(touched, keep):
 
     def draw(header, context):
         layout, count = header.layout, len(touched.chosen)
-        layout.label(text="Stop and Keep" if keep else "Stop", icon="EVENT_ESC")
+        layout.label(text="", icon="EVENT_ESC")
+        layout.label(text=" Stop and Keep" if keep else " Stop")
         row = layout.row()
         row.ui_units_x = 16
         row.progress(

@@ -92,7 +92,7 @@ def draw_legend():
     elif obj is not None and map_object.RECORD in obj and obj.visible_get():
         record, shown = obj[map_object.RECORD], obj.tactile_map_colours
         title = obj.bl_rna.properties["tactile_map_colours"].enum_items[shown].name
-        bar = _scale(context, title, record, record["extent"], map_object.POWERS[shown], 0.0)
+        bar = _scale(context, title, record, record["spacing"], map_object.POWERS[shown], 0.0)
         if shown == "reason":
             bar = title, 0.0, []
         elif shown in map_object.LOGARITHMIC:
