@@ -48,6 +48,8 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         options={"HIDDEN", *UNSAVED},
     )
 
+    _timer = None  # while it is running in a window
+
     @classmethod
     def poll(cls, context):
         if context.mode != "OBJECT":
@@ -56,11 +58,12 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         return True
 
     def invoke(self, context, event):
+        if bpy.app.background:
+            return self.execute(context)
         self._in_window = True
         found = probe.probe_of(context.view_layer.objects.active)
         for name in NAMES if found is not None else ():
-            if not self.properties.is_property_set(name):
-                setattr(self, name, getattr(found.tactile_probe, name))
+            setattr(self, name, getattr(found.tactile_probe, name))
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
     def execute(self, context):
@@ -126,9 +129,10 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         context.workspace.status_text_set(None)
 
     def cancel(self, context):
-        """Blender's, where it ends the operator itself: another file is opened, or the window closed."""
-        self._leave(context)
-        print("Stability Map: stopped, for the file or the window was closed", file=sys.stderr)
+        """Blender's, where it ends the operator itself: by the dialog, a new file or a closed window."""
+        if self._timer is not None:
+            self._leave(context)
+            print("Stability Map: stopped, for the file or the window was closed", file=sys.stderr)
 
     def _target(self, context):
         """The target, if it is still what it was when it was first touched; raises ValueError if not."""

@@ -93,6 +93,11 @@ def by_button():
     gui.click(*MAP_BUTTON)
     yield 1
     picture("map_dialog")
+    gui.xdo("key", "Escape")
+    yield 0.5
+    check("Esc in the dialog starts nothing", is_clean() and data_blocks() == before, data_blocks())
+    gui.click(*MAP_BUTTON)
+    yield 1
     gui.xdo("key", "Return")
     yield from until(running, 5)
     check("the button and Return start a map", running())
