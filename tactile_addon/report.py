@@ -32,8 +32,8 @@ def readable(report):
 
 
 def sentence(error):
-    """The words of an exception, as a sentence begins."""
-    words = str(error)
+    """The words of an exception, as a sentence begins, in one line: names may hold more."""
+    words = " ".join(str(error).split())
     return words[:1].upper() + words[1:]
 
 

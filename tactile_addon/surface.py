@@ -21,6 +21,8 @@ class MeshSurface:
 
     def __init__(self, obj, depsgraph):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
+        if obj.type != "MESH":
+            raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
         evaluated = obj.evaluated_get(depsgraph)
         try:
             if obj.data.is_editmode:
