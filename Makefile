@@ -21,11 +21,12 @@ ZIP := build/tactile_patch.zip
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
 	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo test chart paper stability zip zip-nowheels clean
+.PHONY: help demo test fuzz chart paper stability zip zip-nowheels clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
 	@echo 'make test              check style and types, then test the extension in Blender'
+	@echo 'make fuzz              feed it with more than 10,000 odd inputs, in a quarter of an hour'
 	@echo 'make chart [QUICK=1]   draw speed against accuracy, beside what else one could take, in build/charts'
 	@echo 'make paper             repeat the experiments of the paper, beside its figures'
 	@echo 'make stability         lead everything to where it fails, and count who says so'
@@ -42,6 +43,10 @@ test: $(ZIP)
 	$(VENV_PY) -m ruff format --check
 	$(VENV_PY) -m mypy core
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest
+
+fuzz: $(ZIP)
+	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest --hypothesis-profile=long \
+		--hypothesis-show-statistics tests/test_fuzz_core.py tests/test_fuzz_operator.py
 
 chart: $(ZIP) $(PEERS)
 	$(VENV_PY) -m benchmarks.chart $(if $(QUICK),--quick)

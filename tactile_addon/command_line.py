@@ -207,4 +207,7 @@ def _is_number(text):
 
 def _sentence(error):
     """An operator's error without the words Blender puts around it."""
-    return str(error).strip().splitlines()[0].removeprefix("Error: ")
+    words = str(error).strip()
+    if isinstance(error, RuntimeError):  # there may be more than one report
+        words = words.partition("\n")[0].removeprefix("Error: ")
+    return " ".join(words.split())

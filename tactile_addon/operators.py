@@ -95,8 +95,6 @@ def target_object(context, name):
             if name
             else "No object is active: select the mesh object to touch"
         )
-    if obj.type != "MESH":
-        raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
     return obj
 
 

@@ -9,6 +9,7 @@ where they differ afterwards the handler of live.py touches again.
 """
 
 import hashlib
+import math
 
 import bpy
 import numpy as np
@@ -164,6 +165,8 @@ def _touch(probe, depsgraph):
         raise ValueError(
             f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
         )
+    if not all(0.0 < abs(scale) < math.inf for scale in matrix.to_scale()):  # where no child can be placed
+        raise ValueError("the probe is scaled to nothing, or beyond all numbers: give it a scale of 1")
     return touch(
         settings.target,
         depsgraph,

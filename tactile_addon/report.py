@@ -59,8 +59,8 @@ def map_summary(record):
 
 
 def sentence(error):
-    """The words of an exception, as a sentence begins."""
-    words = str(error)
+    """The words of an exception, as a sentence begins, in one line: names may hold more."""
+    words = " ".join(str(error).split())
     return words[:1].upper() + words[1:]
 
 

@@ -21,6 +21,8 @@ class MeshSurface:
 
     def __init__(self, obj, depsgraph):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
+        if obj.type != "MESH":
+            raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
         try:
             evaluated, self._co, self._linear, self._origin = evaluated_mesh(obj, depsgraph)
             evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)

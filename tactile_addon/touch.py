@@ -108,7 +108,7 @@ def verify(touched, most=None):
 
 def lengths(name, size, extent, step, noise):
     """Extent and step, chosen by the object's size where they are 0. Raises ValueError for bad ones."""
-    if min(extent, step, noise) < 0.0:
+    if not all(length >= 0.0 for length in (extent, step, noise)):  # NaN is none
         raise ValueError(
             f"Extent, step and noise are lengths of 0 or more, got {extent:g}, {step:g} and {noise:g}"
         )
@@ -117,6 +117,8 @@ def lengths(name, size, extent, step, noise):
     extent = extent or size * EXTENT_SHARE
     if step > extent:
         raise ValueError(f"The step {step:g} is longer than the extent {extent:g}: take a shorter one")
+    if noise > extent:
+        raise ValueError(f"The noise {noise:g} is larger than the extent {extent:g}: take a smaller one")
     return extent, step or extent / STEPS
 
 

@@ -476,10 +476,13 @@ def nothing(bpy):
         (nothing, {"normal": (0.0, 0.0, 0.0)}, "Normal: wanted a vector with a direction"),
         (nothing, {"normal": (float("nan"), 0.0, 0.0)}, "Normal: wanted finite numbers"),
         (nothing, {"extent": 50.0}, 'The extent 50 is longer than "Sphere"'),
+        (nothing, {"step": 1e-5}, "Step: wanted at least a 10000th of the extent 0.6"),
         (nothing, {"step": 0.9}, "The step 0.9 is longer than the extent 0.6"),
         (nothing, {"extent": -1.0}, "lengths of 0 or more"),
         (nothing, {"step": -0.1}, "lengths of 0 or more"),
         (nothing, {"noise": -0.1}, "lengths of 0 or more"),
+        (nothing, {"extent": float("nan")}, "lengths of 0 or more, got nan"),
+        (nothing, {"noise": 1e30}, "The noise 1e+30 is larger than the extent 0.6"),
         (nothing, {"weight": -1.0}, "Weight: wanted a finite number above 0"),
         (nothing, {"step": 0.6}, "Curve 1 has 2 of the 3 contacts"),
         (nothing, {"azimuths": [0.0] * 6}, "run in one direction"),
@@ -497,6 +500,12 @@ def test_bad_input_gets_a_sentence_and_leaves_nothing(empty, ball, spoil, change
     assert sentence in message
     assert "Traceback" not in message
     assert datablocks(empty) == before
+
+
+def test_a_name_of_two_lines_is_told_in_one(empty, ball):
+    ball.name = "two\nlines"
+    with pytest.raises(RuntimeError, match='away from "two lines", farther than'):
+        empty.ops.tactile.reconstruct(target=ball.name, location=(0.0, 0.0, 9.0), extent=0.6)
 
 
 def test_with_nothing_active_the_operator_asks_for_a_mesh(empty):

@@ -64,6 +64,28 @@ def state(patch):
     )
 
 
+def test_a_target_that_is_no_mesh_and_a_scale_that_is_none_are_messages(empty, ball, capfd):
+    """Only the panel keeps a script from setting them."""
+    probe, patch = pick(empty)
+    settings = probe.tactile_probe
+    for change, back, message in (
+        (lambda: setattr(settings, "target", probe), lambda: setattr(settings, "target", ball), "is no mesh"),
+        (lambda: setattr(probe, "scale", (0, 1, 1)), lambda: setattr(probe, "scale", (1, 1, 1)), "scaled to"),
+        (
+            lambda: setattr(probe, "scale", (1, 1, 3e38)),
+            lambda: setattr(probe, "scale", (1, 1, 1)),
+            "scaled to",
+        ),
+    ):
+        change()
+        update(empty)
+        assert message in settings.message
+        back()
+        update(empty)
+        assert_touches(probe, patch)
+    assert "Traceback" not in "".join(capfd.readouterr())
+
+
 def in_world(obj):
     return values(obj) @ np.array(obj.matrix_world)[:3, :3].T + place(obj)
 

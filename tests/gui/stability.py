@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, look
+from common import check, data_blocks, last_report, look
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
@@ -145,6 +145,7 @@ def by_escape():
         check(f"Esc ends it, keep {keep}", is_clean())
         if not keep:
             check("... and leaves nothing", data_blocks() == before, data_blocks())
+            check("... and says so", "Stopped: nothing was kept" in last_report(), last_report())
             continue
         (painted,) = maps() or [None]
         if check("... and keeps what is done", painted is not None, data_blocks()):
@@ -177,6 +178,14 @@ def undo():
     gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
 
 
+SAID = {
+    delete_target: "is gone: the map of it was stopped",
+    enter_edit_mode: "The map was stopped, for Object Mode was left",
+    move_target: "was moved while it was touched: start again",
+    change_mesh: "was changed while it was touched: start again",
+}
+
+
 def meanwhile():
     """What the user may do while it is going on; it stops, and nothing of it is left."""
     # Undo first: the others leave words below the mouse, which take keys.
@@ -196,6 +205,9 @@ def meanwhile():
         picture(f"map_{disturb.__name__}")
         yield from until(lambda: not running(), 20)
         check(f"{disturb.__name__}: it stops", is_clean())
+        if disturb in SAID:
+            said = last_report()
+            check(f"{disturb.__name__}: ... with a sentence", SAID[disturb] in said, said)
         check(f"{disturb.__name__}: and leaves no map", not maps(), maps())
         if bpy.context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
