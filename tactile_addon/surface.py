@@ -84,8 +84,7 @@ class MeshSurface:
         stretched = not np.allclose(gram, gram[0, 0] * np.eye(3), rtol=0.0, atol=1e-4 * gram[0, 0])
         if stretched and found[2] > 1e-3 * self.size:
             # Nearest within a stretched object may be on another sheet than nearest in the world.
-            offsets = self._co @ self._linear.T.astype(np.float32)
-            offsets -= np.subtract(location, self._origin).astype(np.float32)
+            offsets = self._co @ self._linear.T - np.subtract(location, self._origin)
             nearest = self._co[np.argmin(np.einsum("ij,ij->i", offsets, offsets))]
             found = min(found, self._walk(self._to_world(nearest.tolist()), location), key=lambda f: f[2])
         return found
