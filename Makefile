@@ -21,7 +21,7 @@ ZIP := build/tactile_patch.zip
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
 	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo test fuzz chart paper zip zip-nowheels clean
+.PHONY: help demo test fuzz chart paper stability zip zip-nowheels clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
@@ -29,6 +29,7 @@ help:
 	@echo 'make fuzz              feed it with more than 10,000 odd inputs, in a quarter of an hour'
 	@echo 'make chart [QUICK=1]   draw speed against accuracy, beside what else one could take, in build/charts'
 	@echo 'make paper             repeat the experiments of the paper, beside its figures'
+	@echo 'make stability         lead everything to where it fails, and count who says so'
 	@echo 'make zip               build the zip files of a release, one for each platform, in build/dist'
 	@echo 'make zip-nowheels      build the zip for a Blender whose own Python has scipy, in build/dist'
 	@echo 'make clean             remove build; the downloaded wheels stay'
@@ -54,6 +55,10 @@ chart: $(ZIP) $(PEERS)
 
 paper: $(ZIP) $(PEERS)
 	$(VENV_PY) -m benchmarks.paper $(ZIP)
+
+stability: $(ZIP) $(PEERS)
+	$(VENV_PY) -m benchmarks.stability
+	$(VENV_PY) -m benchmarks.refusals $(ZIP)
 
 zip: $(READY)
 	$(VENV_PY) tools/build.py --wheels all

@@ -90,7 +90,7 @@ def exact_case(name, planes, noise, seed):
 
 def _touched(surface, planes, noise, seed, extent, turn):
     """The case; None where a curve ends early or the surface is no graph over the domain."""
-    axes, kappas = _darboux(surface)
+    axes, kappas = darboux(surface)
     azimuths, tilts = (np.radians(angles) for angles in PLANES[planes])
     sampling = [SamplingPlane(a + np.radians(turn), t) for a, t in zip(azimuths, tilts, strict=True)]
     lengths = {"extent": extent, "step": extent / STEPS, "tangent": axes[:, 0]}
@@ -99,11 +99,13 @@ def _touched(surface, planes, noise, seed, extent, turn):
         return None
     ends = np.vstack([contour.points[[0, -1]] for contour in contours]) - surface.point
     domain = closed_spline_domain((ends @ axes)[:, :2], extent)
-    hold_out = _above(surface, axes, kappas, domain.grid(HOLD_OUT)[0])
-    return None if hold_out is None else Case(surface.point, axes, kappas, contours, noise, hold_out)
+    hold_out = above(surface, axes, kappas, domain.grid(HOLD_OUT)[0])
+    if np.isnan(hold_out).any():
+        return None
+    return Case(surface.point, axes, kappas, contours, noise, hold_out)
 
 
-def _darboux(surface):
+def darboux(surface):
     """The true frame and curvatures, from central differences of the normal."""
     n, h = surface.normal, 1e-4
     e1 = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
@@ -121,21 +123,27 @@ def _darboux(surface):
     return np.column_stack([d1, np.cross(n, d1), n]), tuple(kappas)
 
 
-def _above(surface, axes, kappas, points):
+def above(surface, axes, kappas, points):
     """The surface above tangent plane points (m, 2), relative to the reference point, (m, 3).
 
-    By Newton's method from the quadric; None where it finds no way.
+    By Newton's method from the quadric; NaN where it finds no way.
     """
     n, h = axes[:, 2], 1e-5
     z = (points**2 @ kappas) / 2.0
+    found = np.full((len(z), 3), np.nan)
+    pending = np.arange(len(z))
     for _ in range(60):
-        there = surface.point + points @ axes[:, :2].T + np.outer(z, n)
+        there = surface.point + points[pending] @ axes[:, :2].T + np.outer(z[pending], n)
         slope = (surface.level(*(there + h * n).T) - surface.level(*(there - h * n).T)) / (2.0 * h)
-        step = surface.level(*there.T) / slope
-        z = z - np.clip(step, -3.0, 3.0)
-        if np.abs(step).max() < 1e-9:
-            return points @ axes[:, :2].T + np.outer(z, n)
-    return None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = surface.level(*there.T) / slope
+        done = np.abs(step) < 1e-9
+        found[pending[done]] = there[done] - surface.point
+        z[pending] -= np.clip(step, -3.0, 3.0)
+        pending = pending[~done]
+        if not len(pending):
+            break
+    return found
 
 
 def random_cases(seed):
@@ -150,7 +158,7 @@ def random_cases(seed):
         extent, turn = rng.uniform(10.0, 13.0), rng.uniform(0.0, 180.0)
         if surface is None:
             continue
-        _, (k1, k2) = _darboux(surface)
+        _, (k1, k2) = darboux(surface)
         if max(-k1, k2) > 1.0 / 15.0 or (k1 * k2 < 0.0) != (seed % 3 == 0):
             continue
         cases = {
@@ -229,7 +237,7 @@ def noise_limit(case, surface):
     """The mean |dz| (um) of five terms fitted to the noise alone, as if all higher terms were known."""
     contacts = np.vstack([c.points for c in case.contours]) - case.point
     x, y, z = (contacts @ case.axes).T
-    there = _above(surface, case.axes, case.kappas, np.column_stack([x, y]))
+    there = above(surface, case.axes, case.kappas, np.column_stack([x, y]))
     terms = exponents(1, 2)
     b = np.linalg.lstsq(monomials(x, y, terms), z - there @ case.axes[:, 2], rcond=None)[0]
     over = case.hold_out @ case.axes

@@ -104,7 +104,7 @@ def find(key):
     while True:
         surface, extent = accuracy._random_shape(rng), rng.uniform(10.0, 13.0)
         # As curved as in accuracy.random_cases.
-        kappas = None if surface is None else accuracy._darboux(surface)[1]
+        kappas = None if surface is None else accuracy.darboux(surface)[1]
         if kappas is None or max(-kappas[0], kappas[1]) > 1.0 / 15.0:
             continue
         if (kappas[0] * kappas[1] < 0.0) == (key % 3 == 0) and (there := _at(surface, extent)) is not None:
@@ -113,14 +113,14 @@ def find(key):
 
 def _at(surface, extent):
     """None where a curve ends early or the surface is no graph over the domain."""
-    place = Place(Remembering(surface), surface.point, extent, *accuracy._darboux(surface))
+    place = Place(Remembering(surface), surface.point, extent, *accuracy.darboux(surface))
     contours = {m: place.tracked(m, 0.0, 0) for m in PLANES}
     if any(c.stops != ("extent", "extent") for m in PLANES for c in contours[m]):
         return None
     ends = np.vstack([c.points[[0, -1]] for c in contours[PLANES[0]]]) - place.point
     domain = closed_spline_domain((ends @ place.axes)[:, :2], extent)
     points, _ = domain.grid(accuracy.HOLD_OUT)
-    hold_out = accuracy._above(surface, place.axes, place.kappas, points)
+    hold_out = accuracy.above(surface, place.axes, place.kappas, points)
     return None if hold_out is None else (place, hold_out)
 
 

@@ -38,7 +38,7 @@ LEAST_COVERED = 0.9  # of the hold-out; a surface with less has failed
 DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}  # of modules that are called otherwise
 KAPPA, NORMAL = "kappa 1/mm", "normal degrees"
 LABEL_SIZE = 7.5
-TIME_LIMITS = (0.5, 300.0)  # of the axes
+TIME_LIMITS = (0.3, 300.0)  # of the axes
 OFF_SCALE = 400.0  # um; above are only names and values
 HEIGHT_LIMITS, KAPPA_LIMITS, NORMAL_LIMITS = (2.5, 1500.0), (5e-6, 0.3), (4e-4, 30.0)
 
@@ -175,7 +175,7 @@ def touch_of(name, planes, noise, seed):
         contours[count] = track(surface, case.point, case.axes[:, 2], sampling, rng=number, **lengths)
     ends = np.vstack([contour.points[[0, -1]] for contour in case.contours]) - case.point
     flat, triangles = closed_spline_domain((ends @ case.axes)[:, :2], extent).triangulation(RINGS)
-    vertices = accuracy._above(surface, case.axes, case.kappas, flat)
+    vertices = accuracy.above(surface, case.axes, case.kappas, flat)
     offsets = np.random.default_rng(number).normal(0.0, noise, len(vertices))
     offsets[0] = 0.0  # the point is exact, as in the contours
     return Touch(case, contours, vertices + np.outer(offsets, case.axes[:, 2]), triangles, extent)

@@ -120,7 +120,7 @@ def exact(name, surface, extent, steps):
 
     def over(r):
         plane = r.domain.grid(VERTICES)[0]
-        return accuracy._above(surface, r.frame.axes, (r.patch.k1, r.patch.k2), plane) @ r.frame.axes
+        return accuracy.above(surface, r.frame.axes, (r.patch.k1, r.patch.k2), plane) @ r.frame.axes
 
     return Place(name, surface, surface.point, surface.normal, extent, steps, over)
 
@@ -230,7 +230,7 @@ def true_curvature(surface, r):
     points, z = surfaces.heights_over(surface, r, 600)
     total = 0.0
     for point in r.frame.to_world(np.column_stack([points, z])):
-        axes, (k1, k2) = accuracy._darboux(replace(surface, point=point))
+        axes, (k1, k2) = accuracy.darboux(replace(surface, point=point))
         total += abs(k1 * k2) / (axes[:, 2] @ r.frame.axes[:, 2])
     return total * r.domain.area / len(points)
 

@@ -11,12 +11,17 @@ from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import azimuth_of, suggest_plane
 from .reconstruction import METHODS, SOLVERS, reconstruct, reconstruct_many
-from .result import Reconstruction
-from .tracking import Contour, SamplingPlane, Surface, track
+from .result import Reconstruction, mean_height_stds
+from .sampling import spaced
+from .tracking import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane, Surface, track
 from .verification import distances, fit_error, overlapped
 
 __all__ = [
+    "CREASE",
+    "EXTENT",
     "METHODS",
+    "NOT_MONGE",
+    "NO_CONTACT",
     "SOLVERS",
     "Contour",
     "DegenerateCurvesError",
@@ -29,9 +34,11 @@ __all__ = [
     "azimuth_of",
     "distances",
     "fit_error",
+    "mean_height_stds",
     "overlapped",
     "reconstruct",
     "reconstruct_many",
+    "spaced",
     "suggest_plane",
     "track",
 ]

@@ -32,7 +32,7 @@ from .evidence import (
     prior_variances,
     restricted,
 )
-from .monge import MongePatch, monomials
+from .monge import monomials
 from .posterior import FREE, TERMS, Posterior
 from .tracking import cross
 
@@ -111,17 +111,15 @@ def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Po
         hyper = Hyperparameters(waviness, prior_variances(waviness), touches.floor)
     else:
         hyper = evidence(data, noises(data, touches.floor))
-    # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
-    precision = _precision(system, prior_variances(hyper.waviness), hyper.noise)
-    solution = np.linalg.solve(precision, (system.seen / hyper.noise[:, None] ** 2)[..., None])
-    mean = prior_mean + solution[..., 0]
+    solution = _solution(system, hyper)
+    mean = prior_mean + solution
     turned = [_turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
     axes, k1, k2, angle = (np.array(values) for values in zip(*turned, strict=True))
     # Outliers show against a surface in level axes.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
     weights, settled, posterior = touches.weights, np.full(len(mean), step == PASSES - 1), None
     if data is not None and level.any():
-        residuals = system.heights - (system.basis @ solution)[..., 0]
+        residuals = system.heights - (system.basis @ solution[..., None])[..., 0]
         weights = np.where(level[:, None], _student_weights(residuals, weights > 0.0, touches.floor), weights)
         settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED)
     if data is not None and settled.any():
@@ -132,21 +130,13 @@ def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Po
     return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, posterior
 
 
-def posterior_of(patch: MongePatch, contacts: Array, accuracy: float) -> Posterior:
-    """What contacts (n, 3) leave open, in the frame of a patch, where the patch is the mean.
-
-    All in unit radius. The noise is what the patch leaves over at the contacts, or `accuracy`.
-    """
-    weights = np.ones((1, len(contacts)))
-    system = _system(contacts[None], weights, np.zeros((1, len(TERMS))))
+def posterior_of(k1: float, k2: float, contacts: Array, accuracy: float) -> Posterior:
+    """What contacts (n, 3) say in a frame and about curvatures that are given; all in unit radius."""
+    weights, prior_mean = np.ones((1, len(contacts))), _prior_mean(k1, k2)[None]
+    system = _system(contacts[None], weights, prior_mean)
     data = restricted(system.basis, system.heights, weights)
-    x, y, z = contacts.T
-    residual = math.sqrt(np.mean((z - patch.height(x, y)) ** 2))
-    hyper = evidence(data, np.array([[max(residual, accuracy, MISFIT)]]))
-    mean = np.zeros((1, len(TERMS)))
-    mean[0, [2, 4]] = patch.k1 / 2.0, patch.k2 / 2.0
-    mean[0, FREE : FREE + len(patch.coefficients)] = patch.coefficients
-    return _posterior(mean, system, data, hyper).at(0)
+    hyper = evidence(data, noises(data, np.array([max(accuracy, MISFIT)])))
+    return _posterior(prior_mean + _solution(system, hyper), system, data, hyper).at(0)
 
 
 def _prior_mean(k1: float, k2: float) -> Array:
@@ -176,6 +166,14 @@ def _system(local: Array, weights: Array, prior_mean: Array) -> _System:
     heights = local[..., 2] - (basis @ prior_mean[..., None])[..., 0]
     weighted = np.swapaxes(weights[..., None] * basis, 1, 2)
     return _System(basis, heights, weighted @ basis, (weighted @ heights[..., None])[..., 0])
+
+
+def _solution(system: _System, hyper: Hyperparameters) -> Array:
+    """The likeliest coefficients less the prior's mean, (b, 27)."""
+    # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
+    precision = _precision(system, prior_variances(hyper.waviness), hyper.noise)
+    solution: Array = np.linalg.solve(precision, (system.seen / hyper.noise[:, None] ** 2)[..., None])
+    return solution[..., 0]
 
 
 def _posterior(mean: Array, system: _System, data: Restricted, hyper: Hyperparameters) -> Posterior:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .arguments import Array
 
 SAMPLES = 1024  # of the boundary; its radius is then good to 1e-5
+ALONG, ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
 
 
 @dataclass(frozen=True)
@@ -23,17 +24,52 @@ class Domain:
     ends: Array
 
     @cached_property
+    def _pieces(self) -> tuple[Array, Array, Array]:
+        """The boundary between end i and end i + 1: the ends after, the chords (m,), and the bends (m, 2).
+
+        A cubic spline by chord length; the bends are its second derivatives at the ends.
+        """
+        row = np.arange(len(self.ends))
+        after = self.ends[row - len(row) + 1]
+        steps = after - self.ends
+        chords = np.sqrt(np.einsum("mi,mi->m", steps, steps))
+        slopes, before = steps / chords[:, None], chords[row - 1]
+        system = np.zeros((len(row), len(row)))
+        system[row, row] = 2.0 * (before + chords)
+        system[row, row - 1] = system[row - 1, row] = before
+        return after, chords, np.linalg.solve(system, 6.0 * (slopes - slopes[row - 1]))
+
+    def _spline(self, piece: NDArray[np.intp], share: Array) -> tuple[Array, Array]:
+        """Points (n, 2) at a share of the way from end `piece` (n,) to the next, and derivatives by it."""
+        after, chords, bends = self._pieces
+        t, rest = share[:, None], 1.0 - share[:, None]
+        start, end, scale = self.ends[piece], after[piece], (chords[piece] ** 2 / 6.0)[:, None]
+        one, other = scale * bends[piece], scale * bends[piece - len(bends) + 1]
+        points = rest * start + t * end + (rest**3 - rest) * one + (t**3 - t) * other
+        return points, end - start + (1.0 - 3.0 * rest**2) * one + (3.0 * t**2 - 1.0) * other
+
+    @cached_property
     def _polar(self) -> tuple[Array, Array]:
         """Azimuths, ascending, and radii of the boundary."""
-        from scipy.interpolate import CubicSpline
-
-        closed = np.vstack([self.ends, self.ends[:1]])
-        chords = np.linalg.norm(np.diff(closed, axis=0), axis=1)
-        at = np.concatenate([[0.0], np.cumsum(chords)])
-        x, y = CubicSpline(at, closed, bc_type="periodic")(np.linspace(0.0, at[-1], SAMPLES + 1)[:-1]).T
+        chords = self._pieces[1]
+        starts = np.cumsum(chords) - chords
+        at = (starts[-1] + chords[-1]) / SAMPLES * np.arange(SAMPLES)
+        piece = np.searchsorted(starts, at, side="right") - 1
+        x, y = self._spline(piece, (at - starts[piece]) / chords[piece])[0].T
         azimuths = np.arctan2(y, x)
         order = np.argsort(azimuths)
         return azimuths[order], np.hypot(x, y)[order]
+
+    @cached_property
+    def nodes(self) -> tuple[Array, Array]:
+        """Points (n, 2) inside and weights (n,) of sum 1 for the mean of a function: Gauss, n = 12 m.
+
+        In circles parallel to the boundary.
+        """
+        piece, share, along, out, outward = _gauss(len(self.ends))
+        points, ahead = self._spline(piece, share)
+        weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
+        return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 
     def _radius(self, azimuth: Array) -> Array:
         return np.interp(azimuth, *self._polar, period=2.0 * np.pi)
@@ -75,6 +111,20 @@ class Domain:
         ring = np.repeat(np.arange(rings + 1), [1, *range(6, 6 * rings + 1, 6)])
         turn = np.concatenate([[0.0], *(np.arange(6 * k) / (6 * k) for k in range(1, rings + 1))])
         return self._at(2.0 * np.pi * turn) * (ring / rings)[:, None], _disk(rings)
+
+
+@lru_cache(maxsize=16)
+def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
+    """For Domain.nodes: piece, place on it and weight of each ray; places and weights along a ray."""
+    along, along_weights = np.polynomial.legendre.leggauss(ALONG)  # type: ignore[no-untyped-call]
+    square, outward = np.polynomial.legendre.leggauss(ACROSS)  # type: ignore[no-untyped-call]  # in r^2
+    return (
+        np.repeat(np.arange(ends), ALONG),
+        np.tile(0.5 * (along + 1.0), ends),
+        np.tile(along_weights, ends),
+        np.sqrt(0.5 * (square + 1.0))[:, None, None],
+        0.5 * outward[:, None],
+    )
 
 
 @lru_cache(maxsize=4)

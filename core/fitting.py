@@ -27,18 +27,18 @@ class Problem:
     basis: Array
     remainder: Array
 
-    @property
-    def condition_number(self) -> float:
-        """Largest over smallest singular value of the basis; 1e16 where it has no full rank."""
-        singular = np.linalg.svd(self.basis, compute_uv=False)
-        return float(singular[0] / max(singular[-1], 1e-16 * singular[0])) if singular.size else 1.0
-
 
 def problem(k1: float, k2: float, degree: int, points: Array) -> Problem:
     """What (5) asks of the terms of degree 3 to `degree` at local contacts (n, 3)."""
     quadric = MongePatch(k1, k2, np.empty(0))
     x, y, z = points.T
     return Problem(quadric, degree, monomials(x, y, exponents(3, degree)), z - quadric.height(x, y))
+
+
+def condition_number(basis: Array) -> float:
+    """Largest over smallest singular value; 1e16 where there is no full rank."""
+    singular = np.linalg.svd(basis, compute_uv=False)
+    return float(singular[0] / max(singular[-1], 1e-16 * singular[0])) if singular.size else 1.0
 
 
 def least_squares(data: Problem) -> Array:

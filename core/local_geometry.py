@@ -119,6 +119,28 @@ def curves_through(r: Array, present: NDArray[np.bool_]) -> Curves:
     )
 
 
+def misses(curves: Curves) -> tuple[Array, Array]:
+    """The distances at which the c curves of one touch pass its reference point, and their deviations.
+
+    (c,) each: the part across the tangent t of r0 in r = r0 + r1 s + r2 s^2, s along t, fitted to the
+    nearest contacts. 0 where there are too few of them to tell.
+    """
+    distance = np.where(curves.present, np.abs(curves.along), np.inf)
+    order = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
+    near = np.take_along_axis(curves.present, order, axis=1)
+    r = near[..., None] * np.take_along_axis(curves.points, order[..., None], axis=1)
+    s = np.einsum("cni,ci->cn", r, curves.tangents)
+    count, longest = np.count_nonzero(near, axis=1), np.abs(s).max(axis=1)
+    told = (count > LEAST_CONTACTS) & (longest > 0.0)
+    basis = near[..., None] * (s / np.where(told, longest, 1.0)[:, None])[..., None] ** np.arange(3)
+    inverse = np.linalg.pinv(basis)
+    solution = inverse @ r
+    variance = np.sum((r - basis @ solution) ** 2, axis=(1, 2)) / np.maximum(count - 3, 1)
+    stds = np.sqrt(variance * np.sum(inverse[:, 0] ** 2, axis=1))
+    distances = np.linalg.norm(cross(solution[:, 0].T, curves.tangents.T), axis=0)
+    return np.where(told, distances, 0.0), np.where(told, stds, 0.0)
+
+
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
     """t and r'' of r = t s + r'' s^2 / 2 by least squares, (c, 3) each, from (c, k) and (c, k, 3).
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .arguments import unit_vector
 from .monge import monomials
 from .posterior import TERMS
-from .result import DOMAIN_POINTS, Reconstruction
+from .result import Reconstruction
 from .tracking import SamplingPlane
 
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))
@@ -26,7 +26,7 @@ def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
     The contour is taken to reach as far and to have as many contacts as those before, with their
     noise. What it will show follows from where it runs, not from the heights found there.
     """
-    x, y = r.domain.grid(DOMAIN_POINTS)[0].T
+    (x, y), weights = r.domain.nodes[0].T, r.domain.nodes[1]
     over = monomials(x / r.radius, y / r.radius, TERMS)
     count = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
     along = np.linspace(-1.0, 1.0, count)
@@ -37,10 +37,10 @@ def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
     shared = contours @ r.posterior.covariance
     seen = shared @ np.swapaxes(contours, 1, 2) + r.posterior.noise**2 * np.eye(count)
     taken = np.swapaxes(shared, 1, 2) @ np.linalg.solve(seen, shared)
-    best = int(np.argmax(np.einsum("kij,ij->k", taken, over.T @ over)))
+    best = int(np.argmax(np.einsum("kij,ij->k", taken, over.T @ (weights[:, None] * over))))
     lost = np.einsum("ni,ij,nj->n", over, taken[best], over)
     variance = np.maximum((r.height_std(x, y) / r.radius) ** 2 - lost, 0.0)
-    return SamplingPlane(float(AZIMUTHS[best])), r.radius * float(np.mean(np.sqrt(variance)))
+    return SamplingPlane(float(AZIMUTHS[best])), r.radius * float(weights @ np.sqrt(variance))
 
 
 def azimuth_of(direction: ArrayLike, normal: ArrayLike, tangent: ArrayLike | None = None) -> float:

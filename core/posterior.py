@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What contacts say of a surface and what they leave open: a Gaussian over polynomials of degree 6."""
 
+import math
 from functools import cache
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ TERMS = exponents(1, DEGREE)
 ORDERS = TERMS.sum(axis=1).astype(float)
 FREE = 5  # x, y, x^2, xy, y^2 have no prior
 DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L
+ALIKE = 0.045  # curvatures, that say nothing of directions
 INVISIBLE = 0.9  # of the prior's variance, left over
 
 
@@ -77,6 +79,19 @@ class Posterior(NamedTuple):
                 return degree
         return DEGREE
 
+    def turn(self) -> float:
+        """The angle (radians) that the Darboux frame may be off: two standard deviations, and the mean's.
+
+        0 where the curvatures differ by less than ALIKE, within a standard deviation.
+        """
+        x, y, xx, xy, yy = self.mean[:FREE]
+        c = self.covariance
+        difference = 2.0 * math.hypot(yy - xx, xy)
+        if difference + 2.0 * math.sqrt(max(c[2, 2] + c[4, 4] - 2.0 * c[2, 4], 0.0)) <= ALIKE:
+            return 0.0
+        std = math.sqrt(c[0, 0] + c[1, 1] + c[3, 3] / max(difference, 1e-9) ** 2)
+        return min(math.hypot(x, y, 0.5 * math.atan2(-xy, yy - xx), 2.0 * std), math.pi / 2.0)
+
     def blind(self, degree: int) -> int:
         """How many directions among the terms of degree 1 to `degree` keep 90 % of their prior variance."""
         last = terms_to(degree) - FREE
@@ -87,6 +102,14 @@ class Posterior(NamedTuple):
 def terms_to(degree: int) -> int:
     """The number of terms of degree 1 to `degree`."""
     return (degree + 1) * (degree + 2) // 2 - 1
+
+
+def coefficients_of(patch: MongePatch) -> Array:
+    """Of the terms of a Posterior, (27,)."""
+    b = np.zeros(len(TERMS))
+    b[2], b[4] = patch.k1 / 2.0, patch.k2 / 2.0
+    b[FREE : FREE + len(patch.coefficients)] = patch.coefficients
+    return b
 
 
 def _turn(angle: Array) -> Array:

@@ -218,8 +218,9 @@ def _result(
             "the curves end in fewer than three places apart from each other, so they bound no patch: "
             "turn the sampling planes, or move the point away from the edge"
         )
-    contacts, converged = touch.curves.points[touch.curves.present], True
+    converged = True
     if posterior is None:
+        contacts = touch.curves.points[touch.curves.present]
         data = fitting.problem(touch.k1, touch.k2, touch.degree, contacts)
         a, converged = _coefficients(data, domain, touch.curves, options)
         patch = MongePatch(touch.k1, touch.k2, a)
@@ -230,7 +231,7 @@ def _result(
         radius=touch.radius,
         patch=patch.scaled(touch.radius),
         domain=Domain(domain.ends * touch.radius),
-        contacts=contacts * touch.radius,
+        curves=touch.curves,
         accuracy=touch.accuracy,
         method=options.method,
         converged=converged,

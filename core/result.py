@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A patch with its frame, and everything one may ask of it."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,14 +14,17 @@ from . import fitting
 from .arguments import Array
 from .bayes import posterior_of
 from .domain import Domain
-from .local_geometry import Frame
-from .monge import MongePatch
-from .posterior import Posterior, terms_to
+from .local_geometry import Curves, Frame, misses
+from .monge import MongePatch, exponents, monomials
+from .posterior import TERMS, Posterior, coefficients_of, terms_to
 from .verification import fit_error
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
-DOMAIN_POINTS = 150  # of a mean over the domain
+DOUBTFUL_TURN = math.radians(8.5)  # of the frame
+DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
+SIGNIFICANT = 5.0  # standard deviations of it,
+LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
 
 
 @dataclass(frozen=True)
@@ -29,7 +34,7 @@ class Reconstruction:
     frame : the Darboux frame
     radius : L, the largest distance of a contact from the point in the tangent plane
     patch, domain : the surface (1) and the part of the tangent plane it is meant for
-    contacts : (n, 3), what was fitted, in the frame
+    curves : what was fitted, in the frame and in units of L
     accuracy : standard deviation of a contact, at least, in units of L
     method : of the fit
     converged : whether its solver did
@@ -42,38 +47,47 @@ class Reconstruction:
     radius: float
     patch: MongePatch
     domain: Domain
-    contacts: Array
+    curves: Curves
     accuracy: float
     method: str
     converged: bool = True
     joint_posterior: Posterior | None = None
 
     @cached_property
+    def contacts(self) -> Array:
+        """What was fitted, (n, 3), in the frame."""
+        return self.radius * self.curves.points[self.curves.present]
+
+    @cached_property
     def posterior(self) -> Posterior:
         """What the contacts leave open, in the frame and in units of L."""
         if self.joint_posterior is not None:
             return self.joint_posterior
-        unit = 1.0 / self.radius
-        return posterior_of(self.patch.scaled(unit), unit * self.contacts, self.accuracy)
+        contacts = self.curves.points[self.curves.present]
+        return posterior_of(self.patch.k1 * self.radius, self.patch.k2 * self.radius, contacts, self.accuracy)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
         x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         u, v = x_array.ravel() / self.radius, y_array.ravel() / self.radius
-        # A patch of lower degree than the posterior departs from its mean as well.
+        # A patch of lower degree, or by another method, departs from the posterior's mean as well.
         off = self.posterior.height(u, v) - self.patch.height(x_array, y_array).ravel() / self.radius
         return (self.radius * np.hypot(self.posterior.height_std(u, v), off)).reshape(x_array.shape)
 
     @cached_property
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
-        points, _ = self.domain.grid(DOMAIN_POINTS)
-        return float(np.mean(self.height_std(*points.T)))
+        return mean_height_stds([self])[0]
 
     @cached_property
     def blind(self) -> int:
         """How many of the coefficients of degree 1 to d, as directions, the contacts say nothing of."""
         return self.posterior.blind(self.patch.degree)
+
+    @property
+    def blind_share(self) -> float:
+        """`blind` as a share of all the coefficients."""
+        return self.blind / terms_to(self.patch.degree)
 
     @cached_property
     def fit_error(self) -> float:
@@ -91,12 +105,8 @@ class Reconstruction:
     @cached_property
     def condition_number(self) -> float:
         """Of the least-squares system of the coefficients, in unit radius."""
-        return self._problem.condition_number
-
-    @cached_property
-    def _problem(self) -> fitting.Problem:
-        unit = self.patch.scaled(1.0 / self.radius)
-        return fitting.problem(unit.k1, unit.k2, unit.degree, self.contacts / self.radius)
+        x, y, _ = self.contacts.T / self.radius
+        return fitting.condition_number(monomials(x, y, exponents(3, self.patch.degree)))
 
     @property
     def status(self) -> str:
@@ -135,4 +145,38 @@ class Reconstruction:
                 f"Heights are good to {100.0 * share:.1f} % of the radius in the mean: take a shorter "
                 "extent, or add sampling planes."
             )
+        distances, stds = misses(self.curves)
+        stds = np.maximum(stds, LEAST_SCATTER * self.accuracy)
+        apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))
+        if len(apart):
+            return "uncertain", (
+                f"Curve {apart[0] + 1} passes the reference point at {self.radius * distances[apart[0]]:.3g}"
+                ", more than its scatter explains: set the point where the curves meet."
+            )
+        turn = self.posterior.turn()
+        if turn > DOUBTFUL_TURN:
+            return "uncertain", (
+                f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
+                "extent, or add sampling planes."
+            )
         return None
+
+
+def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
+    """mean_height_std of each, which keeps it: of many at once it is some times as fast as one by one."""
+    nodes = [r.domain.nodes for r in results]
+    most = max((len(weights) for _, weights in nodes), default=0)
+    points, weights = np.zeros((len(results), most, 2)), np.zeros((len(results), most))
+    for i, (r, (at, weight)) in enumerate(zip(results, nodes, strict=True)):
+        points[i, : len(at)], weights[i, : len(at)] = at / r.radius, weight
+    covariance = np.array([r.posterior.covariance for r in results]).reshape(-1, len(TERMS), len(TERMS))
+    # A patch of lower degree than the posterior departs from its mean as well.
+    off = np.array([r.posterior.mean - coefficients_of(r.patch.scaled(1.0 / r.radius)) for r in results])
+    x, y = points.reshape(-1, 2).T
+    basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
+    variance = np.einsum("bni,bni->bn", basis @ covariance, basis) + (basis @ off[..., None])[..., 0] ** 2
+    means = np.einsum("bn,bn->b", weights, np.sqrt(np.maximum(variance, 0.0)))
+    stds = [r.radius * float(mean) for r, mean in zip(results, means, strict=True)]
+    for r, std in zip(results, stds, strict=True):
+        vars(r)["mean_height_std"] = std
+    return stds

@@ -14,6 +14,7 @@ from .arguments import LARGEST, Array, finite_array, list_of, number, shown, uni
 
 MAX_TURN = math.cos(math.radians(45.0))  # between contacts; a sharper turn is a crease to a finger
 MAX_TILT = math.cos(math.radians(75.0))  # against the normal at the point; beyond, slopes exceed 3.7
+COARSE = 0.01  # of a curve's size; coordinates rounded by more say nothing about curvature
 LEAST_IN_PLANE = 1e-3  # of a surface normal
 MOST_CONTACTS = 10_000  # on half a contour
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
@@ -56,21 +57,16 @@ class SamplingPlane:
         world Y where X is within 26 degrees of the normal. Raises ValueError where `tangent` is
         along the normal, or the tilt is not between -90 and 90 degrees.
         """
-        n = unit_vector("normal", normal)
+        n = _vector(unit_vector("normal", normal))
+        return np.array(self._axes(n, _tangent(n, tangent))).T
+
+    def _axes(self, n: Vector, e1: Vector) -> tuple[Vector, Vector, Vector]:
         azimuth, tilt = number("azimuth", self.azimuth), number("tilt", self.tilt)
         if abs(tilt) >= math.pi / 2:
             raise ValueError(f"tilt: wanted less than 90 degrees, got {math.degrees(tilt):g}")
-        if tangent is None:
-            tangent = (0.0, 1.0, 0.0) if abs(n[0]) > 0.9 else (1.0, 0.0, 0.0)
-        e1 = unit_vector("tangent", tangent)
-        e1 -= (e1 @ n) * n
-        length = math.sqrt(e1 @ e1)
-        if length < 1e-6:
-            raise ValueError("tangent: wanted a direction across the normal, got one along it")
-        e1 /= length
-        t = math.cos(azimuth) * e1 + math.sin(azimuth) * np.array(cross(n, e1))
-        u = math.cos(tilt) * n + math.sin(tilt) * np.array(cross(n, t))
-        return np.column_stack([t, u, cross(t, u)])
+        t = _along(_scaled(e1, math.cos(azimuth)), cross(n, e1), math.sin(azimuth))
+        u = _along(_scaled(n, math.cos(tilt)), cross(n, t), math.sin(tilt))
+        return t, u, cross(t, u)
 
 
 @dataclass(frozen=True)
@@ -83,7 +79,8 @@ class Contour:
     noise : standard deviation of the contacts, or None where it is not known
     stops : why tracking ended at the first and at the last point, or None
 
-    Raises ValueError for another shape or for numbers that are not finite.
+    Raises ValueError for another shape, for numbers that are not finite, and for numbers of single
+    precision too far from the origin.
     """
 
     points: Array
@@ -94,6 +91,14 @@ class Contour:
 
     def __post_init__(self) -> None:
         points = finite_array("points", self.points, (None, 3), LARGEST)
+        single = getattr(self.points, "dtype", None) == np.float32
+        if single and len(points):
+            spacing = float(np.spacing(np.abs(points).max().astype(np.float32)))
+            if spacing > COARSE * np.ptp(points, axis=0).max() > 0.0:
+                raise ValueError(
+                    f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
+                    "of this size: wanted coordinates relative to a point near by, or double precision"
+                )
         object.__setattr__(self, "points", points)
         if self.plane_normal is not None:
             object.__setattr__(self, "plane_normal", unit_vector("plane_normal", self.plane_normal))
@@ -129,7 +134,7 @@ def track(
     Raises ValueError for bad numbers, and where there is no surface at the point.
     """
     p = finite_array("point", point, (3,), LARGEST)
-    n = unit_vector("normal", normal)
+    n = _vector(unit_vector("normal", normal))
     planes = list_of("planes", planes, SamplingPlane)
     step = number("step", step, above=0.0)
     extent = number("extent", extent, above=0.0)
@@ -145,31 +150,45 @@ def track(
             f"rng: wanted a Generator or a whole number of 0 or more, got {shown(rng)}"
         ) from None
     count = math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
-    start, up, side = _first_contact(surface, _vector(p), _vector(n), step)
+    e1 = _tangent(n, tangent)
+    start, up, side = _first_contact(surface, _vector(p), n, e1, step)
     contours = []
     for plane in planes:
-        axes = plane.axes(n, tangent)
-        t, u = _vector(axes[:, 0]), _vector(axes[:, 1])
+        t, u, across = plane._axes(n, e1)
         cast, up_in_plane = _section(surface, start, t, u, side), complex(_dot(up, t), _dot(up, u))
         # Turned by a quarter, clockwise, the curve's normal is its tangent.
-        back, ahead = (_half_contour(cast, up_in_plane, turn, _vector(n), count, step) for turn in (1j, -1j))
+        back, ahead = (_half_contour(cast, up_in_plane, turn, n, count, step) for turn in (1j, -1j))
         points = np.array([*back[0][::-1], tuple(p), *ahead[0]])
         normals = np.array([*back[1][::-1], up, *ahead[1]])
         if noise:
-            in_plane = normals - np.outer(normals @ axes[:, 2], axes[:, 2])
+            in_plane = normals - np.outer(normals @ across, across)
             # The point, which stays where it is, may have no normal in the plane.
             in_plane /= np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), LEAST_IN_PLANE)
             offsets = generator.normal(0.0, noise, len(points))
             offsets[len(back[0])] = 0.0
             points += offsets[:, None] * in_plane
-        contours.append(Contour(points, axes[:, 2], normals, noise, (back[2], ahead[2])))
+        contours.append(Contour(points, np.array(across), normals, noise, (back[2], ahead[2])))
     return contours
 
 
-def _first_contact(surface: Surface, p: Vector, n: Vector, step: float) -> tuple[Vector, Vector, float]:
+def _tangent(n: Vector, tangent: ArrayLike | None) -> Vector:
+    """The unit vector across the unit n that azimuths are measured from; see SamplingPlane.axes."""
+    if tangent is None:
+        tangent = (0.0, 1.0, 0.0) if abs(n[0]) > 0.9 else (1.0, 0.0, 0.0)
+    given = _vector(unit_vector("tangent", tangent))
+    e1 = _along(given, n, -_dot(given, n))
+    length = math.hypot(*e1)
+    if length < 1e-6:
+        raise ValueError("tangent: wanted a direction across the normal, got one along it")
+    return _scaled(e1, 1.0 / length)
+
+
+def _first_contact(
+    surface: Surface, p: Vector, n: Vector, e1: Vector, step: float
+) -> tuple[Vector, Vector, float]:
     """The contact at the reference point, the normal there on the side of `n`, and that side's sign."""
     reach = 0.1 * step  # shorter than a step: a wall close above the point is not the point's
-    e1, _, e2 = (_vector(axis) for axis in SamplingPlane(0.0).axes(n).T)
+    e2 = cross(n, e1)
     # On an edge or a vertex of a mesh a ray may slip between the faces: a hair's breadth beside it does not.
     for aside, length in ((e1, 0.0), (e1, 1e-3), (e2, 1e-3), (e1, -1e-3), (e2, -1e-3)):
         hit = surface.ray_cast(
@@ -242,7 +261,8 @@ def _half_contour(
             return points, normals, CREASE
         contact = _next_contact(cast, at, ahead, up, step)
         if contact is None:
-            flank = cast(at + step * ahead - 0.5 * step * up, -ahead, step)
+            # A flank is found under the point, and behind it where the edge is sharper than 90 degrees.
+            flank = cast(at + step * ahead - 0.5 * step * up, -ahead, 2.0 * step)
             return points, normals, NO_CONTACT if flank is None else CREASE
         length = abs(contact.up)
         # Where the surface lies in the plane there is no curve to follow.

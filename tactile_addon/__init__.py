@@ -4,10 +4,23 @@
 
 import bpy
 
-from . import command_line, gizmos, live, operators, overlay, panel, pick, probe, probe_operators
+from . import (
+    command_line,
+    gizmos,
+    live,
+    map_object,
+    map_operator,
+    operators,
+    overlay,
+    panel,
+    pick,
+    probe,
+    probe_operators,
+)
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
+    map_operator.TACTILE_OT_stability_map,
     pick.TACTILE_OT_pick,
     gizmos.TACTILE_OT_drag,
     gizmos.TACTILE_GGT_handles,
@@ -20,6 +33,7 @@ _commands, _drawings = [], []
 
 def register():
     probe.register()
+    map_object.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     panel.restore_tab()
@@ -39,4 +53,5 @@ def unregister():
     bpy.types.VIEW3D_MT_object.remove(panel.draw_menu)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    map_object.unregister()
     probe.unregister()

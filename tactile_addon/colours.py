@@ -25,7 +25,12 @@ def shades(values, limit):
 
 def diverging(values, limit):
     """The same as linear RGBA, as Blender stores colours."""
-    rgba = shades(values, limit)
+    return linear(shades(values, limit))
+
+
+def linear(rgba):
+    """Linear RGBA of sRGB (n, 4)."""
+    rgba = np.array(rgba)
     srgb = rgba[:, :3]
     rgba[:, :3] = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     return rgba

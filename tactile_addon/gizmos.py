@@ -55,9 +55,10 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if self.what != EXTENT:
             settings.active_plane = self.plane
         self._matrix = context.object.matrix_world.copy()
-        self._before = self._value = self._free = self._get(context)
-        self._last = self._below(context, event)
-        if self._last is None:
+        # The handle comes to the mouse; where the button went down is not known, for a busy Blender hears
+        # of it late, with the mouse already elsewhere.
+        self._before = self._value = self._free = self._last = self._get(context)
+        if self._below(context, event) is None:
             self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
             return {"CANCELLED"}
         context.workspace.status_text_set(_draw_hints)
@@ -81,7 +82,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         self._end(context)
 
     def _follow(self, context, event):
-        """Moves the value by what the mouse has moved, so that a handle does not jump when it is taken."""
+        """Moves the value by what the mouse has moved."""
         now = self._below(context, event)
         if now is None:
             return

@@ -5,8 +5,8 @@
 import bpy
 from bpy.props import FloatVectorProperty, StringProperty
 
-from . import patch_object
-from .probe import patch_near
+from . import map_object, patch_object
+from .probe import record_of
 from .report import sentence
 from .settings import TouchSettings, draw_all, touch_arguments
 from .touch import touch, verify
@@ -82,11 +82,11 @@ def report_error(operator, error):
 
 
 def target_object(context, name):
-    """The object to touch: by name, or the active one, or what the active patch was touched on."""
+    """The object to touch: by name, or the active one, or what the active patch or map was touched on."""
     obj = context.view_layer.objects.active
-    near = patch_near(obj)
-    if not name and near is not None:
-        name = near[patch_object.RECORD]["source"]
+    record = record_of(obj) or (obj and obj.get(map_object.RECORD))
+    if not name and record is not None:
+        name = record["source"]
     if name:
         obj = bpy.data.objects.get(name)
     if obj is None:

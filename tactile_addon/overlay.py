@@ -8,7 +8,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from . import colours, patch_object, probe, units
+from . import colours, map_object, patch_object, probe, units
 from .touch import plane_axes
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart, one a sampling plane.
@@ -79,24 +79,38 @@ def draw_plane():
 
 
 def draw_legend():
-    """The colour bar of the active patch: quantity, unit and range, beside the sidebar."""
+    """The legend of the active patch or map: quantity, unit and range, beside the sidebar."""
     context = bpy.context
-    patch = probe.patch_near(_active(context))
-    if patch is None or not patch.visible_get():
-        return
-    record, shown = patch[patch_object.RECORD], patch.tactile_colours
-    power, limit = patch_object.POWERS[shown], record["colour_limit"]
-    unit = units.unit_of(context.scene, record["radius"])
-    title = patch.bl_rna.properties["tactile_colours"].enum_items[shown].name
+    obj = _active(context)
+    patch = probe.patch_near(obj)
+    if patch is not None and patch.visible_get():
+        record, shown = patch[patch_object.RECORD], patch.tactile_colours
+        low = 0.0 if shown in patch_object.POSITIVE else -1.0
+        title = patch.bl_rna.properties["tactile_colours"].enum_items[shown].name
+        bar = _scale(context, title, record, record["radius"], patch_object.POWERS[shown], low)
+        _draw_box(context, *bar)
+    elif obj is not None and map_object.RECORD in obj and obj.visible_get():
+        record, shown = obj[map_object.RECORD], obj.tactile_map_colours
+        title = obj.bl_rna.properties["tactile_map_colours"].enum_items[shown].name
+        bar = _scale(context, title, record, record["extent"], map_object.POWERS[shown], 0.0)
+        if shown == "reason":
+            bar = title, 0.0, []
+        elif shown in map_object.LOGARITHMIC:
+            bar = title, 0.0, [(at, f"{record['colour_limit'] ** at:.2g}") for at in (0.0, 0.5, 1.0)]
+        _draw_box(context, *bar, map_object.swatches(obj))
+
+
+def _scale(context, title, record, size, power, low):
+    """The title with its unit, where the colours begin, and the (place, text) labels of a scale."""
+    unit = units.unit_of(context.scene, size)
     symbol = units.symbol(power, unit)
-    low = 0.0 if shown in patch_object.POSITIVE else -1.0
-    top = limit / unit[1] ** power
+    top = record["colour_limit"] / unit[1] ** power
     labels = [(at, f"{at * top:.3g}") for at in (low, 0.5 * (low + 1.0), 1.0)]
-    _draw_bar(context, f"{title} ({symbol})" if symbol else title, low, labels)
+    return f"{title} ({symbol})" if symbol else title, low, labels
 
 
-def _draw_bar(context, title, low, labels):
-    """The title, the colours from `low` to 1, the (place, text) labels; nothing where it has no room."""
+def _draw_box(context, title, low, labels, swatches=()):
+    """Title, colours from `low` to 1 with labels, if any, and swatches; nothing where it has no room."""
     theme, scale = (
         context.preferences.themes[0].user_interface.wcol_tooltip,
         context.preferences.system.ui_scale,
@@ -104,26 +118,45 @@ def _draw_bar(context, title, low, labels):
     blf.size(FONT, 11.0 * scale)
     blf.color(FONT, *theme.text, 1.0)
     gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
-    high = BAR[1] * scale + 2.0 * line + 4.0 * gap
+    bar = BAR[1] * scale + line + 2.0 * gap if labels else 0.0
+    high = line + 2.0 * gap + bar + len(swatches) * (line + gap)
     left, right, bottom = _free_strip(context, high + gap)
-    wide = min(max(BAR[0] * scale, blf.dimensions(FONT, title)[0]) + 4.0 * gap, right - left - gap)
+    lengths = [blf.dimensions(FONT, title)[0]]
+    lengths += [blf.dimensions(FONT, text)[0] + 2.0 * line + gap for text, _ in swatches]
+    wide = min(max(BAR[0] * scale, *lengths) + 4.0 * gap, right - left - gap)
     if wide < 0.5 * BAR[0] * scale or bottom + high > context.region.height:
         return
     x, y = right - gap - wide, bottom + gap
-    _fill([(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)], [(*theme.inner[:3], 0.8)] * 4)
-    x, y, wide = x + 2.0 * gap, y + 2.0 * gap + line, wide - 4.0 * gap
+    _fill_box(x, y, wide, high, (*theme.inner[:3], 0.8))
+    x, wide = x + 2.0 * gap, wide - 4.0 * gap
+    for number, (text, colour) in enumerate(reversed(swatches)):
+        at = y + gap + number * (line + gap)
+        _fill_box(x, at, 2.0 * line, line, colour)
+        _write(text, x + 2.0 * line + gap, at)
+    y += high - gap - line
+    if labels:
+        _draw_bar(x, y - gap - BAR[1] * scale, wide, BAR[1] * scale, gap, low, labels)
+    blf.size(FONT, 11.0 * scale * min(1.0, wide / lengths[0]))
+    _write(title, x, y)
+
+
+def _draw_bar(x, y, wide, high, gap, low, labels):
+    """The colours from `low` to 1, and below them the (place, text) labels."""
     at = np.linspace(x, x + wide, STEPS)
     shades = colours.shades(np.repeat(np.linspace(low, 1.0, STEPS), 2), 1.0)
-    _fill([(a, b) for a in at for b in (y, y + BAR[1] * scale)], shades.tolist())
+    _fill([(a, b) for a in at for b in (y, y + high)], shades.tolist())
     labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
     if sum(blf.dimensions(FONT, text)[0] + gap for _, text in labels) > wide + 2.0 * gap:
         del labels[1]  # the one in the middle
+    line = blf.dimensions(FONT, "0")[1]
     for share, text in labels:
         middle = x + (share - low) / (1.0 - low) * wide
         length = blf.dimensions(FONT, text)[0]
         _write(text, min(max(middle - 0.5 * length, x - gap), x + wide + gap - length), y - gap - line)
-    blf.size(FONT, 11.0 * scale * min(1.0, wide / blf.dimensions(FONT, title)[0]))
-    _write(title, x, y + BAR[1] * scale + gap)
+
+
+def _fill_box(x, y, wide, high, colour):
+    _fill([(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)], [colour] * 4)
 
 
 def _write(text, x, y):

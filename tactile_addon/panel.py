@@ -8,7 +8,8 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from . import patch_object, probe, units
+from . import map_object, patch_object, probe, units
+from .map_operator import TACTILE_OT_stability_map
 from .operators import TACTILE_OT_reconstruct
 from .pick import TACTILE_OT_pick
 from .probe_operators import (
@@ -20,6 +21,7 @@ from .probe_operators import (
     shows_colours,
 )
 from .settings import draw_sensor, draw_solver
+from .stability import REASONS
 
 TAB = "Tactile"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
@@ -98,14 +100,54 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             layout.operator(TACTILE_OT_show_colours.bl_idname, icon="SHADING_SOLID")
         box = layout.box()
         unit = units.unit_of(context.scene, record["radius"])
-        column = box.column(align=True)
-        for label, value in _rows(record, unit):
-            row = column.row(align=True).split(factor=0.55, align=True)
-            row.label(text=label)
-            row.label(text=value)
+        _draw_rows(box, _rows(record, unit))
         _draw_sentence(context, box, record["message"], ICONS[record["status"]])
         if found is not None:
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
+
+
+class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
+    bl_idname = "TACTILE_PT_map"
+    bl_label = "Stability Map"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
+        obj = context.view_layer.objects.active
+        if obj is None or map_object.RECORD not in obj:
+            return
+        layout.prop(obj, "tactile_map_colours")
+        if not shows_colours(context.space_data):
+            layout.operator(TACTILE_OT_show_colours.bl_idname, icon="SHADING_SOLID")
+        record = obj[map_object.RECORD]
+        unit = units.unit_of(context.scene, record["extent"])
+        _draw_rows(layout.box(), _map_rows(record, unit))
+
+
+def _map_rows(record, unit):
+    """(label, value) of how many patches there are, and of their medians."""
+    rows = [
+        ("Points", f"{record['touched']}, {units.say(record['spacing'], 1, unit)} apart"),
+        ("Patches", f"{record['patches']}"),
+        ("… in Doubt", f"{record['in_doubt']}"),
+    ]
+    rows += [(f"No Patch: {name}", f"{record['refused'][key]}") for key, name, _ in REASONS[2:]]
+    medians = [(title, f"{name}_median", power) for name, title, _, power in map_object.SHOWN]
+    return rows + [
+        (f"Median {title}", units.say(record[key], power, unit))
+        for title, key, power in medians
+        if key in record
+    ]
+
+
+def _draw_rows(layout, rows):
+    """Labels and values side by side."""
+    column = layout.column(align=True)
+    for label, value in rows:
+        row = column.row(align=True).split(factor=0.55, align=True)
+        row.label(text=label)
+        row.label(text=value)
 
 
 def _rows(record, unit):
@@ -144,7 +186,9 @@ def _draw_sentence(context, layout, sentence, icon):
 
 def draw_menu(self, context):
     self.layout.separator()
-    for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_add_plane, TACTILE_OT_delete):
+    for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
+        self.layout.operator(operator.bl_idname)
+    for operator in (TACTILE_OT_add_plane, TACTILE_OT_delete):
         self.layout.operator(operator.bl_idname)
 
 
@@ -153,6 +197,8 @@ def manual_map():
     page = Path(__file__).resolve().parents[1] / "manual" / "viewport.html"
     pages = {
         "bpy.ops.tactile.pick": "#the-first-patch",
+        "bpy.ops.tactile.stability_map": "#stability-map",
+        "bpy.types.object.tactile_map_colours": "#stability-map",
         "bpy.ops.tactile*": "#probe",
         "bpy.types.tactileprobe*": "#probe",
         "bpy.types.object.tactile_colours": "#result",
@@ -188,4 +234,4 @@ class TactilePreferences(bpy.types.AddonPreferences):
         self.layout.operator("wm.url_open", text="Manual", icon="HELP").url = manual_map()[0]
 
 
-PANELS = (TACTILE_PT_probe, TACTILE_PT_result)
+PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_map)

@@ -16,7 +16,7 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 from mathutils import Matrix, Vector
 
-from . import patch_object
+from . import map_object, patch_object
 from .report import sentence
 from .settings import TouchSettings, changed, touch_arguments
 from .surface import MeshSurface
@@ -61,8 +61,8 @@ def is_probe(obj):
 
 
 def is_result(obj):
-    """Whether it is a patch or the contours of one."""
-    return patch_object.RECORD in obj or patch_object.CONTOURS in obj
+    """Whether it is a patch, the contours of one, or a map."""
+    return any(key in obj for key in (patch_object.RECORD, patch_object.CONTOURS, map_object.RECORD))
 
 
 def patch_of(probe):

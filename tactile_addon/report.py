@@ -31,6 +31,13 @@ def readable(report):
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 
 
+def map_summary(record):
+    """What a stability map has found, in a sentence."""
+    words = [f"{record['patches']} patches at {record['touched']} points, {record['in_doubt']} in doubt"]
+    words += [f"{count} refused by {key}" for key, count in record["refused"].items() if count]
+    return "; ".join(words)
+
+
 def sentence(error):
     """The words of an exception, as a sentence begins, in one line: names may hold more."""
     words = " ".join(str(error).split())

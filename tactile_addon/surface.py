@@ -7,6 +7,7 @@ import zlib
 
 import numpy as np
 
+FARTHEST = 1e15  # that a mesh may reach: distances squared are numbers in single precision
 WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
 
 
@@ -21,22 +22,7 @@ class MeshSurface:
 
     def __init__(self, obj, depsgraph):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
-        if obj.type != "MESH":
-            raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
-        evaluated = obj.evaluated_get(depsgraph)
-        try:
-            if obj.data.is_editmode:
-                # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
-                evaluated.to_mesh()
-                evaluated.to_mesh_clear()
-            evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
-        except RuntimeError as error:
-            raise ValueError(
-                f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
-            ) from error
-        matrix = np.array(evaluated.matrix_world, dtype=float)
-        _require_invertible(obj.name, matrix[:3, :3])
-        self._linear, self._origin = matrix[:3, :3], matrix[:3, 3]
+        evaluated, self._co, self._linear, self._origin = evaluated_mesh(obj, depsgraph)
         self._inverse = np.linalg.inv(self._linear)
         # The same for ray_cast, where a numpy call would cost more than the cast.
         self._rows, self._inverse_rows, self._normal_rows, self._at = (
@@ -44,15 +30,7 @@ class MeshSurface:
         )
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
         self._ray_cast = evaluated.ray_cast
-        if not len(self._mesh.polygons):
-            raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
-        self._co = _coordinates(self._mesh)
-        if not np.isfinite(self._co).all():
-            raise ValueError(
-                f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers'
-            )
-        edges = np.ptp(np.array(evaluated.bound_box), axis=0)
-        self.size = float((edges * np.linalg.norm(self._linear, axis=0)).max())
+        self.size = size_of(evaluated, self._linear)
 
     @property
     def checksum(self):
@@ -62,9 +40,9 @@ class MeshSurface:
     def ray_cast(self, origin, direction, distance):
         """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
         back, (x, y, z) = self._inverse_rows, self._at
-        local = _product(back, *direction)
+        local = product(back, *direction)
         hit, point, normal, _ = self._ray_cast(
-            _product(back, origin[0] - x, origin[1] - y, origin[2] - z),
+            product(back, origin[0] - x, origin[1] - y, origin[2] - z),
             local,
             distance=distance * math.hypot(*local),
             depsgraph=self._depsgraph,
@@ -169,14 +147,49 @@ class MeshSurface:
         return self._inverse @ np.subtract(point, self._origin)
 
     def _to_world(self, point):
-        x, y, z = _product(self._rows, *point)
+        x, y, z = product(self._rows, *point)
         return x + self._at[0], y + self._at[1], z + self._at[2]
 
     def _normal_to_world(self, normal):
         """By the inverse transpose: outward stays outward under any scale, a mirroring one too."""
-        x, y, z = _product(self._normal_rows, *normal)
+        x, y, z = product(self._normal_rows, *normal)
         length = math.hypot(x, y, z)
         return x / length, y / length, z / length
+
+
+def evaluated_mesh(obj, depsgraph):
+    """The evaluated object, its mesh's coordinates in it, and its transform: linear part and origin.
+
+    Raises ValueError, with a sentence, where it cannot be touched.
+    """
+    if obj.type != "MESH":
+        raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
+    evaluated = obj.evaluated_get(depsgraph)
+    if not evaluated.is_evaluated:
+        raise ValueError(
+            f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
+        )
+    if obj.data.is_editmode:
+        # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
+        evaluated.to_mesh()
+        evaluated.to_mesh_clear()
+    matrix = np.array(evaluated.matrix_world, dtype=float)
+    _require_invertible(obj.name, matrix[:3, :3])
+    if not len(evaluated.data.polygons):
+        raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
+    co = _coordinates(evaluated.data)
+    largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
+    if not math.isfinite(largest):
+        raise ValueError(f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers')
+    if max(largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()) > FARTHEST:
+        raise ValueError(f'"{obj.name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
+    return evaluated, co, matrix[:3, :3], matrix[:3, 3]
+
+
+def size_of(evaluated, linear):
+    """The longest edge of the bounding box, in the world."""
+    edges = np.ptp(np.array(evaluated.bound_box), axis=0)
+    return float((edges * np.linalg.norm(linear, axis=0)).max())
 
 
 def _coordinates(mesh):
@@ -196,7 +209,7 @@ def _require_invertible(name, linear):
         raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')
 
 
-def _product(rows, x, y, z):
+def product(rows, x, y, z):
     """A matrix, as rows of Python floats, times a vector."""
     (a, b, c), (d, e, f), (g, h, i) = rows
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z

@@ -14,6 +14,7 @@ from .surface import MeshSurface
 
 EXTENT_SHARE = 1.0 / 8.0  # of the object's largest dimension, where no extent is given
 STEPS = 12  # of a half contour, where no step is given
+BEYOND = 3.0  # times its own deviation, that a patch may be off the mesh in the mean
 COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about curvature
 
 
@@ -58,7 +59,7 @@ def touch(
     """
     clock = [perf_counter()]
     surface = MeshSurface(obj, depsgraph)
-    extent, step = _lengths(obj.name, surface, extent, step, noise)
+    extent, step = lengths(obj.name, surface.size, extent, step, noise)
     point, surface_normal = _reference_point(obj.name, surface, location, extent, step)
     outward = surface_normal if normal is None else normal
     if toward is not None and np.dot(outward, toward) < 0.0:
@@ -97,15 +98,16 @@ def verify(touched, most=None):
     """
     clock = [perf_counter()]
     touched.report.update(_verification_report(touched.surface, touched.result, most))
+    if touched.report["status"] == "ok":
+        touched.report.update(_doubt(touched.report))
     clock.append(perf_counter())
     touched.report["suggested_plane"] = _suggestion_report(touched.result, np.array(touched.report["axes"]))
     clock.append(perf_counter())
     touched.report["seconds"] |= dict(zip(("verify", "suggest"), np.diff(clock).tolist(), strict=True))
 
 
-def _lengths(name, surface, extent, step, noise):
-    """Extent and step, chosen by the object's size where they are 0."""
-    size = surface.size
+def lengths(name, size, extent, step, noise):
+    """Extent and step, chosen by the object's size where they are 0. Raises ValueError for bad ones."""
     if not all(length >= 0.0 for length in (extent, step, noise)):  # NaN is none
         raise ValueError(
             f"Extent, step and noise are lengths of 0 or more, got {extent:g}, {step:g} and {noise:g}"
@@ -130,12 +132,17 @@ def _reference_point(name, surface, location, extent, step):
             f'The location is {distance:g} away from "{name}", farther than the extent {extent:g}: '
             "move it to the surface"
         )
-    if surface.spacing(point) > COARSE * step:
+    require_fine(surface.spacing(point), step)
+    return point, normal
+
+
+def require_fine(spacing, step):
+    """Raises ValueError where coordinates are too coarse for the step."""
+    if spacing > COARSE * step:
         raise ValueError(
-            f"Coordinates at the point are {surface.spacing(point):g} apart in single precision, too coarse "
+            f"Coordinates at the point are {spacing:g} apart in single precision, too coarse "
             f"for a step of {step:g}: move the object nearer to the origin of the world or of its own mesh"
         )
-    return point, normal
 
 
 def reference_axes(outward, tangent=None):
@@ -171,6 +178,18 @@ def _verification_report(surface, result, most):
         "vertices": len(misses),
         "vertex_distance_mean": float(misses.mean()),
         "vertex_distance_max": float(misses.max()),
+    }
+
+
+def _doubt(report):
+    """Status and message where the mesh contradicts the patch."""
+    mean, std = report.get("vertex_distance_mean", 0.0), report["height_std"]
+    if mean <= BEYOND * std:
+        return {}
+    return {
+        "status": "uncertain",
+        "message": f"The mesh is {mean:.3g} off the patch in the mean, which expects {std:.3g}, for between "
+        "the curves there is what they do not show: take a shorter extent, or add sampling planes.",
     }
 
 

@@ -42,6 +42,6 @@ def say(value, power, unit):
 
 
 def symbol(power, unit):
-    """The unit of length^power, as in "mm" or "1/mm²"; empty where lengths have none."""
-    name = unit[0]
+    """The unit of length^power, as in "mm" or "1/mm²"; empty for a number, and where lengths have none."""
+    name = unit[0] if power else ""
     return f"1/{name}{POWERS[-power]}" if name and power < 0 else name

@@ -54,6 +54,17 @@ def test_grid_cells_and_triangles_fill_the_area(ends):
     assert areas.sum() == pytest.approx(domain.area, rel=5e-3)
 
 
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_nodes_take_means_over_the_domain(ends):
+    domain = closed_spline_domain(ends, 1.0)
+    points, weights = domain.nodes
+    assert np.all(domain.contains(*points.T))
+    dense = domain.grid(40000)[0]
+    for i, j in [(0, 0), (2, 0), (1, 1), (0, 3), (4, 0), (2, 2)]:
+        moment = np.mean(dense[:, 0] ** i * dense[:, 1] ** j)
+        assert weights @ (points[:, 0] ** i * points[:, 1] ** j) == pytest.approx(moment, abs=2e-3)
+
+
 def test_the_triangulation_is_a_disk_with_triangles_near_to_equilateral():
     points, triangles = closed_spline_domain(circle(SIXTH), 1.0).triangulation(12)
     edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)

@@ -143,7 +143,9 @@ def test_the_fast_solver_finds_no_higher_minimum_on_convex_surfaces(name, noise)
 def test_newton_ends_no_higher_than_a_general_solver_from_the_same_start(name, noise):
     surface = PAPER_SIZE[name]
     r = reconstruct(surface.point, touched(surface, noise), outward=surface.normal, method="tagc", degree=4)
-    objective = tagc.Objective(r._problem, Domain(r.domain.ends / r.radius), 1000.0)
+    unit = r.patch.scaled(1.0 / r.radius)
+    data = fitting.problem(unit.k1, unit.k2, unit.degree, r.contacts / r.radius)
+    objective = tagc.Objective(data, Domain(r.domain.ends / r.radius), 1000.0)
 
     def value_and_gradient(a):
         at = objective.fields(a)

@@ -421,6 +421,14 @@ def zero_scale(bpy):
     bpy.context.object.scale.y = 0.0
 
 
+def huge(bpy):
+    bpy.context.object.scale = (3e38, 3e38, 1.0)
+
+
+def one_vertex_far_away(bpy):
+    bpy.context.object.data.vertices[5].co.x = 1e30
+
+
 def disabled(bpy):
     bpy.context.object.hide_viewport = True
 
@@ -466,6 +474,8 @@ def nothing(bpy):
         (no_faces, {}, '"Sphere" has no faces to touch'),
         (bad_vertex, {}, "vertices at no finite place"),
         (zero_scale, {}, "scaled to nothing in some direction"),
+        (huge, {}, "reaches farther than 1e+15 from the origin"),
+        (one_vertex_far_away, {}, "reaches farther than 1e+15 from the origin"),
         (disabled, {}, "disabled in viewports or excluded from the view layer"),
         (excluded, {}, "disabled in viewports or excluded from the view layer"),
         (far_away, {"location": (2e6, 0.0, 2.0)}, "apart in single precision, too coarse"),
@@ -539,6 +549,22 @@ def test_a_doubtful_patch_finishes_with_a_warning(empty, capfd):
     assert report["status"] == "uncertain"
     assert "take a shorter extent" in report["message"]
     assert "Warning: Heights are good to" in capfd.readouterr().out
+
+
+def test_a_bump_between_the_curves_is_a_doubt_once_the_mesh_is_compared(empty):
+    empty.ops.mesh.primitive_grid_add(x_subdivisions=80, y_subdivisions=80, size=2.0)
+    mesh = empty.context.object.data
+    at = values(mesh, "position", "vector", 3)
+    touch = {"location": (0.0, 0.0, 0.0), "extent": 0.8}
+    assert reconstruct(empty, **touch)[1]["status"] == "ok"
+    azimuth = math.radians(30.0)
+    away = np.hypot(at[:, 0] - 0.5 * math.cos(azimuth), at[:, 1] - 0.5 * math.sin(azimuth))
+    at[:, 2] = 0.3 * np.clip(1.0 - away / 0.2, 0.0, 1.0)
+    mesh.attributes["position"].data.foreach_set("vector", at.ravel())
+    mesh.update()
+    _, report = reconstruct(empty, target="Grid", **touch)
+    assert report["status"] == "uncertain"
+    assert report["message"].startswith(f"The mesh is {report['vertex_distance_mean']:.3g} off the patch")
 
 
 def test_half_a_contour_has_all_contacts_that_the_extent_has_room_for(empty):

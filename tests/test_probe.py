@@ -707,6 +707,13 @@ def test_disabling_takes_handler_and_properties_away_and_enabling_brings_them_ba
     assert_touches(*pick(empty))
 
 
+def test_an_instance_is_not_touched_for_what_it_shows(empty, ball, extension):
+    touchable = extension.tactile_addon.pick._require_touchable
+    touchable(ball, ball.matrix_world.copy())
+    with pytest.raises(ValueError, match=f'This is an instance of "{ball.name}": make it real'):
+        touchable(ball, Matrix.Translation((5.0, 0.0, 0.0)))
+
+
 @pytest.mark.parametrize("shape", ["uv_sphere", "monkey"])
 @pytest.mark.parametrize("share", [0.02, 0.1])
 def test_the_nearest_point_of_a_stretched_object_is_nearest_in_the_world(empty, extension, shape, share):

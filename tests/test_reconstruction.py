@@ -220,6 +220,15 @@ def test_a_sensor_that_knows_nothing_leaves_a_patch_in_doubt():
     assert np.isfinite([r.mean_height_std, r.patch.k1, r.patch.k2]).all()
 
 
+def test_a_weight_beyond_all_measure_leaves_the_contacts_alone():
+    ball = surfaces.sphere(25)
+    errors = [
+        reconstruct(ball.point, GOOD, outward=ball.normal, method="tagc", degree=6, weight=weight).fit_error
+        for weight in (1e12, 1e20, 1e50)
+    ]
+    assert errors == pytest.approx(errors[:1] * 3, rel=1e-6)
+
+
 def test_curves_that_rounding_far_from_the_origin_spoils_are_refused():
     ball = surfaces.sphere(25)
     far = ball.point + 1e17
@@ -313,8 +322,8 @@ def test_bad_arguments_of_many_are_named(change, message):
 
 def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():
     s = np.linspace(0.1, 1.0, 9)
-    curves = [Contour(np.outer(s, [1.0, slope, 0.0]) / np.hypot(1, slope)) for slope in (0.0, 1e-2, 0.0206)]
-    with pytest.raises(DegenerateCurvesError):
+    curves = [Contour(np.column_stack([s, bend * s * (1.0 - s), 0.0 * s])) for bend in (-0.1, 0.0, 0.1)]
+    with pytest.raises(DegenerateCurvesError, match="fewer than three places apart"):
         reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 import gui
 from bpy.app.handlers import persistent
-from mathutils import Vector
+from mathutils import Quaternion, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from common import check, data_blocks, look
@@ -114,6 +114,13 @@ def pick(target):
     yield 0.5
     at = [round(v) for v in gui.view_point(place)]
     before = data_blocks()
+    other = next(area for area in bpy.context.window.screen.areas if area.type != "VIEW_3D")
+    try:
+        with bpy.context.temp_override(area=other):
+            said = bpy.ops.tactile.pick("INVOKE_DEFAULT")
+    except RuntimeError as error:
+        said = str(error)
+    check("points are picked in a 3D viewport only", "Points are picked in a 3D viewport" in said, said)
     gui.click(*PICK_BUTTON)
     yield 0.5
     gui.xdo("mousemove", at[0] - 30, at[1], "sleep", 0.3, "mousemove", *at)
@@ -189,7 +196,17 @@ def drag_handles():
     yield 1
     check("Esc in the middle of a turn takes it back", same(state(), before), (state(), before))
 
-    before = state()
+    direction = gui.find()[1].spaces.active.region_3d.view_rotation.copy()
+    gui.find()[1].spaces.active.region_3d.view_rotation = probe().matrix_world.to_quaternion() @ Quaternion(
+        (1.0, 0.0, 0.0), math.radians(90.0)
+    )
+    yield 0.5
+    gui.drag(handle(azimuth), [v + 20 for v in handle(azimuth)])
+    yield 1
+    check("a handle in a plane seen edge on stays where it is", same(state(), before), (state(), before))
+    gui.find()[1].spaces.active.region_3d.view_rotation = direction
+    yield 0.5
+
     axes = probe().matrix_world
     reach = probe().tactile_probe.extent
     number = probe().tactile_probe.active_plane

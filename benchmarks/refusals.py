@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What becomes of touches all over scans that are creased, holed, nested, thin or far from the origin.
+
+`python -m benchmarks.refusals ZIP [--touches N]`, from the root of a checkout; ZIP is the built extension.
+Each scan is touched at random points (seeded, by area) with the extension's own defaults. Prints Markdown:
+how many patches there are, how many of them with a warning, how many refusals, and why; and how many patches
+are `silent`: without a warning, and off the mesh by more than five times their own deviation, in the mean.
+"""
+
+import argparse
+import math
+import re
+import sys
+from collections import Counter
+from pathlib import Path
+from time import perf_counter
+
+from tools import blender
+
+from . import SCANS_FOLDER, machine
+from .accuracy import table
+from .scans import AZIMUTHS
+
+SILENT = 5.0
+EXTENTS = (1.0 / 8.0, 1.0 / 32.0)  # of the object's size: the default, and one for details
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("zip", type=Path, help="the built extension")
+    parser.add_argument("--touches", type=int, default=200, help="of each scan and extent (%(default)s)")
+    options = parser.parse_args()
+    scans = sorted(SCANS_FOLDER.glob("*.*"))
+    if not scans:
+        sys.exit(f"refusals: there are no scans in {SCANS_FOLDER}")
+    rows, reasons = [], Counter()
+    with blender.quiet():
+        extension = blender.start(options.zip)
+        for path in scans:
+            for share in EXTENTS:
+                row, why = _touches(extension, path, share, options.touches)
+                rows.append(row)
+                reasons += why
+    head = ["scan, extent of the size", "patches", "with a warning", "refused", "silent", "slowest touch, ms"]
+    table(head, rows)
+    table(
+        ["warned or refused because", "touches"], [[why, f"{count}"] for why, count in reasons.most_common()]
+    )
+    print(f"{options.touches} touches a row; {machine('bpy', 'numpy', 'scipy')}.")
+
+
+def _touches(extension, path, share, count):
+    """A row of the table, and how often what was said."""
+    import bpy
+    import numpy as np
+
+    extension.tactile_addon.command_line.open_file(path)
+    obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
+    size = extension.tactile_addon.surface.MeshSurface(obj, depsgraph).size
+    areas = np.array([face.area for face in obj.data.polygons])
+    planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
+    fit = {"extent": share * size, "step": 0.0, "noise": 0.0, "seed": 0, "method": "bayes", "degree": 4}
+    reports, reasons, slowest = [], Counter(), 0.0
+    for index in np.random.default_rng(0).choice(len(areas), count, p=areas / areas.sum()):
+        location = obj.matrix_world @ obj.data.polygons[index].center
+        start = perf_counter()
+        try:
+            touched = extension.tactile_addon.touch.touch(obj, depsgraph, location, planes, **fit)
+        except ValueError as error:
+            reasons[_kind(f"refused: {error}")] += 1
+            continue
+        finally:
+            slowest = max(slowest, perf_counter() - start)
+        extension.tactile_addon.touch.verify(touched)
+        report = touched.report
+        reports.append(report)
+        _check_finite(report)
+        if report["status"] != "ok":
+            reasons[_kind(f"{report['status']}: {report['message']}")] += 1
+    warned = sum(report["status"] != "ok" for report in reports)
+    silent = [
+        report
+        for report in reports
+        if report["status"] == "ok"
+        and report.get("vertex_distance_mean", 0.0) > SILENT * report["height_std"]
+    ]
+    name = f"{path.stem}, 1/{1 / share:.0f}"
+    numbers = len(reports), warned, count - len(reports), len(silent)
+    return [name, *(f"{number}" for number in numbers), f"{1e3 * slowest:.0f}"], reasons
+
+
+def _kind(message):
+    """A message without its numbers and its advice."""
+    message = re.split(r"\. \d of ", message)[0]
+    return re.sub(r"-?\d[\d.]*(e[+-]\d+)?", "#", message.rsplit(": ", 1)[0])
+
+
+def _check_finite(value):
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for part in value:
+            _check_finite(part)
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ArithmeticError(f"a report holds {value}")
+
+
+if __name__ == "__main__":
+    main()

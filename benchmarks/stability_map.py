@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How many points a second a stability map takes, and for what, on a small and on a large mesh.
+
+`python -m benchmarks.stability_map ZIP`, from the root of a checkout; ZIP is the built extension.
+
+The wavy sheet of benchmarks.live is mapped with the operator's defaults, as a script does, with another
+spacing each time for more points. The Markdown table has the median run of a few on one thread, in one
+Blender without a window: `points/s` is the whole operator, from the mesh to the painted copy; then, in
+milliseconds a point, tracking with its ray casts, the fit with deviation, condition number and status,
+the distances to the mesh, and thinning and painting; and in seconds what is done once, the tree of the
+faces among it.
+"""
+
+import argparse
+from pathlib import Path
+from statistics import median_low
+from time import perf_counter
+
+from tools import blender
+
+from . import machine
+from .live import Clock, sheet
+
+CASES = [(10_000, 0.0), (100_000, 0.0), (100_000, 0.02), (1_000_000, 0.0)]  # faces, spacing
+RUNS = 3
+
+
+def measure(bpy, clock, faces, spacing):
+    """A row of the table."""
+    sheet(bpy, faces)
+    runs = []
+    for _ in range(RUNS):
+        clock.spent.clear()
+        start = perf_counter()
+        bpy.ops.tactile.stability_map(target="Grid", spacing=spacing)
+        runs.append((perf_counter() - start, dict(clock.spent)))
+        painted = bpy.context.object
+        count = painted["tactile_map"]["touched"]
+        bpy.data.objects.remove(painted)
+    whole, spent = runs[[seconds for seconds, _ in runs].index(median_low([seconds for seconds, _ in runs]))]
+    parts = [spent["tracking"], spent["fit"] + spent["noting"] - spent["error"], spent["error"]]
+    parts.append(whole - sum(parts) - spent["snapshot"])
+    cells = [f"{1e3 * seconds / count:.2f}" for seconds in parts]
+    return [f"{faces}", f"{count}", f"{count / whole:.0f}", *cells, f"{spent['snapshot']:.2f}"]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("zip", type=Path, metavar="ZIP")
+    extension = blender.start(parser.parse_args().zip)
+    import bpy
+
+    addon, clock = extension.tactile_addon, Clock()
+    clock.wrap(addon.snapshot.MeshSnapshot, "__init__", "snapshot")
+    for name, stage in (("track", "tracking"), ("reconstruct_many", "fit"), ("mean_height_stds", "fit")):
+        clock.wrap(addon.stability.core, name, stage)
+    clock.wrap(addon.stability.StabilityMap, "_note", "noting")
+    clock.wrap(addon.stability.StabilityMap, "_error", "error")
+    columns = ("faces", "points", "points/s", "tracking", "fit", "error", "thinning, paint", "once, s")
+    print(f"| {' | '.join(columns)} |\n|{'--:|' * len(columns)}")
+    for faces, spacing in CASES:
+        with blender.quiet():
+            row = measure(bpy, clock, faces, spacing)
+        print(f"| {' | '.join(row)} |")
+    print(f"\nMilliseconds a point, median of {RUNS} runs; {machine('bpy')}.")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""docs/messages.md has every message that the sources have, no other, and each is in a test."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROWS = [
+    cell.strip().replace("\\|", "|")
+    for line in (ROOT / "docs" / "messages.md").read_text().splitlines()
+    if line.startswith("|") and not line.startswith("|--")
+    for cell in line.split(" | ")[slice(1, 2) if re.match(r"\| (ok|any|uncertain|not_)", line) else slice(1)]
+]
+ROWS = [row.strip("| ") for row in ROWS if row.strip("| ") not in ("message", "status")]
+ERRORS = {"ValueError", "DegenerateCurvesError"}
+
+
+def text_of(node):
+    """A string of the source, with … for what is put into it; None for anything else."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        return "".join(part.value if isinstance(part, ast.Constant) else "…" for part in node.values)
+    return None
+
+
+def sentences(node):
+    """The nodes that are messages: of errors, of reports, of a status."""
+    if isinstance(node, ast.Call):
+        name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
+        return node.args[:1] if name in ERRORS else node.args[1:2] if name == "report" else []
+    if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
+        return node.value.elts[1:] if isinstance(node.value.elts[0], ast.Constant) else []
+    if isinstance(node, ast.Dict):
+        keys = zip(node.keys, node.values, strict=True)
+        return [value for key, value in keys if isinstance(key, ast.Constant) and key.value == "message"]
+    return []
+
+
+def messages():
+    for folder in ("core", "tactile_addon"):
+        for path in sorted((ROOT / folder).glob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text())):
+                for found in sentences(node):
+                    for part in (found.body, found.orelse) if isinstance(found, ast.IfExp) else (found,):
+                        text = text_of(part)
+                        if text and len(text.split()) > 3:
+                            yield text
+
+
+MESSAGES = sorted(set(messages()))
+
+
+def is_about_an_argument(text):
+    return re.match(r"(\w+|…): wanted ", text) and "single precision" not in text
+
+
+@pytest.mark.parametrize("message", [m for m in MESSAGES if not is_about_an_argument(m)])
+def test_every_message_is_in_the_table(message):
+    assert message in ROWS
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_every_row_is_a_message_and_in_a_test(row):
+    fixed = [re.findall(r"\w+", part) for part in row.split("…")]
+    if row.startswith(("…: wanted", "… of …", "The patch describes")):
+        return
+    assert row in MESSAGES
+    tests = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("*.py"))
+    told = " ".join(re.findall(r"\w+", tests))
+    runs = [" ".join(part[i : i + 3]) for part in fixed for i in range(len(part) - 2)]
+    assert any(run in told for run in runs), "no test has any three words of it"
