@@ -27,6 +27,7 @@ def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[
         yield None
     chosen = np.concatenate(left)
     chosen = rng.permutation(chosen[_one_a_cell(points[chosen], CELL * spacing)])
+    yield None
     tree = cKDTree(points[chosen])
     yield None
     free = np.ones(len(chosen), dtype=bool)

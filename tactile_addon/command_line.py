@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c tactile reconstruct [FILE]`: a patch from the shell, the report on standard output."""
+"""`blender -c tactile reconstruct|map [FILE]`: a patch or a stability map from the shell."""
 
 import argparse
 import json
@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 
-from . import patch_object
-from .report import readable
+from . import map_object, patch_object
+from .report import map_readable, readable
 from .settings import METHODS, SOLVERS
 
 
@@ -20,7 +20,7 @@ def main(args):
     sys.stdout.reconfigure(line_buffering=True)
     options = _parser().parse_args([f" {a}" if _is_number(a) else a for a in args])
     try:
-        report = _reconstruct(options)
+        report = _run(options)
         _write(report, options)
     except (RuntimeError, OSError, ValueError) as error:
         print(f"tactile: {_sentence(error)}", file=sys.stderr)
@@ -31,9 +31,30 @@ def main(args):
 def _parser():
     parser = argparse.ArgumentParser(prog="blender -c tactile", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    add = commands.add_parser(
-        "reconstruct", help="touch a mesh and rebuild the patch around a point"
-    ).add_argument
+    patch = commands.add_parser("reconstruct", help="touch a mesh and rebuild the patch around a point")
+    vector = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
+    patch.add_argument("--location", **vector, help="where to touch (default: the 3D cursor)")
+    patch.add_argument("--normal", **vector, help="outward direction there (default: the surface's)")
+    patch.set_defaults(
+        operator=bpy.ops.tactile.reconstruct, record=patch_object.RECORD, words=readable, more={}
+    )
+    stability = commands.add_parser("map", help="touch a mesh all over and paint a copy by how well it goes")
+    help = "distance between the points that are touched (a quarter of the extent)"
+    stability.add_argument("--spacing", type=float, help=help)
+    stability.set_defaults(
+        operator=bpy.ops.tactile.stability_map,
+        record=map_object.RECORD,
+        words=map_readable,
+        more={"progress": True},
+    )
+    for command in (patch, stability):
+        _add_inputs(command.add_argument)
+    parser.set_defaults(fail=parser.error)
+    return parser
+
+
+def _add_inputs(add):
+    """The arguments that the commands have in common."""
     add(
         "file",
         nargs="?",
@@ -47,9 +68,6 @@ def _parser():
         metavar="NAME",
         help="object to touch (default: the active one, or the only mesh)",
     )
-    vector = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
-    add("--location", **vector, help="where to touch (default: the 3D cursor)")
-    add("--normal", **vector, help="outward direction there (default: the surface's)")
     add(
         "--azimuths",
         type=float,
@@ -72,15 +90,19 @@ def _parser():
     add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000)")
     add("--solver", choices=[name for name, _, _ in SOLVERS], help="of tagc (fast)")
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
-    add("--output", type=Path, metavar="OUT.blend", help="save the scene with the patch")
-    parser.set_defaults(fail=parser.error)
-    return parser
+    add(
+        "--output",
+        type=Path,
+        metavar="OUT",
+        help="save the scene with the result, .blend; a map also as .ply",
+    )
 
 
 def _arguments(options):
     """What was given on the command line as the operator's arguments."""
-    names = ["location", "normal", "extent", "step", "noise", "seed", "method", "weight", "solver"]
-    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    names = ["location", "normal", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"]
+    names = [name for name in names if getattr(options, name, None) is not None]
+    given = {name: getattr(options, name) for name in names}
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
     if options.azimuths is not None:
@@ -94,7 +116,7 @@ def _arguments(options):
     return given
 
 
-def _reconstruct(options):
+def _run(options):
     """Opens the file, runs the operator, saves; returns the report."""
     arguments = _arguments(options)
     for path in (options.json, options.output):
@@ -103,13 +125,27 @@ def _reconstruct(options):
     if options.file is not None:
         open_file(options.file)
     before = set(bpy.data.objects)
-    bpy.ops.tactile.reconstruct(target=options.target or _default_target(), **arguments)
+    options.operator(target=options.target or _default_target(), **arguments, **options.more)
     # By name it may be another, and it is not active where the scene was saved in edit mode.
-    (patch,) = (obj for obj in set(bpy.data.objects) - before if patch_object.RECORD in obj)
-    report = patch[patch_object.RECORD].to_dict()
+    (made,) = (obj for obj in set(bpy.data.objects) - before if options.record in obj)
+    report = made[options.record].to_dict()
     if options.output is not None:
-        bpy.ops.wm.save_as_mainfile(filepath=str(options.output.absolute()))
+        _save(options.output, made)
     return report
+
+
+def _save(path, made):
+    """The scene; where it is a map and the path says so, that alone as a .ply with its attributes."""
+    if map_object.RECORD not in made or path.suffix.lower() != ".ply":
+        bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()))
+        return
+    with bpy.context.temp_override(selected_objects=[made], window=bpy.context.window_manager.windows[0]):
+        bpy.ops.wm.ply_export(
+            filepath=str(path.absolute()),
+            export_selected_objects=True,
+            export_attributes=True,
+            export_uv=False,  # whose seams would split vertices
+        )
 
 
 def open_file(path):
@@ -161,7 +197,7 @@ def _write(report, options):
         return
     if options.json is not None:
         Path(options.json).write_text(json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    print(readable(report))
+    print(options.words(report))
 
 
 def _six_radians(degrees):

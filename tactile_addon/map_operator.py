@@ -15,6 +15,7 @@ from .settings import NAMES, TouchSettings, draw_all, touch_arguments
 from .stability import StabilityMap
 
 SLICE = 0.05  # seconds of work between two events
+SAY = 1.0  # seconds between two lines of progress
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
 
@@ -41,6 +42,13 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         description="Paint what has been touched so far when it is stopped by Esc",
         default=True,
     )
+    progress: BoolProperty(
+        name="Progress",
+        description="Say on standard error how far it is, where there is no window to show it",
+        options={"HIDDEN", *UNSAVED},
+    )
+
+    _timer = None  # while it is running in a window
 
     @classmethod
     def poll(cls, context):
@@ -50,11 +58,12 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         return True
 
     def invoke(self, context, event):
+        if bpy.app.background:
+            return self.execute(context)
         self._in_window = True
         found = probe.probe_of(context.view_layer.objects.active)
         for name in NAMES if found is not None else ():
-            if not self.properties.is_property_set(name):
-                setattr(self, name, getattr(found.tactile_probe, name))
+            setattr(self, name, getattr(found.tactile_probe, name))
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
     def execute(self, context):
@@ -64,8 +73,7 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         except ValueError as error:
             return report_error(self, error)
         if not getattr(self, "_in_window", False):
-            for _ in self._steps:
-                pass
+            self._run()
             return self._finish(context)
         self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
         context.workspace.status_text_set(_progress(self._map, self.keep))
@@ -79,6 +87,14 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
             target, context.evaluated_depsgraph_get(), spacing=self.spacing, **touch_arguments(self)
         )
         self._steps = self._map.steps()
+
+    def _run(self):
+        """All steps at once; says now and then how far they are, where that is wanted."""
+        said = perf_counter()
+        for _ in self._steps:
+            if self.progress and perf_counter() > said + SAY:
+                said = perf_counter()
+                print(f"{self._map.done} of {len(self._map.chosen)} points", file=sys.stderr, flush=True)
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
@@ -113,9 +129,10 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         context.workspace.status_text_set(None)
 
     def cancel(self, context):
-        """Blender's, where it ends the operator itself: another file is opened, or the window closed."""
-        self._leave(context)
-        print("Stability Map: stopped, for the file or the window was closed", file=sys.stderr)
+        """Blender's, where it ends the operator itself: by the dialog, a new file or a closed window."""
+        if self._timer is not None:
+            self._leave(context)
+            print("Stability Map: stopped, for the file or the window was closed", file=sys.stderr)
 
     def _target(self, context):
         """The target, if it is still what it was when it was first touched; raises ValueError if not."""
@@ -155,7 +172,8 @@ def _progress(touched, keep):
 
     def draw(header, context):
         layout, count = header.layout, len(touched.chosen)
-        layout.label(text="Stop and Keep" if keep else "Stop", icon="EVENT_ESC")
+        layout.label(text="", icon="EVENT_ESC")
+        layout.label(text=" Stop and Keep" if keep else " Stop")
         row = layout.row()
         row.ui_units_x = 16
         row.progress(

@@ -92,7 +92,7 @@ def draw_legend():
     elif obj is not None and map_object.RECORD in obj and obj.visible_get():
         record, shown = obj[map_object.RECORD], obj.tactile_map_colours
         title = obj.bl_rna.properties["tactile_map_colours"].enum_items[shown].name
-        bar = _scale(context, title, record, record["extent"], map_object.POWERS[shown], 0.0)
+        bar = _scale(context, title, record, record["spacing"], map_object.POWERS[shown], 0.0)
         if shown == "reason":
             bar = title, 0.0, []
         elif shown in map_object.LOGARITHMIC:
@@ -146,8 +146,9 @@ def _draw_bar(x, y, wide, high, gap, low, labels):
     shades = colours.shades(np.repeat(np.linspace(low, 1.0, STEPS), 2), 1.0)
     _fill([(a, b) for a in at for b in (y, y + high)], shades.tolist())
     labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
-    if sum(blf.dimensions(FONT, text)[0] + gap for _, text in labels) > wide + 2.0 * gap:
-        del labels[1]  # the one in the middle
+    first, middle, last = (blf.dimensions(FONT, text)[0] for _, text in labels)
+    if 0.5 * (wide - middle) < max(first, last):
+        del labels[1]  # it would run into one beside it
     line = blf.dimensions(FONT, "0")[1]
     for share, text in labels:
         middle = x + (share - low) / (1.0 - low) * wide

@@ -121,24 +121,29 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         if not shows_colours(context.space_data):
             layout.operator(TACTILE_OT_show_colours.bl_idname, icon="SHADING_SOLID")
         record = obj[map_object.RECORD]
-        unit = units.unit_of(context.scene, record["extent"])
-        _draw_rows(layout.box(), _map_rows(record, unit))
+        box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
+        _draw_rows(box, _map_rows(record, unit))
+        medians = _median_rows(record, unit)
+        if medians:
+            box.label(text="Medians of the Patches")
+            _draw_rows(box, medians)
 
 
 def _map_rows(record, unit):
-    """(label, value) of how many patches there are, and of their medians."""
-    rows = [
-        ("Points", f"{record['touched']}, {units.say(record['spacing'], 1, unit)} apart"),
-        ("Patches", f"{record['patches']}"),
-        ("… in Doubt", f"{record['in_doubt']}"),
+    """(label, value) of how many patches there are, and why not more."""
+    names = {key: f"No Patch: {name}" for key, name, _ in REASONS}
+    return [
+        ("Points", str(record["touched"])),
+        ("Spacing", units.say(record["spacing"], 1, unit)),
+        ("Patches", str(record["patches"])),
+        ("… in Doubt", str(record["in_doubt"])),
+        *((names[key], str(count)) for key, count in record["refused"].items() if count),
     ]
-    rows += [(f"No Patch: {name}", f"{record['refused'][key]}") for key, name, _ in REASONS[2:]]
-    medians = [(title, f"{name}_median", power) for name, title, _, power in map_object.SHOWN]
-    return rows + [
-        (f"Median {title}", units.say(record[key], power, unit))
-        for title, key, power in medians
-        if key in record
-    ]
+
+
+def _median_rows(record, unit):
+    quantities = [(title, f"{name}_median", power) for name, title, _, power in map_object.SHOWN]
+    return [(title, units.say(record[key], power, unit)) for title, key, power in quantities if key in record]
 
 
 def _draw_rows(layout, rows):

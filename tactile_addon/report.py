@@ -27,6 +27,26 @@ def readable(report):
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
+    return _table(rows)
+
+
+def map_readable(record):
+    """The same of a stability map."""
+    refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
+    names = [key for key in record if key.endswith("_median")]
+    return _table(
+        [
+            ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
+            ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
+            ("refused", refused),
+            ("fit", f"{record['method']}, degree {record['degree']}"),
+            ("spacing, extent, step", ", ".join(f"{record[k]:.4g}" for k in ("spacing", "extent", "step"))),
+            *((f"median {name.removesuffix('_median')}", f"{record[name]:.4g}") for name in names),
+        ]
+    )
+
+
+def _table(rows):
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 

@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from .surface import evaluated_mesh, product, size_of
+from .surface import disabled, evaluated_mesh, product, size_of
 
 
 class MeshSnapshot:
@@ -37,7 +37,10 @@ class MeshSnapshot:
         self.has_face[corners] = True
         self.points, self.normals = co @ linear.T, normals @ np.linalg.inv(linear)
         self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1, keepdims=True), 1e-30)
-        self._cast = BVHTree.FromObject(obj, depsgraph).ray_cast  # half the time of the object's own
+        try:
+            self._cast = BVHTree.FromObject(obj, depsgraph).ray_cast  # half the time of the object's own
+        except ValueError as error:
+            raise disabled(obj) from error
         if not np.array_equal(linear, np.eye(3)):
             self.ray_cast = _transformed(self._cast, linear)
 

@@ -14,19 +14,19 @@ from .surface import evaluated_mesh
 from .touch import lengths, require_fine
 
 SPACING_SHARE = 1.0 / 4.0  # of the extent, where no spacing is given
-BATCH = 32  # touches that are fitted at once: a few hundredths of a second
+BATCH = 20  # touches that are fitted at once: in a hundredth of a second
 SAMPLES = 15  # of a patch, that are compared with the mesh
 LAYERS = 4  # of the mesh that a sample is compared with, at most
-CROWD = 20_000  # vertices that are given their nearest touch at once
+CROWD = 10_000  # vertices that are given their nearest touch at once
 NOTHING = -1.0  # where there is no patch, in the place of each quantity
 # What the attribute `reason` counts: key, name, and the stop of a curve that it follows from.
 REASONS = [
     ("patch", "Patch", None),
-    ("doubt", "Patch in Doubt", None),
+    ("doubt", "In Doubt", None),
     ("crease", "Crease", core.CREASE),
-    ("edge", "Edge or Hole", core.NO_CONTACT),
-    ("steep", "Turns Away", core.NOT_MONGE),
-    ("nothing", "Nothing to Feel", None),
+    ("edge", "Border", core.NO_CONTACT),
+    ("steep", "Too Steep", core.NOT_MONGE),
+    ("nothing", "No Area", None),
 ]
 KEYS = [key for key, _, _ in REASONS]
 STOPS = {stop: code for code, (_, _, stop) in enumerate(REASONS) if stop}
@@ -46,13 +46,15 @@ class StabilityMap:
 
         Raises ValueError, with a sentence, for what cannot be touched, and for inputs no touch can do with.
         """
+        import scipy.spatial  # noqa: F401  # takes half a second once: not between two redraws
+
         self.surface = MeshSnapshot(obj, depsgraph)
         if spacing < 0.0:
             raise ValueError(f"The spacing is a length of 0 or more, got {spacing:g}")
         self.extent, self.step = lengths(obj.name, self.surface.size, extent, step, noise)
         self.spacing = spacing or SPACING_SHARE * self.extent
         require_fine(self.surface.spacing, self.step)
-        self.planes, self.noise, self.fit = planes, noise, fit
+        self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
         self._rng = np.random.default_rng(seed)
         _rehearse(planes, self.extent, self.step, fit)
         self.chosen, self.done = [], 0
@@ -174,8 +176,10 @@ class StabilityMap:
             known = values[values != NOTHING].tolist()
             if known:
                 report[f"{name}_median"] = median(known)
-        names = ("spacing", "extent", "step", "noise")
-        return report | {name: getattr(self, name) for name in names} | self.fit
+        names = ("spacing", "extent", "step", "noise", "seed")
+        report |= {name: getattr(self, name) for name in names} | self.fit
+        angles = [(plane.azimuth, plane.tilt) for plane in self.planes]
+        return report | {"planes": np.degrees(angles).tolist()}
 
 
 def _height_off(surface, start, up, reach):

@@ -22,7 +22,13 @@ class MeshSurface:
 
     def __init__(self, obj, depsgraph):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
-        evaluated, self._co, self._linear, self._origin = evaluated_mesh(obj, depsgraph)
+        if obj.type != "MESH":
+            raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
+        try:
+            evaluated, self._co, self._linear, self._origin = evaluated_mesh(obj, depsgraph)
+            evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
+        except RuntimeError as error:
+            raise disabled(obj) from error
         self._inverse = np.linalg.inv(self._linear)
         # The same for ray_cast, where a numpy call would cost more than the cast.
         self._rows, self._inverse_rows, self._normal_rows, self._at = (
@@ -157,18 +163,19 @@ class MeshSurface:
         return x / length, y / length, z / length
 
 
+def disabled(obj):
+    """The error to raise for an object that Blender has not evaluated."""
+    return ValueError(
+        f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
+    )
+
+
 def evaluated_mesh(obj, depsgraph):
     """The evaluated object, its mesh's coordinates in it, and its transform: linear part and origin.
 
-    Raises ValueError, with a sentence, where it cannot be touched.
+    Raises ValueError, with a sentence, where it cannot be touched; but for disabled objects.
     """
-    if obj.type != "MESH":
-        raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
     evaluated = obj.evaluated_get(depsgraph)
-    if not evaluated.is_evaluated:
-        raise ValueError(
-            f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
-        )
     if obj.data.is_editmode:
         # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
         evaluated.to_mesh()

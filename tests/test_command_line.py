@@ -70,6 +70,53 @@ def test_every_option_arrives(command, files):
     assert bpy.data.objects["Sphere Patch"]["tactile"]["degree"] == 5
 
 
+def test_a_map_from_every_kind_of_file(command, files):
+    reports = []
+    for kind in ("ply", "stl", "obj", "blend"):
+        code, out, _ = command("map", files / f"ball.{kind}", "--spacing", 1, "--json", "-")
+        assert code == 0
+        (line,) = [line for line in out.splitlines() if line.startswith("{")]
+        reports.append(json.loads(line))
+    for report in reports:
+        assert report["patches"] == report["touched"] > 20
+        assert report["in_doubt"] == 0
+        assert set(report["refused"]) == {"crease", "edge", "steep", "nothing"}
+        assert 0.0 < report["error_median"] < 0.002
+        assert 0.0 < report["height_std_median"] < 0.002
+
+
+def test_every_option_of_a_map_arrives_and_the_copy_is_saved(command, files):
+    options = ["--target", "Sphere", "--extent", 0.6, "--step", 0.05, "--noise", "1e-3", "--seed", "4"]
+    options += ["--azimuths", "-10", "40", "85", "130", "--tilts", "5", "0", "-5", "0", "--degree", "5"]
+    path, blend, ply = files / "report.json", files / "out.blend", files / "out.ply"
+    arguments = ("map", files / "ball.blend", "--spacing", 1.5, *options)
+    code, out, err = command(*arguments, "--json", path, "--output", blend)
+    assert (code, err) == (0, "")
+    assert "median height_std" in out
+    report = json.loads(path.read_text())
+    assert [report[key] for key in ("method", "degree", "seed")] == ["bayes", 5, 4]
+    assert [report[key] for key in ("spacing", "extent", "step")] == pytest.approx([1.5, 0.6, 0.05])
+    assert [angle for plane in report["planes"] for angle in plane] == pytest.approx(
+        [-10, 5, 40, 0, 85, -5, 130, 0], abs=1e-4
+    )
+    assert command(*arguments, "--output", ply)[0] == 0
+    head = ply.read_bytes().partition(b"end_header")[0].decode()
+    for name in ("error", "height_std", "condition_number", "blind_share", "reason"):
+        assert f" {name}\n" in head
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    painted = bpy.data.objects["Sphere Stability"]
+    assert painted["tactile_map"]["degree"] == 5
+    assert f"element vertex {len(painted.data.vertices)}\n" in head
+
+
+def test_a_map_says_how_far_it_is(command, files):
+    code, _, err = command("map", files / "ball.ply", "--spacing", 0.1)
+    assert code == 0
+    assert all(line.endswith("points") for line in err.splitlines())
+
+
 def test_the_degree_may_be_left_to_the_contacts(command, files):
     code, out, _ = command("reconstruct", files / "ball.ply", *PLACE, "--degree", "auto")
     assert code == 0
@@ -101,6 +148,9 @@ def test_the_open_scene_is_touched_without_a_file(command, files):
         (["{folder}/ball.ply", *PLACE, "--target", "Nobody"], 'There is no object "Nobody"'),
         (["{folder}/ball.ply", *PLACE, "--json", "{folder}/no/report.json"], 'to write "report.json" to'),
         (["{folder}/ball.ply", *PLACE, "--output", "{folder}/no/out.blend"], 'to write "out.blend" to'),
+        (["map", "missing.ply"], 'there is no file "missing.ply"'),
+        (["map", "{folder}/ball.ply", "--spacing", "-1"], "The spacing is a length"),
+        (["map", "{folder}/ball.ply", "--extent", "99"], "longer than"),
     ],
 )
 def test_what_cannot_be_done_exits_with_1_and_a_sentence(command, files, words, sentence):
@@ -109,7 +159,8 @@ def test_what_cannot_be_done_exits_with_1_and_a_sentence(command, files, words, 
     (files / "head.ply").write_bytes((files / "ball.ply").read_bytes()[:100])
     for kind in ("ply", "blend"):
         (files / f"cut.{kind}").write_bytes((files / f"ball.{kind}").read_bytes()[:2000])
-    code, out, err = command("reconstruct", *(str(word).format(folder=files) for word in words))
+    words = words if words[0] == "map" else ["reconstruct", *words]
+    code, out, err = command(*(str(word).format(folder=files) for word in words))
     assert code == 1
     assert err.splitlines()[-1].startswith("tactile: ")
     assert sentence in err.splitlines()[-1]
@@ -126,6 +177,8 @@ def test_what_cannot_be_done_exits_with_1_and_a_sentence(command, files, words, 
         (["reconstruct", "--azimuths", "0", "60"], "--azimuths: wanted three to six, got 2"),
         (["reconstruct", "--tilts", "0", "60"], "--tilts: wanted as many as there are planes"),
         (["reconstruct", "--nonsense"], "--nonsense"),
+        (["map", "--spacing", "wide"], "--spacing"),
+        (["map", "--location", "1", "2", "3"], "--location"),
     ],
 )
 def test_bad_arguments_exit_with_2(command, empty, words, sentence):

@@ -321,6 +321,12 @@ def make_disabled(bpy, obj):
     obj.hide_viewport = True
 
 
+def make_disabled_with_a_probe(bpy, obj):
+    """Which keeps it in Blender's evaluation, without a mesh."""
+    bpy.ops.tactile.pick(target=obj.name, location=(0.0, 0.0, 2.0))
+    obj.hide_viewport = True
+
+
 def make_distant(bpy, obj):
     obj.data.transform(Matrix.Translation((1e7, 0.0, 0.0)))
 
@@ -332,6 +338,7 @@ def make_distant(bpy, obj):
         (make_infinite, "no finite place"),
         (make_flat, "scaled to nothing"),
         (make_disabled, "disabled in viewports"),
+        (make_disabled_with_a_probe, "disabled in viewports"),
         (make_distant, "apart in single precision"),
     ],
 )

@@ -117,6 +117,25 @@ def check_errors():
         check(f"{what} ends with 2", good, f"code {code}\n{stderr}")
 
 
+def check_map():
+    """A stability map, saved as a mesh file."""
+    file = folder / "map.ply"
+    words = ["-c", "tactile", "map", scene, "--spacing", 0.15, "--json", "-", "--output", file]
+    for background in ([], ["-b"]):
+        code, stdout, stderr = blender(*background, *words)
+        lines = [json.loads(line) for line in stdout.splitlines() if line.startswith("{")]
+        good = code == 0 and len(lines) == 1 and "Traceback" not in stdout + stderr
+        check(" ".join(["blender", *background, "-c tactile map"]), good, f"code {code}\n{stderr}\n{stdout}")
+        if good:
+            counted = lines[0]["patches"] + sum(lines[0]["refused"].values())
+            check("... counts all points", counted == lines[0]["points"] > 100, lines[0])
+            head = file.read_bytes()[:2000] if file.is_file() else b""
+            check(
+                "... and its --output has the attributes", b" height_std" in head and b" reason" in head, head
+            )
+            file.unlink(missing_ok=True)
+
+
 def check_example():
     """The example that puts many patches on one object, in a background run."""
     example = Path("examples/many_patches.py")
@@ -142,4 +161,5 @@ if first is not None:
     check_files(first)
     check_output(first)
 check_errors()
+check_map()
 check_example()
