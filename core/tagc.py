@@ -94,7 +94,9 @@ def newton_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
     if not len(a):
         return a, True
     scale = max(float(np.mean(np.abs(at.det))), 1e-9)
-    unit = np.linalg.inv(np.linalg.cholesky(objective.metric)).T
+    # Beside a weight beyond all measure rounding may leave the metric indefinite.
+    least = 1e-13 * np.trace(objective.metric) * np.eye(len(a))
+    unit = np.linalg.inv(np.linalg.cholesky(objective.metric + least)).T
     for share in ROUNDINGS:
         rounding, damping = scale * share, 1e-3
         value = objective.value(at, rounding)

@@ -165,6 +165,8 @@ def open_file(path):
         raise OSError(f'cannot read "{path.name}": wanted a .blend, .ply, .stl or .obj file')
     bpy.ops.wm.read_homefile(use_empty=True)
     unreadable = f'no mesh could be read from "{path.name}": is the file whole?'
+    if path.suffix.lower() == ".ply" and not _has_header(path):
+        raise OSError(unreadable)
     try:
         # Importers ask for a window, which is not the current one after `blender -b`.
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
@@ -173,6 +175,12 @@ def open_file(path):
         raise OSError(unreadable) from error
     if not any(len(mesh.polygons) for mesh in bpy.data.meshes):
         raise OSError(unreadable)
+
+
+def _has_header(path):
+    """Whether the header of a .ply file comes to its end; where it does not, the importer ends Blender."""
+    with path.open("rb") as file:
+        return b"end_header" in file.read(1 << 16)
 
 
 def _default_target():

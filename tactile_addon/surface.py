@@ -7,6 +7,7 @@ import zlib
 
 import numpy as np
 
+FARTHEST = 1e15  # that a mesh may reach: distances squared are numbers in single precision
 WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
 
 
@@ -183,8 +184,11 @@ def evaluated_mesh(obj, depsgraph):
     if not len(evaluated.data.polygons):
         raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
     co = _coordinates(evaluated.data)
-    if not np.isfinite(co).all():
+    largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
+    if not math.isfinite(largest):
         raise ValueError(f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers')
+    if max(largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()) > FARTHEST:
+        raise ValueError(f'"{obj.name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
     return evaluated, co, matrix[:3, :3], matrix[:3, 3]
 
 

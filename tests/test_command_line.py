@@ -141,6 +141,7 @@ def test_the_open_scene_is_touched_without_a_file(command, files):
         (["missing.ply", *PLACE], 'there is no file "missing.ply"'),
         (["{folder}/ball.txt", *PLACE], "wanted a .blend, .ply, .stl or .obj file"),
         (["{folder}/cut.ply", *PLACE], ""),
+        (["{folder}/head.ply", *PLACE], "no mesh could be read"),
         (["{folder}/cut.blend", *PLACE], ""),
         (["{folder}/text.obj", *PLACE], "no mesh could be read"),
         (["{folder}/ball.ply", "--location", "9", "9", "9"], "The location is"),
@@ -155,6 +156,7 @@ def test_the_open_scene_is_touched_without_a_file(command, files):
 def test_what_cannot_be_done_exits_with_1_and_a_sentence(command, files, words, sentence):
     (files / "ball.txt").write_text("a ball")
     (files / "text.obj").write_text("a ball")
+    (files / "head.ply").write_bytes((files / "ball.ply").read_bytes()[:100])
     for kind in ("ply", "blend"):
         (files / f"cut.{kind}").write_bytes((files / f"ball.{kind}").read_bytes()[:2000])
     words = words if words[0] == "map" else ["reconstruct", *words]

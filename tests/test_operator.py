@@ -421,6 +421,14 @@ def zero_scale(bpy):
     bpy.context.object.scale.y = 0.0
 
 
+def huge(bpy):
+    bpy.context.object.scale = (3e38, 3e38, 1.0)
+
+
+def one_vertex_far_away(bpy):
+    bpy.context.object.data.vertices[5].co.x = 1e30
+
+
 def disabled(bpy):
     bpy.context.object.hide_viewport = True
 
@@ -466,6 +474,8 @@ def nothing(bpy):
         (no_faces, {}, '"Sphere" has no faces to touch'),
         (bad_vertex, {}, "vertices at no finite place"),
         (zero_scale, {}, "scaled to nothing in some direction"),
+        (huge, {}, "reaches farther than 1e+15 from the origin"),
+        (one_vertex_far_away, {}, "reaches farther than 1e+15 from the origin"),
         (disabled, {}, "disabled in viewports or excluded from the view layer"),
         (excluded, {}, "disabled in viewports or excluded from the view layer"),
         (far_away, {"location": (2e6, 0.0, 2.0)}, "apart in single precision, too coarse"),

@@ -220,6 +220,15 @@ def test_a_sensor_that_knows_nothing_leaves_a_patch_in_doubt():
     assert np.isfinite([r.mean_height_std, r.patch.k1, r.patch.k2]).all()
 
 
+def test_a_weight_beyond_all_measure_leaves_the_contacts_alone():
+    ball = surfaces.sphere(25)
+    errors = [
+        reconstruct(ball.point, GOOD, outward=ball.normal, method="tagc", degree=6, weight=weight).fit_error
+        for weight in (1e12, 1e20, 1e50)
+    ]
+    assert errors == pytest.approx(errors[:1] * 3, rel=1e-6)
+
+
 def test_curves_that_rounding_far_from_the_origin_spoils_are_refused():
     ball = surfaces.sphere(25)
     far = ball.point + 1e17
