@@ -6,6 +6,7 @@ Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the calle
 convex body has negative curvatures under its outward normal.
 """
 
+from .common_point import common_point
 from .domain import Domain
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
@@ -13,6 +14,7 @@ from .next_plane import azimuth_of, suggest_plane
 from .reconstruction import METHODS, SOLVERS, reconstruct, reconstruct_many
 from .result import Reconstruction, mean_height_stds
 from .sampling import spaced
+from .serialization import from_dict, to_dict
 from .tracking import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane, Surface, track
 from .verification import distances, fit_error, overlapped
 
@@ -32,13 +34,16 @@ __all__ = [
     "SamplingPlane",
     "Surface",
     "azimuth_of",
+    "common_point",
     "distances",
     "fit_error",
+    "from_dict",
     "mean_height_stds",
     "overlapped",
     "reconstruct",
     "reconstruct_many",
     "spaced",
     "suggest_plane",
+    "to_dict",
     "track",
 ]
