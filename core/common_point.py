@@ -102,8 +102,8 @@ def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> N
         if not (miss <= APART * size and gap <= GAP * size):
             raise DegenerateCurvesError(
                 f"the curves do not come near each other: curve {number}, {size:.3g} long, is "
-                f"{max(miss, gap):.3g} away from the point nearest to all: give the reference point, or leave "
-                "that curve out"
+                f"{max(miss, gap):.3g} away from the point nearest to all: give the reference point, or "
+                "leave that curve out"
             )
 
 
