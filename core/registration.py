@@ -25,13 +25,16 @@ SPACING = 0.1  # of the points a polynomial is fitted to
 APART, TURN = 0.05, math.radians(2.0)  # poses that differ by less are one
 PLACES = 0.2  # between the places that are tried
 TURNS = 36
-FACING = 0.5  # what opposite normals count, as a distance: the other side of a thin wall is farther
+FACING = 0.1  # what opposite normals count, as a distance: the other side of a thin wall is farther
 LARGEST_AREA = 5000.0
 CONTACTS = 60  # of the coarse search, at most
-COARSE, FINE = 400, 24  # poses that are refined, to the nearest planes and to the nearest triangles
+COARSE, FINE = 400, 24  # poses that are refined, to the nearest planes and to the nearest triangles,
+COARSE_STEPS, FINE_STEPS = 8, 20
+NEAREST = 16  # triangles that are measured
 TERMS = exponents(0, 4)
 AMBIGUOUS = 1.5  # times the residual is about as good
 LEAST_RESIDUAL = 1e-3  # below it residuals do not differ
+SIGNIFICANT = 3.0  # standard deviations of a pose
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,7 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     touch = _Touch(contacts, r.patch.normal(*r.contacts[:, :2].T))
     few = slice(None, None, math.ceil(len(contacts) / CONTACTS))
     places = _coarse(_Touch(contacts[few], touch.normals[few]), mesh)
-    places, residuals, slack = _descend(places, touch, mesh, 8, 20)
+    places, residuals, slides = _descend(places, touch, mesh, NEAREST, FINE_STEPS)
     poses = []
     distinct = _distinct(places, residuals)
     limits = AMBIGUOUS * np.maximum(residuals, LEAST_RESIDUAL)
@@ -115,7 +118,7 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
                 place - rotation @ r.frame.origin,
                 float(r.radius * residuals[i]),
                 int(np.argmin(np.einsum("ij,ij->i", co - place, co - place))),
-                bool(min(others.min(initial=np.inf), slack[i]) < limits[i]),
+                bool(slides[i] or (others < limits[i]).any()),
             )
         )
     return poses
@@ -185,7 +188,7 @@ def _coarse(touch: _Touch, mesh: _Mesh) -> _Places:
     order = order[np.isfinite(scores[order])]
     axes, origins = places.at(order // TURNS)
     places = _Places(axes @ _about_normal()[order % TURNS], origins)
-    places, residuals, _ = _descend(places, touch, mesh, 1, 8)
+    places, residuals, _ = _descend(places, touch, mesh, 1, COARSE_STEPS)
     return places.at(np.array(_distinct(places, residuals)[:FINE]))
 
 
@@ -256,9 +259,9 @@ def _axes(normals: Array) -> Array:
 
 def _descend(
     places: _Places, touch: _Touch, mesh: _Mesh, neighbours: int, steps: int
-) -> tuple[_Places, Array, Array]:
+) -> tuple[_Places, Array, NDArray[np.bool_]]:
     """Places moved to where the contacts are nearest to the mesh (Levenberg-Marquardt), the residuals there,
-    and what they grow to, at least, where a place moves by as much as makes it another one."""
+    and whether a place may as well be another one within the accuracy of the contacts."""
     from scipy.spatial.transform import Rotation
 
     scale = np.array([TURN, TURN, TURN, APART, APART, APART])
@@ -273,14 +276,21 @@ def _descend(
         moved = _Places(turned, places.origins + step[:, 3:])
         new_errors, new_slopes = _errors(moved, touch, mesh, neighbours)
         better = np.sum(new_errors**2, axis=1) < np.sum(errors**2, axis=1)
-        places = _Places(*(np.where(better.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(places, moved, strict=True)))
-        errors, slopes = np.where(better[:, None], new_errors, errors), np.where(better[:, None, None], new_slopes, slopes)
+        places = _Places(
+            *(
+                np.where(better.reshape(-1, *[1] * (a.ndim - 1)), b, a)
+                for a, b in zip(places, moved, strict=True)
+            )
+        )
+        errors, slopes = (
+            np.where(better[:, None], new_errors, errors),
+            np.where(better[:, None, None], new_slopes, slopes),
+        )
         damping *= np.where(better, 0.2, 5.0)
     slopes = slopes * scale
     growth = np.linalg.eigvalsh(np.einsum("mni,mnj->mij", slopes, slopes))[:, 0]
-    square = np.sum(errors**2, axis=1)
-    count = errors.shape[1]
-    return places, np.sqrt(square / count), np.sqrt((square + np.maximum(growth, 0.0)) / count)
+    residuals = np.sqrt(np.mean(errors**2, axis=1))
+    return places, residuals, growth < (SIGNIFICANT * np.maximum(residuals, LEAST_RESIDUAL)) ** 2
 
 
 def _errors(places: _Places, touch: _Touch, mesh: _Mesh, neighbours: int) -> tuple[Array, Array]:
@@ -295,11 +305,15 @@ def _errors(places: _Places, touch: _Touch, mesh: _Mesh, neighbours: int) -> tup
     else:
         offsets = points[:, None] - _closest(points[:, None], mesh.triangles[near])
         lengths = np.linalg.norm(offsets, axis=2)
-        row, nearest = np.arange(len(points)), lengths.argmin(axis=1)
+        # The other side of a thin wall, however near.
+        away = np.einsum("nki,ni->nk", mesh.smooth[near], normals) < 0.0
+        row, nearest = np.arange(len(points)), (lengths + away).argmin(axis=1)
         distance = lengths[row, nearest]
         # On the surface there is no direction to it but the normal.
         on = (distance < 1e-9)[:, None]
-        up = np.where(on, mesh.normals[near[row, nearest]], offsets[row, nearest] / np.maximum(distance, 1e-9)[:, None])
+        up = np.where(
+            on, mesh.normals[near[row, nearest]], offsets[row, nearest] / np.maximum(distance, 1e-9)[:, None]
+        )
     up = up.reshape(arms.shape)
     return distance.reshape(arms.shape[:2]), np.concatenate([np.cross(arms, up), up], axis=2)
 
