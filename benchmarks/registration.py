@@ -41,8 +41,8 @@ PLANES = [core.SamplingPlane(math.radians(azimuth)) for azimuth in (0.0, 60.0, 1
 NEAR, TURN = 1.0, math.radians(2.0)  # mm
 AMBIGUOUS = 1.5
 FINE_TURNS = 36
-FIRST, KEPT = 6, 500  # contacts that all poses are judged by first; poses that are refined
-REFINED = 100  # of those, to the nearest triangles
+FIRST, KEPT = 6, 300  # contacts that all poses are judged by first; poses that are refined
+REFINED = 50  # of those, to the nearest triangles
 
 
 class Scan:
@@ -130,16 +130,15 @@ class Exhaustive:
     def search(self, r):
         """Poses, the best first, and their residuals."""
         axes, origins = self.places(r.contacts)
-        touch = registration._Touch(r.contacts / r.radius, r.patch.normal(*r.contacts[:, :2].T))
-        corners = self.faces.astype(np.intp)
-        mesh = registration._mesh(self.vertices / r.radius, corners, 1.0)
-        places = registration._Places(axes, origins / r.radius)
-        for neighbours, kept in ((1, REFINED), (registration.NEAREST, REFINED)):
-            places, residuals, _ = registration._descend(places, touch, mesh, neighbours, 10)
-            kept = registration._distinct(places, residuals)[:kept]
-            places, residuals = places.at(kept), residuals[kept]
-        rotations = places.axes @ r.frame.axes.T
-        shifts = r.radius * places.origins - rotations @ r.frame.origin
+        touch = np.array([r.contacts / r.radius, r.patch.normal(*r.contacts[:, :2].T)])
+        mesh = registration._mesh(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
+        places = np.concatenate([axes, origins[..., None] / r.radius], axis=2)
+        for neighbours in (1, registration.NEAREST):
+            places, residuals, _ = registration._descended(places, touch, mesh, neighbours, 10)
+            kept = registration._distinct(places, residuals)[:REFINED]
+            places, residuals = places[kept], residuals[kept]
+        rotations = places[..., :3] @ r.frame.axes.T
+        shifts = r.radius * places[..., 3] - rotations @ r.frame.origin
         return list(zip(rotations, shifts, strict=True)), r.radius * residuals
 
 

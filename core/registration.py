@@ -61,7 +61,7 @@ class Pose:
 
 
 class _Mesh(NamedTuple):
-    """Triangles (m, 3, 3) of like size, their unit normals, centres and smooth normals there (m, 3), a tree."""
+    """Triangles (m, 3, 3) of like size, unit normals, centres and smooth normals there (m, 3), a tree."""
 
     triangles: Array
     normals: Array
@@ -116,7 +116,7 @@ def _mesh(co: Array, corners: NDArray[np.intp], patch: float) -> _Mesh:
     size = np.linalg.norm(np.ptp(co[corners], axis=(0, 1)))
     if not patch <= size <= LARGEST_MESH:
         raise ValueError(
-            f"vertices: wanted a mesh from {patch:.2g} (the patch) to {LARGEST_MESH:g} times the radius across, "
+            f"vertices: wanted a mesh from {patch:.2g} (the patch) to {LARGEST_MESH:g} times the radius, "
             f"got {size:.2g}: bring both to one unit, or take another extent"
         )
     normals = np.zeros_like(co)
@@ -155,8 +155,12 @@ def _halved(pieces: Array) -> Array:
 
 def _coarse(touch: Array, mesh: _Mesh) -> Array:
     """The most promising places, moved to where the contacts are nearest to the planes of triangles."""
+    from scipy.spatial.transform import Rotation
+
     touch = touch[:, :: math.ceil(touch.shape[1] / CONTACTS)]
-    turns, (places, scores) = _turns(), _scored(touch, mesh)
+    places, fields = _fields(mesh, 1.05 * np.linalg.norm(touch[0], axis=1).max())
+    turns = Rotation.from_euler("z", 2.0 * np.pi / TURNS * np.arange(TURNS)).as_matrix()
+    scores = np.column_stack([_scores(touch @ turn.T, fields) for turn in turns])
     least = (scores <= np.roll(scores, 1, axis=1)) & (scores <= np.roll(scores, -1, axis=1))
     order = np.argsort(np.where(least, scores, np.inf), axis=None)[: min(COARSE, np.count_nonzero(least))]
     places = places[order // TURNS]
@@ -165,59 +169,40 @@ def _coarse(touch: Array, mesh: _Mesh) -> Array:
     return places[_distinct(places, residuals)[:FINE]]
 
 
-def _turns() -> Array:
-    """All the rotations about the normal, (TURNS, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_euler("z", 2.0 * np.pi / TURNS * np.arange(TURNS)).as_matrix()
-
-
-def _scored(touch: Array, mesh: _Mesh) -> tuple[Array, Array]:
-    """Places all over the mesh (m, 3, 4) and the contacts' squared distances to it in all turns, (m, TURNS).
-
-    What a small tilt and a shift along the normal make good does not count: so neither does, on a quadric,
-    a small shift along the surface.
-    """
+def _fields(mesh: _Mesh, reach: float) -> tuple[Array, Array]:
+    """Places all over the mesh (m, 3, 4), and the polynomials that stand for it there, (k, m)."""
     from scipy.spatial import cKDTree
 
     rng = np.random.default_rng(0)
     points = [i for i in spaced(mesh.centres, SPACING, rng) if i is not None]
     chosen = [points[i] for i in spaced(mesh.centres[points], PLACES, rng) if i is not None]
-    places = np.concatenate([_axes(mesh.smooth[chosen]), mesh.centres[chosen][..., None]], axis=2)
-    tree, reach = cKDTree(mesh.centres[points]), 1.05 * np.linalg.norm(touch[0], axis=1).max()
+    places = np.concatenate([_axes(mesh.smooth[chosen]), mesh.centres[chosen, :, None]], axis=2)
     # The last one is what a query finds where there is nothing.
     co, normals = (np.vstack([a[points], np.zeros(3)]) for a in (mesh.centres, mesh.smooth))
-    products, both, square = _products(touch)
-    scores = []
+    tree, nearest, fields = cKDTree(co[:-1]), range(1, min(MOST_POINTS, len(points)) + 1), []
     for part in np.array_split(places, math.ceil(len(places) / 500)):
         axes, origins = part[..., :3], part[..., 3]
-        found = tree.query(origins, range(1, min(MOST_POINTS, len(points)) + 1), distance_upper_bound=reach)[
-            1
-        ]
+        found = tree.query(origins, nearest, distance_upper_bound=reach)[1]
         local = (co[found] - origins[:, None]) @ axes
         weights = np.maximum(normals[found] @ axes[..., 2:], 0.0)
-        basis = weights * _basis(local)
-        system = np.einsum("mni,mnj->mij", basis, basis, optimize=True) + RIDGE * np.eye(len(TERMS))
-        right = np.einsum("mni,mn->mi", basis, (weights * local)[..., 2], optimize=True)
-        a = np.linalg.solve(system, right[..., None])[..., 0]
-        scores.append(square - 2.0 * a @ both + (a[:, :, None] * a[:, None]).reshape(len(a), -1) @ products)
-    return places, np.concatenate(scores)
+        x, y = local.reshape(-1, 3)[:, :2].T
+        basis = weights * monomials(x, y, TERMS).reshape(*found.shape, -1)
+        system = basis.swapaxes(1, 2) @ basis + RIDGE * np.eye(len(TERMS))
+        fields.append(np.linalg.solve(system, basis.swapaxes(1, 2) @ (weights * local)[..., 2:])[..., 0])
+    return places, np.concatenate(fields).T
 
 
-def _basis(points: Array) -> Array:
-    """The terms of the polynomial at local points (m, n, 3), (m, n, k)."""
-    x, y = points.reshape(-1, 3)[:, :2].T
-    return monomials(x, y, TERMS).reshape(*points.shape[:2], -1)
+def _scores(touch: Array, fields: Array) -> Array:
+    """Sums of squared distances of the contacts to polynomials (k, m).
 
-
-def _products(touch: Array) -> tuple[Array, Array, float]:
-    """Of the terms at the turned contacts among each other (k^2, TURNS), with the heights, of the heights."""
-    weights, (x, y, z) = touch[1][:, 2:], touch[0].T  # a height on a slope is less of a distance
+    What a small tilt and a shift along the normal make good does not count: so neither does, on a quadric,
+    a small shift along the surface.
+    """
+    x, y, z = touch[0].T
+    weights = touch[1, :, 2:]  # a height on a slope is less of a distance
+    off = weights * (z[:, None] - monomials(x, y, TERMS) @ fields)
     free = np.linalg.qr(weights * monomials(x, y, exponents(0, 1)))[0]
-    basis = weights * _basis(touch[0] @ _turns().swapaxes(1, 2))
-    basis, z = basis - free @ (free.T @ basis), weights[:, 0] * z
-    z = z - free @ (free.T @ z)
-    return (basis.swapaxes(1, 2) @ basis).reshape(TURNS, -1).T, (z @ basis).T, float(z @ z)
+    return np.sum(off**2, axis=0) - np.sum((free.T @ off) ** 2, axis=0)
 
 
 def _axes(normals: Array) -> Array:
