@@ -269,7 +269,7 @@ def _feet(points: Array, triangles: Array) -> Array:
     across, corners = _across(triangles), np.moveaxis(triangles, -2, 0)
     height = np.sum((points - corners[0]) * across, axis=-1, keepdims=True)
     feet = points - height / np.sum(across**2, axis=-1, keepdims=True) * across
-    inside, least, nearest = True, np.full(feet.shape[:-1], np.inf), feet
+    inside, least, nearest = np.full(feet.shape[:-1], True), np.full(feet.shape[:-1], np.inf), feet
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         edge, arm = end - start, points - start
         inside = inside & (np.sum(np.cross(edge, arm) * across, axis=-1) >= 0.0)
