@@ -12,6 +12,7 @@ from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import azimuth_of, suggest_plane
 from .reconstruction import METHODS, SOLVERS, reconstruct, reconstruct_many
+from .registration import Pose, register
 from .result import Reconstruction, mean_height_stds
 from .sampling import spaced
 from .serialization import from_dict, to_dict
@@ -30,6 +31,7 @@ __all__ = [
     "Domain",
     "Frame",
     "MongePatch",
+    "Pose",
     "Reconstruction",
     "SamplingPlane",
     "Surface",
@@ -42,6 +44,7 @@ __all__ = [
     "overlapped",
     "reconstruct",
     "reconstruct_many",
+    "register",
     "spaced",
     "suggest_plane",
     "to_dict",
