@@ -6,7 +6,7 @@ Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the calle
 convex body has negative curvatures under its outward normal.
 """
 
-from .common_point import common_point
+from .common_point import common_point, in_running_order
 from .domain import Domain
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
@@ -40,6 +40,7 @@ __all__ = [
     "distances",
     "fit_error",
     "from_dict",
+    "in_running_order",
     "mean_height_stds",
     "overlapped",
     "reconstruct",

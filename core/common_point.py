@@ -4,10 +4,12 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .arguments import Array, list_of
+from .arguments import LARGEST, Array, finite_array, list_of
 from .local_geometry import (
     LEAST_ANGLE,
     LEAST_CONTACTS,
@@ -50,6 +52,17 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     _require_near(point, misses, contours)
     _require_crossing(tangents)
     return origin + point, misses
+
+
+def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
+    """The contour with its contacts as they follow each other along a curve through `point`."""
+    r = contour.points - finite_array("point", point, (3,), LARGEST)
+    if not len(r):
+        return contour
+    tangent = curves_through(r[None, None], np.ones((1, 1, len(r)), dtype=bool)).tangents[0, 0]
+    order = np.argsort(np.copysign(np.linalg.norm(r, axis=1), r @ tangent), kind="stable")
+    normals = None if contour.normals is None else contour.normals[order]
+    return replace(contour, points=contour.points[order], normals=normals)
 
 
 def _misses(point: Array, feet: Array, tangents: Array) -> Array:

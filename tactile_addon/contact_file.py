@@ -42,7 +42,7 @@ def read(path):
     readers = {".csv": _read_csv, ".txt": _read_csv, ".tsv": _read_csv, ".ply": _read_ply}
     if path.suffix.lower() not in readers:
         raise OSError(f'cannot read "{path.name}": wanted a .csv or .ply file of contacts')
-    return readers[path.suffix.lower()](path.name, path.read_bytes())
+    return readers[path.suffix.lower()](f'"{path.name}"', path.read_bytes())
 
 
 def write(path, contours, unit=""):
@@ -59,7 +59,7 @@ def write(path, contours, unit=""):
 
 
 def _contours(labels, points, normals, times):
-    """One a label, in the order of their first contacts; normals, with None where blank, and times or None."""
+    """One a label, in the order of their first contacts; of normals some may be None, and times too."""
     by_curve = {}
     for row, label in enumerate(labels):
         by_curve.setdefault(label, []).append(row)
@@ -70,7 +70,9 @@ def _contours(labels, points, normals, times):
         # A sensor at rest writes one contact many times: it is no more certain for that.
         first = np.sort(np.unique(points[rows], axis=0, return_index=True)[1])
         rows = np.array(rows)[first]
-        some = None if normals is None or normals[rows[0]] is None else np.array([normals[row] for row in rows])
+        some = (
+            None if normals is None or normals[rows[0]] is None else np.array([normals[row] for row in rows])
+        )
         contours.append(core.Contour(points[rows], normals=some))
     return contours
 
@@ -82,29 +84,31 @@ def _read_csv(name, data):
         raise ValueError(f"{name}: wanted a header with the columns curve, x, y, z, got an empty file")
     number, header = lines[0]
     separator = next((s for s in ";\t" if s in header), ",")
-    columns, unit = _columns(f"{name}, line {number}", _fields(name, number, header, separator))
+    at = f"{name}, line {number}"
+    columns, unit = _columns(at, _fields(at, header, separator))
     labels, points, normals, times, last = [], [], [], [], {}
     for number, line in lines[1:]:
-        fields = _fields(name, number, line, separator)
+        at = f"{name}, line {number}"
+        fields = _fields(at, line, separator)
         if not any(fields):
             continue
         if len(fields) > columns["width"] and any(fields[columns["width"] :]):
             raise ValueError(
-                f"{name}, line {number}: wanted {columns['width']} fields, got {len(fields)}: decimal commas need "
-                "semicolons or tabs between the fields"
+                f"{at}: wanted {columns['width']} fields, got {len(fields)}: decimal commas "
+                "need semicolons or tabs between the fields"
             )
         row = {key: fields[i] if i < len(fields) else "" for key, i in columns.items() if key != "width"}
 
-        def value(key, number=number, row=row):
-            return _number(f'{name}, line {number}, column "{key}"', row[key])
+        def value(key, at=at, row=row):
+            return _number(f'{at}, column "{key}"', row[key])
 
         labels.append(row.get("curve", "1"))
         if not labels[-1]:
-            raise ValueError(f'{name}, line {number}, column "curve": wanted a number or a name, got none')
+            raise ValueError(f'{at}: wanted a number or a name in the column "curve", got none')
         points.append([value(key) for key in POINT])
         measured = "nx" in row and any(row[key] for key in NORMAL)
         if measured is not last.setdefault(labels[-1], measured):
-            raise ValueError(f"{name}, line {number}: wanted normals all along a curve or nowhere, got some")
+            raise ValueError(f"{at}: wanted normals all along a curve or nowhere, got some")
         normals.append([value(key) for key in NORMAL] if measured else None)
         if "time" in row:
             times.append(value("time"))
@@ -126,11 +130,11 @@ def _lines(name, data):
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
-def _fields(name, number, line, separator):
+def _fields(at, line, separator):
     try:
         (fields,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
     except csv.Error:
-        raise ValueError(f"{name}, line {number}: wanted fields of some letters, got a longer one") from None
+        raise ValueError(f"{at}: wanted fields of some letters, got a longer one") from None
     return [field.strip() for field in fields]
 
 
@@ -186,7 +190,7 @@ def _read_ply(name, data):
     body = body.partition(b"\n")[2]
     before, count, fields = _ply_vertices(name, lines, order)
     if lines[1][1] == "ascii":
-        rows = _ply_rows(name, len(lines) + 1, body, len(before), count, fields)
+        rows = _ply_rows(name, len(lines) + 2, body, len(before), count, fields)
     else:
         kind, start = np.dtype(fields), sum(np.dtype(kinds).itemsize for kinds in before)
         if len(body) < start + count * kind.itemsize:
@@ -209,7 +213,9 @@ def _ply_vertices(name, lines, order):
             if line[:1] == ["element"]:
                 elements.append((line[1], int(line[2]), []))
             elif line[:1] == ["property"]:
-                elements[-1][2].append((line[-1].lower(), "list" if line[1] == "list" else PLY_TYPES[line[1]]))
+                elements[-1][2].append(
+                    (line[-1].lower(), "list" if line[1] == "list" else PLY_TYPES[line[1]])
+                )
         except (IndexError, ValueError, KeyError):
             raise ValueError(f'{name}: wanted an element or a property, got "{" ".join(line)}"') from None
     before = []
@@ -229,11 +235,9 @@ def _ply_rows(name, first, body, skip, count, fields):
     lines = body.decode("latin-1").splitlines()[skip : skip + count]
     rows = np.zeros(count, [(key, "f8") for key, _ in fields])
     for i in range(count):
+        at = f"{name}, line {first + skip + i}"
         words = lines[i].split() if i < len(lines) else []
         if len(words) != len(fields):
-            raise ValueError(
-                f"{name}, line {first + skip + i}: wanted {len(fields)} numbers, got {len(words)}: is the file whole?"
-            )
-        at = f"{name}, line {first + skip + i}"
+            raise ValueError(f"{at}: wanted {len(fields)} numbers, got {len(words)}: is the file whole?")
         rows[i] = tuple(_number(f'{at}, "{key}"', word) for (key, _), word in zip(fields, words, strict=True))
     return rows

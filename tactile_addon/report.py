@@ -6,13 +6,15 @@
 def readable(report):
     """Lines of label and value; lengths in the unit of the scene or file."""
     seconds = report["seconds"]
-    stops = sorted({stop for pair in report["stops"] for stop in pair})
+    contacts = (
+        f"{report['contacts']} on {report['curves']} curves" if "curves" in report else _tracked(report)
+    )
     rows = [
         ("touched", report["source"]),
         ("status", f"{report['status']}: {report['message']}"),
         ("fit", f"{report['method']}, degree {report['degree']}"),
-        ("contacts", f"{report['contacts']} on {len(report['planes'])} curves, ended by: {', '.join(stops)}"),
-        ("step, extent, radius", f"{report['step']:.4g}, {report['extent']:.4g}, {report['radius']:.4g}"),
+        ("contacts", contacts),
+        *_lengths(report),
         ("point", _vector(report["frame"]["origin"])),
         ("normal", _vector(report["frame"]["normal"])),
         ("direction d1", _vector(report["frame"]["d1"])),
@@ -28,6 +30,23 @@ def readable(report):
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
     return _table(rows)
+
+
+def _tracked(report):
+    stops = sorted({stop for pair in report["stops"] for stop in pair})
+    return f"{report['contacts']} on {len(report['planes'])} curves, ended by: {', '.join(stops)}"
+
+
+def _lengths(report):
+    """Those of a touch; of measured curves, how far they miss their common point."""
+    if "step" in report:
+        lengths = f"{report['step']:.4g}, {report['extent']:.4g}, {report['radius']:.4g}"
+        return [("step, extent, radius", lengths)]
+    rows = [("unit", report["unit"])] if report["unit"] else []
+    rows.append(("radius", f"{report['radius']:.4g}"))
+    if "misses" in report:
+        rows.append(("curves miss it by", ", ".join(f"{miss:.3g}" for miss in report["misses"])))
+    return rows
 
 
 def map_readable(record):
@@ -65,6 +84,8 @@ def sentence(error):
 
 
 def _verification(report):
+    if "curves" in report:
+        return "there is none"
     if not report["vertices"]:
         return "no vertex of the mesh lies over the patch"
     share = _share(report, "vertex_distance_mean")
