@@ -14,7 +14,7 @@ from .reconstruction import METHODS, SOLVERS, reconstruct, reconstruct_many
 from .result import Reconstruction, mean_height_stds
 from .sampling import spaced
 from .tracking import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane, Surface, track
-from .verification import distances, fit_error, overlapped
+from .verification import distances, fit_error, overlapped, reachable, verify
 
 __all__ = [
     "CREASE",
@@ -36,9 +36,11 @@ __all__ = [
     "fit_error",
     "mean_height_stds",
     "overlapped",
+    "reachable",
     "reconstruct",
     "reconstruct_many",
     "spaced",
     "suggest_plane",
     "track",
+    "verify",
 ]
