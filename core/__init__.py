@@ -11,6 +11,7 @@ from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import azimuth_of, suggest_plane
 from .reconstruction import METHODS, SOLVERS, reconstruct, reconstruct_many
+from .registration import Pose, register
 from .result import Reconstruction, mean_height_stds
 from .sampling import spaced
 from .tracking import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane, Surface, track
@@ -28,6 +29,7 @@ __all__ = [
     "Domain",
     "Frame",
     "MongePatch",
+    "Pose",
     "Reconstruction",
     "SamplingPlane",
     "Surface",
@@ -39,6 +41,7 @@ __all__ = [
     "reachable",
     "reconstruct",
     "reconstruct_many",
+    "register",
     "spaced",
     "suggest_plane",
     "track",

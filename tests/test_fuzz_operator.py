@@ -245,6 +245,7 @@ def instanced(bpy, obj, draw):
 
 def edited(bpy, obj, draw):
     if obj.type == "MESH" and obj.name in bpy.context.view_layer.objects and obj.visible_get():
+        bpy.context.view_layer.objects.active = obj
         bpy.ops.object.mode_set(mode=draw(st.sampled_from(["EDIT", "SCULPT"])))
 
 

@@ -1,0 +1,242 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contours whose place is unknown, put onto meshes of exact surfaces."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import surfaces
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from core import Contour, SamplingPlane, reconstruct, register, track
+
+PLANES = [SamplingPlane(np.radians(azimuth)) for azimuth in (0, 60, 120)]
+TURN, SHIFT = Rotation.from_euler("xyz", (0.7, -1.1, 2.3)).as_matrix(), np.array([310.0, -40.0, 75.0])
+WAVES = ((1.0, (0.27, 0.08, -0.14), 0.4), (0.8, (-0.1, 0.3, 0.19), 1.9), (0.9, (0.16, -0.19, 0.24), 3.0))
+
+
+def ball(count=10000):
+    """Points all over the unit sphere (n, 3), and counterclockwise triangles."""
+    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
+    across = np.sqrt(1.0 - z**2)
+    points = np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+    faces = ConvexHull(points).simplices
+    corners = points[faces]
+    inward = np.einsum("ij,ij->i", np.cross(corners[:, 1], corners[:, 2]), corners[:, 0]) < 0.0
+    faces[inward] = faces[inward, ::-1]
+    return points, faces
+
+
+def bumps(p):
+    return sum(a * np.sin(p @ np.array(w) + phase) for a, w, phase in WAVES)
+
+
+@cache
+def bumpy():
+    """A bumpy ball without symmetry, of radius 25: an exact surface with a point of it, and a mesh."""
+
+    def gradient(p):
+        slopes = (a * np.cos(p @ np.array(w) + phase) * np.array(w) for a, w, phase in WAVES)
+        return p / np.linalg.norm(p) - sum(slopes)
+
+    directions, faces = ball()
+    radii = np.full(len(directions), 25.0)
+    for _ in range(60):
+        radii = 25.0 + bumps(radii[:, None] * directions)
+    vertices = radii[:, None] * directions
+    surface = surfaces.Exact(
+        lambda x, y, z: np.sqrt(x**2 + y**2 + z**2) - 25.0 - bumps(np.stack([x, y, z], axis=-1)),
+        gradient,
+        vertices[1234],
+        0.0,
+        0.0,
+    )
+    return surface, vertices, faces
+
+
+def touch(surface, *, side=1.0, factor=1.0, noise=0.0):
+    """Of `surface`, scaled by `factor`, moved to where TURN and SHIFT bring it back; reconstructed."""
+    lengths = {"extent": 10.0, "step": 0.8, "noise": noise, "rng": 3}
+    contours = track(surface, surface.point, surface.normal, PLANES, **lengths)
+    moved = [Contour((factor * c.points - SHIFT) @ TURN, noise=factor * noise) for c in contours]
+    return reconstruct((factor * surface.point - SHIFT) @ TURN, moved, outward=side * surface.normal @ TURN)
+
+
+def off(pose, r, point, turn=TURN):
+    """By how much a pose misses: in place, and in degrees."""
+    place = pose.rotation @ r.frame.origin + pose.translation
+    angle = np.arccos(np.clip((np.sum(turn * pose.rotation) - 1.0) / 2.0, -1.0, 1.0))
+    return np.linalg.norm(place - point), np.degrees(angle)
+
+
+def test_contours_are_found_on_a_shape_without_symmetry():
+    surface, vertices, faces = bumpy()
+    r = touch(surface)
+    poses = register(r, vertices, faces)
+    place, angle = off(poses[0], r, surface.point)
+    assert place < 0.05
+    assert angle < 0.2
+    assert poses[0].residual < 0.02
+    assert poses[0].vertex == 1234
+    assert not poses[0].is_ambiguous
+    assert all(pose.is_ambiguous for pose in poses[1:])
+    assert len(poses) == 5
+    assert [pose.residual for pose in poses] == sorted(pose.residual for pose in poses)
+    for pose in poses:
+        assert np.allclose(pose.rotation @ pose.rotation.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
+    assert len(register(r, vertices, faces, best=1)) == 1
+
+
+def test_the_residual_is_the_distance_of_the_contacts_to_the_mesh():
+    """On a ball's mesh a contact is as far from it as the facets are from the sphere, where it is right."""
+    directions, faces = ball(2000)
+    r = touch(surfaces.sphere(25.0))
+    pose = register(r, 26.0 * directions, faces)[0]
+    contacts = r.frame.to_world(r.contacts) @ pose.rotation.T + pose.translation
+    corners = 26.0 * directions[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    # Of a convex body, nearly, for contacts that are nearly on it.
+    heights = np.max(np.einsum("nfi,fi->nf", contacts[:, None] - corners[None, :, 0], normals), axis=1)
+    assert pose.residual == pytest.approx(np.sqrt(np.mean(heights**2)), rel=0.02)
+
+
+def test_an_ellipsoid_has_four_places_as_good():
+    surface = surfaces.ellipsoid(40.0, 28.0, 20.0, 0.6, 0.5)
+    directions, faces = ball()
+    r = touch(surface)
+    poses = register(r, directions * [40.0, 28.0, 20.0], faces)
+    found = set()
+    for pose in poses[:4]:
+        assert pose.is_ambiguous
+        for i, signs in enumerate(([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1])):
+            place, angle = off(pose, r, signs * surface.point, np.diag(signs) @ TURN)
+            if place < 0.2 and angle < 0.5:
+                found.add(i)
+    assert found == {0, 1, 2, 3}
+    assert len(poses) == 4 or poses[4].residual > 5.0 * poses[3].residual
+
+
+def tube(sides, rings, long):
+    """A cylinder of radius 20 around z, open, of as many facets."""
+    turn, z = 2.0 * np.pi / sides * np.arange(sides), np.linspace(-long / 2.0, long / 2.0, rings)
+    vertices = np.array([[20.0 * np.cos(t), 20.0 * np.sin(t), h] for h in z for t in turn])
+    i, k = (a.ravel() for a in np.meshgrid(np.arange(sides), sides * np.arange(rings - 1)))
+    a, b = i + k, (i + 1) % sides + k
+    return vertices, np.vstack(
+        [np.column_stack([a, b, b + sides]), np.column_stack([a, b + sides, a + sides])]
+    )
+
+
+@pytest.mark.parametrize("rings", [61, 2], ids=["fine", "one facet long"])
+def test_on_a_cylinder_the_place_is_ambiguous(rings):
+    r = touch(surfaces.cylinder(20.0))
+    poses = register(r, *tube(180, rings, 60.0))
+    assert all(pose.is_ambiguous for pose in poses)
+    assert poses[0].residual < 0.02
+    place = poses[0].rotation @ r.frame.origin + poses[0].translation
+    assert np.hypot(*place[:2]) == pytest.approx(20.0, abs=0.05)
+    assert abs((poses[0].rotation @ r.frame.axes)[2, 1]) > 0.999  # d2, which does not curve, is the axis
+
+
+def test_on_a_sphere_and_on_a_plane_the_place_is_ambiguous():
+    directions, faces = ball()
+    poses = register(touch(surfaces.sphere(25.0)), 25.0 * directions, faces)
+    assert all(pose.is_ambiguous for pose in poses)
+    assert poses[0].residual < 0.02
+    square = np.array([[-40, -40, 0], [40, -40, 0], [40, 40, 0], [-40, 40, 0]])
+    poses = register(touch(surfaces.plane()), square, [[0, 1, 2], [0, 2, 3]])
+    assert all(pose.is_ambiguous for pose in poses)
+    assert poses[0].residual < 1e-6
+
+
+def test_a_mirror_image_is_no_place():
+    surface, vertices, faces = bumpy()
+    r = touch(surface)
+    right = register(r, vertices, faces)[0].residual
+    assert register(r, vertices * [-1, 1, 1], faces[:, ::-1])[0].residual > 5.0 * right
+
+
+def test_a_pose_turns_moves_and_scales_with_the_mesh():
+    surface, vertices, faces = bumpy()
+    first = register(touch(surface), vertices, faces)[0]
+    turn, shift = Rotation.from_euler("zyx", (2.0, 0.5, -1.0)).as_matrix(), np.array([1e3, -2e3, 500.0])
+    second = register(touch(surface), vertices @ turn.T + shift, faces)[0]
+    assert np.allclose(second.rotation, turn @ first.rotation, atol=1e-3)
+    r = touch(surface)
+    assert np.allclose(
+        second.rotation @ r.frame.origin + second.translation,
+        turn @ (first.rotation @ r.frame.origin + first.translation) + shift,
+        atol=0.02,
+    )
+    r = touch(surface, factor=1e-3)
+    place, angle = off(register(r, 1e-3 * vertices, faces)[0], r, 1e-3 * surface.point)
+    assert place < 5e-5
+    assert angle < 0.2
+
+
+def test_of_two_walls_the_normals_choose():
+    """A shell of 1 mm, whose inner wall is the outer one's likeness."""
+    surface, vertices, faces = bumpy()
+    shell = np.vstack([vertices, 0.96 * vertices]), np.vstack([faces, faces[:, ::-1] + len(vertices)])
+    for factor, side in ((1.0, 1.0), (0.96, -1.0)):
+        r = touch(surface, factor=factor, side=side)
+        pose = register(r, *shell)[0]
+        place, angle = off(pose, r, factor * surface.point)
+        assert place < 0.05
+        assert angle < 0.2
+        assert pose.vertex == 1234 + (len(vertices) if side < 0 else 0)
+
+
+def test_noise_moves_a_pose_by_no_more_than_itself():
+    surface, vertices, faces = bumpy()
+    r = touch(surface, noise=0.1)
+    pose = register(r, vertices, faces)[0]
+    place, angle = off(pose, r, surface.point)
+    assert place < 0.5
+    assert angle < 2.0
+    assert 0.07 < pose.residual < 0.13
+    # Noise in the mesh, a tenth of its edges' length, is found to be noise.
+    scanned = vertices + np.random.default_rng(1).normal(0.0, 0.1, vertices.shape)
+    place, angle = off(register(r, scanned, faces)[0], r, surface.point)
+    assert place < 0.5
+    assert angle < 2.0
+
+
+SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"r": "touch"}, "r: wanted a Reconstruction"),
+        ({"vertices": np.zeros((4, 2))}, "vertices: wanted shape"),
+        ({"vertices": [[0.0, 0.0, np.nan]]}, "vertices: wanted finite numbers"),
+        ({"vertices": "mesh"}, "vertices: wanted numbers"),
+        ({"faces": []}, "faces: wanted triangles, got none"),
+        ({"faces": [[0, 1, 2, 0]]}, "faces: wanted shape"),
+        ({"faces": [[0, 1, 3]]}, "faces: wanted whole numbers from 0 to 2"),
+        ({"faces": [[0, 1, -1]]}, "faces: wanted whole numbers"),
+        ({"faces": [[0, 1, 0.5]]}, "faces: wanted whole numbers"),
+        ({"faces": [[0, 1, 1]], "vertices": 50.0 * SQUARE}, "none that has an area"),
+        ({"best": 0}, "best: wanted a whole number"),
+        ({"best": 1.5}, "best: wanted a whole number"),
+        ({}, "vertices: wanted a mesh from .* bring both to one unit"),
+        ({"vertices": 1e5 * SQUARE}, "vertices: wanted a mesh from .* bring both to one unit"),
+    ],
+)
+def test_bad_arguments_are_refused_with_a_sentence(arguments, says):
+    r = touch(surfaces.sphere(25.0))
+    given = {"r": r, "vertices": SQUARE, "faces": [[0, 1, 2]], **arguments}
+    with pytest.raises(ValueError, match=says):
+        register(given.pop("r"), given.pop("vertices"), given.pop("faces"), **given)
+
+
+def test_few_triangles_are_enough():
+    poses = register(touch(surfaces.plane()), 50.0 * SQUARE, [[0, 1, 2]])
+    assert poses[0].residual < 1e-6
+    assert np.isfinite(poses[0].rotation).all()
