@@ -171,7 +171,7 @@ def _rows(record, unit):
     ]
     if "vertices" not in record:
         return [*rows, ("Mesh to Patch", "…")]
-    if record["vertices"]:
+    if record["vertices"] and "verification" not in record:
         rows += [
             ("Mesh to Patch", units.say(record["vertex_distance_mean"], 1, unit)),
             ("… at Most", units.say(record["vertex_distance_max"], 1, unit)),

@@ -122,7 +122,7 @@ def table_of(found, unit):
 def rows_of(found, unit):
     """(label, value) of what else there is."""
     return [
-        ("Error (6) on Curves", _length(found, "fit_error", unit)),
+        ("Fit Error on Curves", _length(found, "fit_error", unit)),
         (f"… on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
         ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
         ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
