@@ -15,7 +15,7 @@ from .registration import Pose, register
 from .result import Reconstruction, mean_height_stds
 from .sampling import spaced
 from .tracking import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane, Surface, track
-from .verification import distances, fit_error, overlapped
+from .verification import distances, fit_error, overlapped, reachable, verify
 
 __all__ = [
     "CREASE",
@@ -38,10 +38,12 @@ __all__ = [
     "fit_error",
     "mean_height_stds",
     "overlapped",
+    "reachable",
     "reconstruct",
     "reconstruct_many",
     "register",
     "spaced",
     "suggest_plane",
     "track",
+    "verify",
 ]

@@ -16,10 +16,12 @@ from . import (
     pick,
     probe,
     probe_operators,
+    verification,
 )
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
+    verification.TACTILE_OT_verify,
     map_operator.TACTILE_OT_stability_map,
     pick.TACTILE_OT_pick,
     gizmos.TACTILE_OT_drag,

@@ -3,6 +3,7 @@
 """`blender -c tactile reconstruct|map [FILE]`: a patch or a stability map from the shell."""
 
 import argparse
+import csv
 import json
 import math
 import sys
@@ -11,8 +12,9 @@ from pathlib import Path
 import bpy
 
 from . import map_object, patch_object
-from .report import map_readable, readable
+from .report import map_readable, readable, verification_columns
 from .settings import METHODS, SOLVERS
+from .verification import verify_patch
 
 
 def main(args):
@@ -35,6 +37,7 @@ def _parser():
     vector = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
     patch.add_argument("--location", **vector, help="where to touch (default: the 3D cursor)")
     patch.add_argument("--normal", **vector, help="outward direction there (default: the surface's)")
+    patch.add_argument("--verify", type=Path, metavar="OUT", help="write the distances to the mesh as .csv")
     patch.set_defaults(
         operator=bpy.ops.tactile.reconstruct, record=patch_object.RECORD, words=readable, more={}
     )
@@ -46,6 +49,7 @@ def _parser():
         record=map_object.RECORD,
         words=map_readable,
         more={"progress": True},
+        verify=None,
     )
     for command in (patch, stability):
         _add_inputs(command.add_argument)
@@ -119,7 +123,7 @@ def _arguments(options):
 def _run(options):
     """Opens the file, runs the operator, saves; returns the report."""
     arguments = _arguments(options)
-    for path in (options.json, options.output):
+    for path in (options.json, options.output, options.verify):
         if path not in (None, "-") and not Path(path).absolute().parent.is_dir():
             raise OSError(f'there is no folder "{Path(path).parent}" to write "{Path(path).name}" to')
     if options.file is not None:
@@ -128,6 +132,9 @@ def _run(options):
     options.operator(target=options.target or _default_target(), **arguments, **options.more)
     # By name it may be another, and it is not active where the scene was saved in edit mode.
     (made,) = (obj for obj in set(bpy.data.objects) - before if options.record in obj)
+    if options.record == patch_object.RECORD:
+        source = bpy.data.objects[made[options.record]["source"]]
+        verify_patch(made, source, bpy.context.evaluated_depsgraph_get())
     report = made[options.record].to_dict()
     if options.output is not None:
         _save(options.output, made)
@@ -192,6 +199,9 @@ def _default_target():
 
 
 def _write(report, options):
+    if options.verify is not None:
+        with options.verify.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(zip(*verification_columns(report), strict=True))
     if options.json == "-":
         print(json.dumps(report, allow_nan=False))
         return

@@ -57,7 +57,7 @@ class MeshSurface:
         return (self._to_world(point), self._normal_to_world(normal)) if hit and any(normal) else None
 
     def vertices_near(self, point, radius, most=None):
-        """World coordinates and normals, of any length, of the vertices within `radius` of a world point.
+        """Indices, world coordinates and normals of any length of vertices within `radius` of a world point.
 
         Where these are more than `most`, only each second, third, ... of them.
         """
@@ -69,14 +69,10 @@ class MeshSurface:
             near = near[:: math.ceil(len(near) / most) or 1]
         normals = [self._mesh.vertex_normals[i].vector for i in near.tolist()]
         return (
+            near,
             self._co[near] @ self._linear.T + self._origin,
             np.array(normals).reshape(-1, 3) @ self._inverse,
         )
-
-    def is_hidden(self, point, direction, reach):
-        """Whether something of the mesh is above the world point within `reach` along the unit direction."""
-        start = [a + 1e-3 * reach * b for a, b in zip(point, direction, strict=True)]
-        return self.ray_cast(start, direction, reach) is not None
 
     def project(self, location):
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""
