@@ -73,12 +73,11 @@ class _Mesh(NamedTuple):
 def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: int = 5) -> list[Pose]:
     """The poses that bring a touch's contacts nearest to a mesh, the best first; `best` of them at most.
 
+    r : a Reconstruction, or what else has its frame, radius, patch and contacts
     vertices : (n, 3), in the contacts' unit; faces : (m, 3), indices, counterclockwise from outside
 
     Raises ValueError for bad arguments, and for a mesh that is smaller or very much larger than the patch.
     """
-    if not isinstance(r, Reconstruction):
-        raise ValueError(f"r: wanted a Reconstruction, got {shown(r)}")
     if not isinstance(best, int | np.integer) or best < 1:
         raise ValueError(f"best: wanted a whole number of 1 or more, got {shown(best)}")
     co = finite_array("vertices", vertices, (None, 3), LARGEST)
