@@ -155,10 +155,10 @@ def main():
     )
     table([*head.split("|"), "said so", "said in vain"], rows)
     print(
-        f"Half contours of {SHARE * SIZE:g} mm on objects of {SIZE:g} mm, noise {NOISE:g} mm. The first `right` "
-        "are of the unambiguous cases. `better`: cases where the exhaustive search has found a residual that is "
-        "5 % less. `said so`, `in vain`: by core.register, of the ambiguous and of the unambiguous cases. "
-        f"Times are medians, {machine('numpy', 'scipy')}."
+        f"Half contours of {SHARE * SIZE:g} mm on objects of {SIZE:g} mm, noise {NOISE:g} mm. The first "
+        "`right` are of the unambiguous cases. `better`: cases where the exhaustive search has found a "
+        "residual that is 5 % less. `said so`, `in vain`: by core.register, of the ambiguous and of the "
+        f"unambiguous cases. Times are medians, {machine('numpy', 'scipy')}."
     )
 
 
