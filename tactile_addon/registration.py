@@ -10,6 +10,7 @@ from mathutils import Matrix
 from .. import core
 from . import patch_object, probe
 from .operators import report_error, target_object
+from .report import registration_summary
 from .surface import MeshSurface
 from .verification import placed, selected_mesh
 
@@ -41,15 +42,6 @@ def register_patch(patch, target, depsgraph, pose=1):
         "is_ambiguous": poses[0].is_ambiguous,
     }
     return patch[patch_object.RECORD]["registration"].to_dict()
-
-
-def summary(found):
-    """In a sentence."""
-    residual = found["residuals"][found["pose"] - 1]
-    words = f'The contacts are {residual:.3g} off "{found["target"]}" (root mean square)'
-    if not found["is_ambiguous"]:
-        return words
-    return f"{words}; others of its {len(found['residuals'])} poses are about as good"
 
 
 class TACTILE_OT_register(bpy.types.Operator):
@@ -87,7 +79,7 @@ class TACTILE_OT_register(bpy.types.Operator):
             found = register_patch(patch, target, context.evaluated_depsgraph_get(), self.pose)
         except ValueError as error:
             return report_error(self, error)
-        self.report({"WARNING"} if found["is_ambiguous"] else {"INFO"}, summary(found))
+        self.report({"WARNING"} if found["is_ambiguous"] else {"INFO"}, registration_summary(found))
         return {"FINISHED"}
 
     def draw(self, context):

@@ -116,9 +116,9 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     with pytest.raises(RuntimeError, match="is that of its probe: it is known already"):
         empty.ops.tactile.register(target=suzanne.name)
     patch = extension.tactile_addon.probe.patch_near(empty.context.object)
-    registration = extension.tactile_addon.registration
+    registration, report = extension.tactile_addon.registration, extension.tactile_addon.report
     found = {"target": "A", "pose": 1, "residuals": [0.1, 0.2], "is_ambiguous": False}
-    assert registration.summary(found) == 'The contacts are 0.1 off "A" (root mean square)'
+    assert report.registration_summary(found) == 'The contacts are 0.1 off "A" (root mean square)'
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
     with pytest.raises(ValueError, match=r"poses on .* take one of them"):
