@@ -81,9 +81,6 @@ def touch(
     clock.append(perf_counter())
     report = {
         "source": obj.name,
-        "status": result.status,
-        "message": result.message,
-        "fit": {"status": result.status, "message": result.message},
         "method": fit["method"],
         "degree": result.patch.degree,
         "extent": extent,
@@ -221,6 +218,9 @@ def suggestion_report(result, reference):
 def reconstruction_report(result):
     d1, d2, n = result.frame.axes.T.tolist()
     return {
+        "status": result.status,
+        "message": result.message,
+        "fit": {"status": result.status, "message": result.message},  # a mesh may say otherwise
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
         "k1": result.patch.k1,
         "k2": result.patch.k2,
