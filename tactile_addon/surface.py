@@ -67,11 +67,14 @@ class MeshSurface:
         near = np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
         if most is not None:
             near = near[:: math.ceil(len(near) / most) or 1]
-        normals = [self._mesh.vertex_normals[i].vector for i in near.tolist()]
+        normals = np.empty_like(
+            self._co
+        )  # all of them: one by one, a few thousand take longer than a million
+        self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
         return (
             near,
             self._co[near] @ self._linear.T + self._origin,
-            np.array(normals).reshape(-1, 3) @ self._inverse,
+            normals[near] @ self._inverse,
         )
 
     def triangles(self):
