@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 import core
+from core.verification import is_hidden
 from tests import surfaces
 from tools import blender, demo
 
@@ -151,11 +152,8 @@ def scan_places(extension):
 
 def _within_reach(surface, r):
     """The mesh vertices over the domain that a finger can touch from outside."""
-    around = surface.vertices_near(r.frame.origin, 2.0 * r.radius)
-    over = core.overlapped(r.frame, r.domain, r.radius, *around)
-    up = r.frame.axes[:, 2].tolist()
-    hidden = [surface.is_hidden(vertex, up, 2.0 * r.radius) for vertex in r.frame.to_world(over).tolist()]
-    return over[~np.array(hidden, dtype=bool)]
+    _, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius)
+    return r.frame.to_local(vertices[core.reachable(r, surface, vertices, normals)])
 
 
 # Experiments -------------------------------------------------------------------------------------------
@@ -559,7 +557,7 @@ def _cut(stage, obj, place, r):
     up, (x, y, z) = r.frame.axes[:, 2].tolist(), r.frame.to_local(points).T
     near = (np.hypot(x, y) < CUT * r.radius) & (np.abs(z) < CUT * r.radius)
     for i in np.flatnonzero(near):  # what lies below another layer is in the way of the view from inside
-        near[i] = not place.surface.is_hidden(points[i].tolist(), up, 2.0 * CUT * r.radius)
+        near[i] = not is_hidden(place.surface, points[i].tolist(), up, 2.0 * CUT * r.radius)
     # Emission is in linear light, the colours meant are as seen.
     colours = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
     attributes = [("normal_colour", "FLOAT_COLOR", colours.astype(np.float32))]

@@ -17,7 +17,7 @@ from .result import Reconstruction, mean_height_stds
 from .sampling import spaced
 from .serialization import from_dict, to_dict
 from .tracking import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane, Surface, track
-from .verification import distances, fit_error, overlapped
+from .verification import distances, fit_error, overlapped, reachable, verify
 
 __all__ = [
     "CREASE",
@@ -43,6 +43,7 @@ __all__ = [
     "in_running_order",
     "mean_height_stds",
     "overlapped",
+    "reachable",
     "reconstruct",
     "reconstruct_many",
     "register",
@@ -50,4 +51,5 @@ __all__ = [
     "suggest_plane",
     "to_dict",
     "track",
+    "verify",
 ]

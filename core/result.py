@@ -17,7 +17,7 @@ from .domain import Domain
 from .local_geometry import Curves, Frame, misses
 from .monge import MongePatch, exponents, monomials
 from .posterior import TERMS, Posterior, coefficients_of, terms_to
-from .verification import fit_error
+from .verification import fit_error, total_absolute_curvature
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
@@ -97,10 +97,7 @@ class Reconstruction:
     @cached_property
     def total_absolute_curvature(self) -> float:
         """(8), the integral of |K| over the patch."""
-        points, h = self.domain.grid(fitting.GRID)
-        d = self.patch.derivatives(*points.T)
-        w = 1.0 + d.x**2 + d.y**2
-        return h**2 * float(np.sum(np.abs(d.xx * d.yy - d.xy**2) * w**-1.5))
+        return total_absolute_curvature(self.patch, self.domain)
 
     @cached_property
     def condition_number(self) -> float:

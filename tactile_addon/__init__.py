@@ -17,10 +17,14 @@ from . import (
     pick,
     probe,
     probe_operators,
+    registration,
+    verification,
 )
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
+    verification.TACTILE_OT_verify,
+    registration.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,
     pick.TACTILE_OT_pick,
     gizmos.TACTILE_OT_drag,

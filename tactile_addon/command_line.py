@@ -3,6 +3,7 @@
 """`blender -c tactile reconstruct|fit|map FILE`: a patch or a stability map from the shell."""
 
 import argparse
+import csv
 import json
 import math
 import sys
@@ -11,9 +12,11 @@ from pathlib import Path
 import bpy
 
 from . import contact_file, map_object, measured, patch_object
-from .report import map_readable, readable
+from .registration import register_patch
+from .report import map_readable, readable, verification_columns
 from .settings import METHODS, SOLVERS
 from .units import ADAPTIVE, METRES
+from .verification import verify_patch
 
 
 def main(args):
@@ -50,6 +53,8 @@ def _parser():
     fit.add_argument(
         "--normal-std", type=float, metavar="DEGREES", help="of measured normals, to fit them too"
     )
+    help = "put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts"
+    fit.add_argument("--onto", type=Path, metavar="MESH", help=help)
     _add_fit(fit.add_argument)
     fit.set_defaults(
         operator=bpy.ops.tactile.import_contacts, record=patch_object.RECORD, words=readable, more={}
@@ -65,7 +70,10 @@ def _parser():
     )
     for command in (patch, stability):
         _add_inputs(command.add_argument)
-    parser.set_defaults(fail=parser.error)
+    for command in (patch, fit):
+        help = "write the distances to the mesh as .csv"
+        command.add_argument("--verify", type=Path, metavar="OUT", help=help)
+    parser.set_defaults(fail=parser.error, verify=None, contacts=None, onto=None)
     return parser
 
 
@@ -145,8 +153,9 @@ def _arguments(options):
 
 def _run(options):
     """Opens the file, runs the operator, saves; returns the report."""
-    contacts = getattr(options, "contacts", None)
-    for path in (options.json, options.output, contacts):
+    if "files" in options and options.verify is not None and options.onto is None:
+        options.fail("--verify: wanted --onto MESH too, to compare with")
+    for path in (options.json, options.output, options.contacts, options.verify):
         if path not in (None, "-") and not Path(path).absolute().parent.is_dir():
             raise OSError(f'there is no folder "{Path(path).parent}" to write "{Path(path).name}" to')
     if getattr(options, "file", None) is not None:
@@ -156,12 +165,26 @@ def _run(options):
     options.operator(**arguments, **options.more)
     # By name it may be another, and it is not active where the scene was saved in edit mode.
     (made,) = (obj for obj in set(bpy.data.objects) - before if options.record in obj)
+    if options.record == patch_object.RECORD:
+        _compare(made, options)
     report = made[options.record].to_dict()
-    if contacts is not None:
-        contact_file.write(contacts, patch_object.contacts_of(made))
+    if options.contacts is not None:
+        contact_file.write(options.contacts, patch_object.contacts_of(made))
     if options.output is not None:
         _save(options.output, made)
     return report
+
+
+def _compare(patch, options):
+    """The patch with the mesh that was touched, or with the one that it is put onto."""
+    target = None if "files" in options else bpy.data.objects[patch[patch_object.RECORD]["source"]]
+    if options.onto is not None:
+        before = set(bpy.data.objects)
+        _import(options.onto)
+        target = next(obj for obj in set(bpy.data.objects) - before if obj.type == "MESH")
+        register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
+    if target is not None:
+        verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
 
 
 def _open_contacts(options):
@@ -206,12 +229,17 @@ def _save(path, made):
 
 def open_file(path):
     """Makes the file the scene: opens a .blend, imports a mesh into an empty one, coordinates as they are."""
+    if path.suffix.lower() == ".blend" and path.is_file():
+        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
+        return
+    _import(path, empty=True)
+
+
+def _import(path, empty=False):
+    """Adds the mesh of a file to the scene, or to an empty one."""
     if not path.is_file():
         raise OSError(f'there is no file "{path}"')
     full = str(path.absolute())
-    if path.suffix.lower() == ".blend":
-        bpy.ops.wm.open_mainfile(filepath=full, load_ui=False)
-        return
     imports = {
         ".ply": lambda: bpy.ops.wm.ply_import(filepath=full),
         ".stl": lambda: bpy.ops.wm.stl_import(filepath=full),
@@ -219,8 +247,9 @@ def open_file(path):
     }
     if path.suffix.lower() not in imports:
         raise OSError(f'cannot read "{path.name}": wanted a .blend, .ply, .stl or .obj file')
-    bpy.ops.wm.read_homefile(use_empty=True)
-    unreadable = f'no mesh could be read from "{path.name}": is the file whole?'
+    if empty:
+        bpy.ops.wm.read_homefile(use_empty=True)
+    unreadable, there = f'no mesh could be read from "{path.name}": is the file whole?', set(bpy.data.meshes)
     if path.suffix.lower() == ".ply" and not _has_header(path):
         raise OSError(unreadable)
     try:
@@ -229,7 +258,7 @@ def open_file(path):
             imports[path.suffix.lower()]()
     except RuntimeError as error:
         raise OSError(unreadable) from error
-    if not any(len(mesh.polygons) for mesh in bpy.data.meshes):
+    if not any(len(mesh.polygons) for mesh in set(bpy.data.meshes) - there):
         raise OSError(unreadable)
 
 
@@ -248,6 +277,9 @@ def _default_target():
 
 
 def _write(report, options):
+    if options.verify is not None:
+        with options.verify.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(zip(*verification_columns(report), strict=True))
     if options.json == "-":
         print(json.dumps(report, allow_nan=False))
         return

@@ -66,8 +66,6 @@ def fit(source, contours, *, point=None, outward=None, flip=False, sensor_std=0.
     axes = reference_axes(result.frame.axes[:, 2])
     report = {
         "source": source,
-        "status": result.status,
-        "message": result.message,
         "method": options["method"],
         "degree": result.patch.degree,
         **reconstruction_report(result),

@@ -20,8 +20,10 @@ from .probe_operators import (
     TACTILE_OT_update,
     shows_colours,
 )
+from .registration import TACTILE_OT_register
 from .settings import draw_sensor, draw_solver
 from .stability import REASONS
+from .verification import TACTILE_OT_verify, rows_of, table_of
 
 TAB = "Tactile"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
@@ -102,6 +104,11 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         unit = units.unit_of(context.scene, record["radius"])
         _draw_rows(box, _rows(record, unit))
         _draw_sentence(context, box, record["message"], ICONS[record["status"]])
+        box.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
+        if found is None:
+            box.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
+        if "verification" in record:
+            _draw_verification(box, record["verification"], unit)
         if found is not None:
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
 
@@ -167,7 +174,7 @@ def _rows(record, unit):
     ]
     if "vertices" not in record:
         return [*rows, ("Mesh to Patch", "…")]
-    if record["vertices"]:
+    if record["vertices"] and "verification" not in record:
         rows += [
             ("Mesh to Patch", units.say(record["vertex_distance_mean"], 1, unit)),
             ("… at Most", units.say(record["vertex_distance_max"], 1, unit)),
@@ -178,6 +185,18 @@ def _rows(record, unit):
         ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
         ("… Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
     ]
+
+
+def _draw_verification(layout, found, unit):
+    layout.label(text=found["target"], icon="MESH_DATA", translate=False)
+    column = layout.column(align=True)
+    for label, *values in table_of(found, unit):
+        row = column.row(align=True).split(factor=0.31, align=True)
+        row.label(text=label)
+        row = row.row(align=True)
+        for value in values:
+            row.label(text=value)
+    _draw_rows(layout, rows_of(found, unit))
 
 
 def _draw_sentence(context, layout, sentence, icon):
@@ -193,6 +212,8 @@ def draw_menu(self, context):
     self.layout.separator()
     for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
         self.layout.operator(operator.bl_idname)
+    for operator in (TACTILE_OT_verify, TACTILE_OT_register):
+        self.layout.operator(operator.bl_idname)
     for operator in (TACTILE_OT_add_plane, TACTILE_OT_delete):
         self.layout.operator(operator.bl_idname)
 
@@ -202,6 +223,8 @@ def manual_map():
     page = Path(__file__).resolve().parents[1] / "manual" / "viewport.html"
     pages = {
         "bpy.ops.tactile.pick": "#the-first-patch",
+        "bpy.ops.tactile.verify": "#verify",
+        "bpy.ops.tactile.register": "#register",
         "bpy.ops.tactile.stability_map": "#stability-map",
         "bpy.types.object.tactile_map_colours": "#stability-map",
         "bpy.ops.tactile*": "#probe",

@@ -18,7 +18,13 @@ COLOUR = "curvature_colour"
 RINGS = 25  # of the patch mesh: 1951 vertices
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 CONTOUR_COLOUR = (0.02, 0.02, 0.02, 1.0)
-KEYS = {"FLOAT": "value", "INT": "value", "FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}
+KEYS = {
+    "FLOAT": "value",
+    "INT": "value",
+    "BOOLEAN": "value",
+    "FLOAT_VECTOR": "vector",
+    "FLOAT_COLOR": "color",
+}
 # What the colours can show: attribute, name, description, and the power of length it is measured in.
 QUANTITIES = [
     ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
@@ -52,8 +58,7 @@ def rewrite(patch, touched):
     """Makes the patch, and its contours where they are still there, those of another touch, in place."""
     lines = contours_of(patch)
     for obj in filter(None, (patch, lines)):
-        if obj.data.users > 1:  # a linked copy, which shows another touch from now on
-            obj.data = obj.data.copy()
+        own_mesh(obj)
     _fill_patch(patch.data, touched)
     names = {"patch": patch.name}
     if lines is not None:
@@ -65,6 +70,12 @@ def rewrite(patch, touched):
     if touched.is_complete:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolour(patch)
+
+
+def own_mesh(obj):
+    """A linked copy shows something else than the others from now on."""
+    if obj.data.users > 1:
+        obj.data = obj.data.copy()
 
 
 def reconstruction_of(patch):
@@ -112,10 +123,20 @@ def _place(patch, matrix):
 
 def hold(patch):
     """Keeps the patch where it was touched while its probe moves on without it."""
+    axes, origin = touched_frame(patch)
+    if not is_at(patch, axes, origin):
+        _place(patch, _matrix(axes, origin))
+
+
+def touched_frame(patch):
+    """Where it was touched: axes as columns, and origin."""
     frame = patch[RECORD]["frame"]
-    matrix = _matrix(np.transpose([frame[name] for name in ("d1", "d2", "normal")]), frame["origin"])
-    if not np.allclose(patch.matrix_world, matrix, rtol=1e-6, atol=1e-6 * patch[RECORD]["radius"]):
-        _place(patch, matrix)
+    return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
+
+
+def is_at(patch, axes, origin):
+    near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
+    return np.allclose(patch.matrix_world, _matrix(axes, origin), **near)
 
 
 def meshes(patch):
@@ -255,10 +276,19 @@ def fill(mesh, points, triangles, attributes):
         mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
         mesh.update(calc_edges=True)
     for name, kind, values in [("position", "FLOAT_VECTOR", points), *attributes]:
-        # No reference to an attribute may outlive the next `new`, which moves them all.
-        attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, "POINT")
-        attribute.data.foreach_set(KEYS[kind], values.ravel())
+        write(mesh, name, kind, values)
     mesh.update()
+
+
+def write(mesh, name, kind, values):
+    """Writes a point attribute; one of that name that is of another kind makes room."""
+    # No reference to an attribute may outlive the next `new`, which moves them all.
+    attribute = mesh.attributes.get(name)
+    if attribute is not None and (attribute.data_type, attribute.domain) != (kind, "POINT"):
+        mesh.attributes.remove(attribute)
+        attribute = None
+    attribute = attribute or mesh.attributes.new(name, kind, "POINT")
+    attribute.data.foreach_set(KEYS[kind], values.ravel())
 
 
 def _has_triangles(mesh, count, triangles):

@@ -2,6 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The report of a reconstruction as a table for people, and errors as sentences."""
 
+SPREAD = ("mean", "median", "max", "rms")
+# What core.verify finds, in the order of a table.
+VERIFIED = (
+    *("vertices", *(f"vertex_distance_{key}" for key in SPREAD)),
+    *("contacts", *(f"contact_distance_{key}" for key in SPREAD), "fit_error"),
+    *("extra_contours", "extra_points", "extra_fit_error"),
+    *("total_absolute_curvature", "overlap"),
+)
+
 
 def readable(report):
     """Lines of label and value; lengths in the unit of the scene or file."""
@@ -24,6 +33,8 @@ def readable(report):
         ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
         ("height std", f"{report['height_std']:.4g}, {_share(report, 'height_std')} of the radius"),
         ("mesh to patch", _verification(report)),
+        *([("put onto", registration_summary(report["registration"]))] if "registration" in report else []),
+        *_verified_rows(report.get("verification")),
         ("suggested next plane", _suggestion(report["suggested_plane"])),
         ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
@@ -93,6 +104,59 @@ def _verification(report):
         f"mean {report['vertex_distance_mean']:.4g}, {share} of the radius; "
         f"max {report['vertex_distance_max']:.4g}; {report['vertices']} vertices"
     )
+
+
+def _verified_rows(found):
+    """What is not in the report without it."""
+    if found is None:
+        return []
+    names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
+    more = f"{found['extra_fit_error']:.4g}, " if "extra_fit_error" in found else ""
+    return [
+        *(
+            (f"{name} distances", ", ".join(f"{key} {found[f'{name}_distance_{key}']:.4g}" for key in SPREAD))
+            for name in names
+        ),
+        ("(6) on more curves", f"{more}{found['extra_points']} points on {found['extra_contours']} curves"),
+        ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
+    ]
+
+
+def registration_summary(found):
+    """Where a patch was put, in a sentence."""
+    residual = found["residuals"][found["pose"] - 1]
+    words = f'The contacts are {residual:.3g} off "{found["target"]}" (root mean square)'
+    if not found["is_ambiguous"]:
+        return words
+    return f"{words}; others of its {len(found['residuals'])} poses are about as good"
+
+
+def verification_summary(record):
+    """Whether a verification gives reason to doubt, and what it has found, in a sentence."""
+    found = record["verification"]
+    name, vertices, percent = found["target"], found["vertices"], 100.0 * found["overlap"]
+    if not (vertices or percent or found["extra_points"]):
+        return True, f'Nothing of "{name}" is below the patch: move one to the other, or choose another mesh'
+    if not vertices:
+        return True, f'No vertex of "{name}" is over the patch, of which it covers {percent:.0f} %'
+    if record["status"] != "ok":
+        return True, record["message"]
+    mean, most = found["vertex_distance_mean"], found["vertex_distance_max"]
+    return False, (
+        f'{vertices} vertices of "{name}" are {mean:.3g} off the patch in the mean, {most:.3g} at most; it '
+        f"covers {percent:.0f} %"
+    )
+
+
+def verification_columns(report):
+    """(heading, value) of the row of a patch; the value is empty where there is none."""
+    found = report["verification"]
+    lengths = [key for key in VERIFIED if "distance" in key or "error" in key]
+    return [
+        *((key, report[key]) for key in ("patch", "source", "status")),
+        ("target", found["target"]),
+        *((f"{key} [unit of the file]" if key in lengths else key, found.get(key, "")) for key in VERIFIED),
+    ]
 
 
 def _suggestion(plane):

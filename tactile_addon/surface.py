@@ -57,7 +57,7 @@ class MeshSurface:
         return (self._to_world(point), self._normal_to_world(normal)) if hit and any(normal) else None
 
     def vertices_near(self, point, radius, most=None):
-        """World coordinates and normals, of any length, of the vertices within `radius` of a world point.
+        """Indices, world coordinates and normals of any length of vertices within `radius` of a world point.
 
         Where these are more than `most`, only each second, third, ... of them.
         """
@@ -67,16 +67,23 @@ class MeshSurface:
         near = np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
         if most is not None:
             near = near[:: math.ceil(len(near) / most) or 1]
-        normals = [self._mesh.vertex_normals[i].vector for i in near.tolist()]
+        normals = np.empty_like(
+            self._co
+        )  # all of them: one by one, a few thousand take longer than a million
+        self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
         return (
+            near,
             self._co[near] @ self._linear.T + self._origin,
-            np.array(normals).reshape(-1, 3) @ self._inverse,
+            normals[near] @ self._inverse,
         )
 
-    def is_hidden(self, point, direction, reach):
-        """Whether something of the mesh is above the world point within `reach` along the unit direction."""
-        start = [a + 1e-3 * reach * b for a, b in zip(point, direction, strict=True)]
-        return self.ray_cast(start, direction, reach) is not None
+    def triangles(self):
+        """Vertices (n, 3) in the world, and triangles (m, 3), counterclockwise from outside."""
+        self._mesh.calc_loop_triangles()
+        faces = np.empty((len(self._mesh.loop_triangles), 3), dtype=np.int32)
+        self._mesh.loop_triangles.foreach_get("vertices", faces.ravel())
+        mirrored = np.linalg.det(self._linear) < 0.0
+        return self._co @ self._linear.T + self._origin, faces[:, ::-1] if mirrored else faces
 
     def project(self, location):
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""

@@ -81,8 +81,6 @@ def touch(
     clock.append(perf_counter())
     report = {
         "source": obj.name,
-        "status": result.status,
-        "message": result.message,
         "method": fit["method"],
         "degree": result.patch.degree,
         "extent": extent,
@@ -105,8 +103,7 @@ def verify(touched, most=None):
     """
     clock = [perf_counter()]
     touched.report.update(_verification_report(touched.surface, touched.result, most))
-    if touched.report["status"] == "ok":
-        touched.report.update(_doubt(touched.report))
+    touched.report.update(judgement(touched.report, touched.report.get("vertex_distance_mean", 0.0)))
     clock.append(perf_counter())
     touched.report["suggested_plane"] = suggestion_report(touched.result, np.array(touched.report["axes"]))
     clock.append(perf_counter())
@@ -173,12 +170,8 @@ def plane_axes(matrix, settings, number):
 
 def _verification_report(surface, result, most):
     """Distances to the patch of the vertices over it that a finger can reach; none where there are none."""
-    frame, radius = result.frame, result.radius
-    around = surface.vertices_near(frame.origin, 2.0 * radius, most)
-    over = core.overlapped(frame, result.domain, radius, *around)
-    up = frame.axes[:, 2].tolist()
-    hidden = [surface.is_hidden(vertex, up, 2.0 * radius) for vertex in frame.to_world(over).tolist()]
-    misses = core.distances(result.patch, over[~np.array(hidden, dtype=bool)])
+    _, over = reachable(surface, result, most)
+    misses = core.distances(result.patch, result.frame.to_local(over))
     if not len(misses):
         return {"vertices": 0}
     return {
@@ -188,11 +181,21 @@ def _verification_report(surface, result, most):
     }
 
 
-def _doubt(report):
-    """Status and message where the mesh contradicts the patch."""
-    mean, std = report.get("vertex_distance_mean", 0.0), report["height_std"]
-    if mean <= BEYOND * std:
-        return {}
+def reachable(surface, r, most=None):
+    """The vertices over a patch that a finger can reach: indices in the evaluated mesh, world coordinates."""
+    near, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius, most)
+    over = core.reachable(r, surface, vertices, normals)
+    return near[over], vertices[over]
+
+
+def judgement(report, mean, scale=1.0):
+    """Status and message: the fit's own, unless it has no doubt and the mesh contradicts it.
+
+    mean : distance of the mesh; scale : of a patch that was scaled since its report
+    """
+    std = scale * report["height_std"]
+    if report["fit"]["status"] != "ok" or mean <= BEYOND * std:
+        return report["fit"]
     return {
         "status": "uncertain",
         "message": f"The mesh is {mean:.3g} off the patch in the mean, which expects {std:.3g}, for between "
@@ -215,6 +218,9 @@ def suggestion_report(result, reference):
 def reconstruction_report(result):
     d1, d2, n = result.frame.axes.T.tolist()
     return {
+        "status": result.status,
+        "message": result.message,
+        "fit": {"status": result.status, "message": result.message},  # a mesh may say otherwise
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
         "k1": result.patch.k1,
         "k2": result.patch.k2,
@@ -222,6 +228,8 @@ def reconstruction_report(result):
         "mean_curvature": float(result.patch.mean_curvature(0.0, 0.0)),
         "coefficients": result.patch.coefficients.tolist(),
         "radius": result.radius,
+        "ends": result.domain.ends.tolist(),
+        "points": result.contacts.tolist(),
         "area": result.domain.area,
         "contacts": len(result.contacts),
         "fit_error": result.fit_error,

@@ -149,8 +149,8 @@ def test_distances_of_mesh_vertices_over_the_domain():
     over = overlapped(r.frame, r.domain, r.radius, vertices, normals)
     expected = 20000 * (1 - np.cos(8 / 25)) / 2
     assert len(over) == pytest.approx(expected, rel=0.15)
-    assert np.linalg.norm(r.frame.to_world(over), axis=1) == pytest.approx(25.0)
-    assert distances(r.patch, over).mean() < 0.05
+    assert np.linalg.norm(vertices[over], axis=1) == pytest.approx(25.0)
+    assert distances(r.patch, r.frame.to_local(vertices[over])).mean() < 0.05
 
 
 def test_four_to_six_planes_and_curves_that_are_not_planar():

@@ -3,8 +3,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
 # run.sh ZIP: what only a real Blender can show, with the zip without wheels installed in it: the
-# command line, the example script, the menu entry, probes and stability maps by mouse and keyboard in a
-# window, and what hundreds of touches leave behind. The pictures are in build/gui, to be looked at.
+# command line, the example script, the menu entry, probes, verification and stability maps by mouse and
+# keyboard in a window, and what hundreds of touches leave behind. The pictures are in build/gui, to be looked at.
 set -euo pipefail
 [ $# = 1 ] || { echo "usage: run.sh ZIP" >&2; exit 2; }
 zip=$(readlink -f "$1")
@@ -45,6 +45,8 @@ GUI_ARGS="$out/scene.blend" step "the window's checks" \
   $gui shot tests/gui/window.py "$out/window.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the viewport's checks" \
   $gui shot tests/gui/viewport.py "$out/viewport.png"
+GUI_ARGS="$out/scene.blend" step "the verification's checks" \
+  $gui shot tests/gui/verify.py "$out/verify.png"
 GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the stability map's checks" \
   $gui shot tests/gui/stability.py "$out/stability.png"
 GUI_ARGS="$out/scene.blend" step "the contacts' checks" \

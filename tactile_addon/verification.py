@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A patch, where it is now, against any mesh: the operator, and what it does."""
+
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, StringProperty
+
+from .. import core
+from . import patch_object, probe, units
+from .live import is_pending
+from .operators import report_error, target_object
+from .report import SPREAD, verification_summary
+from .surface import MeshSurface
+from .touch import judgement, reachable
+
+DISTANCE, OVERLAP = "patch_distance", "patch_overlap"  # attributes of the mesh
+NOTHING = -1.0  # the distance of a vertex that does not count
+EVEN = 1e-4  # that the scales of a patch may differ by
+
+
+class Placed(NamedTuple):
+    """A patch object as core.verify takes it, in the world, and how many times its report's size it is."""
+
+    frame: core.Frame
+    radius: float
+    patch: core.MongePatch
+    domain: core.Domain
+    contacts: np.ndarray
+    scale: float
+
+
+def placed(patch):
+    """The patch object where it is now. Raises ValueError where it is no longer of its shape."""
+    record, scale = patch[patch_object.RECORD], 1.0
+    axes, origin = patch_object.touched_frame(patch)
+    if not patch_object.is_at(patch, axes, origin):  # where it is, that is in double precision
+        matrix = np.array(patch.matrix_world, dtype=float)
+        scale, origin = np.linalg.norm(matrix[:3, :3]) / 3.0**0.5, matrix[:3, 3]
+        axes = matrix[:3, :3] / max(scale, 1e-30)
+        if not (np.allclose(axes.T @ axes, np.eye(3), atol=EVEN) and np.linalg.det(axes) > 0.0):
+            raise ValueError(
+                f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
+            )
+    return Placed(
+        core.Frame(origin, axes),
+        scale * record["radius"],
+        core.MongePatch(record["k1"], record["k2"], np.array(record["coefficients"])).scaled(scale),
+        core.Domain(scale * np.array(record["ends"])),
+        scale * np.array(record["points"]),
+        scale,
+    )
+
+
+def verify_patch(patch, target, depsgraph, write=False):
+    """Compares the patch object with the mesh object `target`; its record has the result as `verification`.
+
+    write : distance and overlap as attributes on the target, too
+
+    Raises ValueError, with a sentence and nothing changed, where that cannot be done.
+    """
+    if not (patch.is_editable and patch.data.is_editable):
+        raise ValueError(f'"{patch.name}" comes from a library: make it local to verify it')
+    r, surface = placed(patch), MeshSurface(target, depsgraph)
+    if write:
+        _require_writable(target, depsgraph)
+    indices, vertices = reachable(surface, r)
+    found = core.verify(r, surface, vertices)
+    points, normals = _vertices(patch.data, r)
+    deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
+    patch_object.own_mesh(patch)
+    patch_object.write(patch.data, "deviation", "FLOAT", deviations)
+    patch_object.recolour(patch)
+    record = patch[patch_object.RECORD]
+    record["verification"] = {"target": target.name, **found}
+    verdict = judgement(record.to_dict(), found.get("vertex_distance_mean", 0.0), r.scale)
+    record["status"], record["message"] = verdict["status"], verdict["message"]
+    if write:
+        distances = np.full(len(target.data.vertices), NOTHING)
+        distances[indices] = core.distances(r.patch, r.frame.to_local(vertices))
+        patch_object.write(target.data, DISTANCE, "FLOAT", distances)
+        patch_object.write(target.data, OVERLAP, "BOOLEAN", distances != NOTHING)
+        target.data.update()
+
+
+def _vertices(mesh, r):
+    """Points and unit normals of the patch's vertices, in its frame."""
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", points.ravel())
+    points = r.scale * points.astype(float)
+    return points, r.patch.normal(points[:, 0], points[:, 1])
+
+
+def _require_writable(target, depsgraph):
+    """Raises ValueError where the vertices that are felt have no attributes to write to."""
+    if not target.data.is_editable or target.data.is_editmode:
+        raise ValueError(
+            f'"{target.name}" cannot be changed: leave its Edit Mode, or make it local, to write on it'
+        )
+    if len(target.evaluated_get(depsgraph).data.vertices) != len(target.data.vertices):
+        raise ValueError(
+            f'The modifiers of "{target.name}" make or take away vertices: apply them to write on it'
+        )
+
+
+def table_of(found, unit):
+    """Rows of a label and what it is for the mesh and for the contacts."""
+
+    def lengths(key):
+        return (_length(found, f"{what}_distance_{key}", unit) for what in ("vertex", "contact"))
+
+    names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
+    return [
+        ("Distance", "Mesh", "Contacts"),
+        *((name, *lengths(key)) for name, key in names),
+        ("Points", str(found["vertices"]), str(found["contacts"])),
+    ]
+
+
+def rows_of(found, unit):
+    """(label, value) of what else there is."""
+    return [
+        ("Fit Error on Curves", _length(found, "fit_error", unit)),
+        (f"… on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
+        ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
+        ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
+    ]
+
+
+def _length(found, key, unit):
+    return units.say(found[key], 1, unit) if key in found else "–"
+
+
+class TACTILE_OT_verify(bpy.types.Operator):
+    """Measure how far the active patch is from the mesh it was touched on, or from another selected mesh"""
+
+    bl_idname = "tactile.verify"
+    bl_label = "Verify Against Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+
+    target: StringProperty(
+        name="Target",
+        description="Name of the mesh object to compare with; empty for the other selected mesh, or for the "
+        "one that was touched",
+    )
+    write: BoolProperty(
+        name="Write on the Mesh",
+        description="Keep the distance to the patch, and which vertices it overlaps, as attributes there",
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if probe.patch_near(context.view_layer.objects.active) is None:
+            cls.poll_message_set("Select a patch; after the mesh to compare with, if that is another one")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Leave this mode: patches are verified in Object Mode")
+            return False
+        return True
+
+    def execute(self, context):
+        obj = context.view_layer.objects.active
+        found, patch = probe.probe_of(obj), probe.patch_near(obj)
+        if found is not None and is_pending(found):  # or what completes it would undo the verification
+            probe.refresh(found, context)
+        try:
+            target = target_object(context, self.target or selected_mesh(context))
+            verify_patch(patch, target, context.evaluated_depsgraph_get(), self.write)
+        except ValueError as error:
+            return report_error(self, error)
+        record = patch[patch_object.RECORD].to_dict()
+        doubt, summary = verification_summary(record)
+        self.report({"WARNING"} if doubt else {"INFO"}, summary)
+        return {"FINISHED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop_search(self, "target", context.scene, "objects")
+        layout.prop(self, "write")
+
+
+def selected_mesh(context):
+    """The name of the selected mesh that is no result of a touch; empty for none."""
+    selected = context.view_layer.objects.selected
+    names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]
+    if len(names) > 1:
+        raise ValueError(
+            f"{len(names)} meshes are selected: select one besides the patch, or none for the one touched"
+        )
+    return names[0] if names else ""
