@@ -94,7 +94,7 @@ def main():
     clock.wrap(addon.surface.MeshSurface, "ray_cast", "ray casts")
     clock.wrap(addon.touch.core, "track", "tracking")
     clock.wrap(addon.touch.core, "reconstruct", "fit")
-    clock.wrap(addon.touch, "_reconstruction_report", "fit")
+    clock.wrap(addon.touch, "reconstruction_report", "fit")
     clock.wrap(addon.patch_object, "rewrite", "mesh write")
     # As in a window, where what is dear waits for the end of the gesture.
     update = addon.probe.update

@@ -25,15 +25,18 @@ from core import (
     DegenerateCurvesError,
     Reconstruction,
     SamplingPlane,
+    common_point,
     distances,
+    from_dict,
     reconstruct,
     reconstruct_many,
     suggest_plane,
+    to_dict,
     track,
 )
 
 NAMES = (
-    "azimuth|contours|contours_list|degree|extent|method|noise|normal|normals|outward|plane_normal|planes|point|"
+    "azimuth|contours|contours_list|degree|extent|method|noise|normal|normal_std|normals|outward|plane_normal|planes|point|"
     "points|rng|sensor_std|solver|step|stops|surface|tangent|tilt|weight"
 )
 SHAPES = (
@@ -382,6 +385,30 @@ def test_arbitrary_curves(curves, point, outward, method):
         r = refused(reconstruct, point, contours, outward=outward, method=method)
         if r is not None:
             examine(r)
+
+
+@given(st.lists(ODD_POINTS, max_size=5))
+@in_time
+def test_where_arbitrary_curves_meet(curves):
+    found = refused(lambda: common_point([Contour(c) for c in curves]))
+    if found is not None:
+        assert all(np.isfinite(values).all() for values in found)
+
+
+@given(st.integers(0, 8), st.integers(0, 3), st.data())
+@in_time
+def test_arbitrary_measured_normals(shape, planes, data):
+    """And what becomes of the reconstruction as plain values."""
+    point, outward, curves = tracked(shape, planes, 0.0)
+    contours = []
+    for curve in curves:
+        normals = data.draw(st.one_of(hnp.arrays(np.float64, curve.shape), st.just(curve - point + outward)))
+        std = data.draw(st.one_of(ODD_NUMBERS, st.floats(1e-300, 1e3)))
+        contours.append(refused(Contour, curve, normals=normals, normal_std=std) or Contour(curve))
+    r = refused(reconstruct, point, contours, outward=outward)
+    if r is not None:
+        examine(r)
+        examine(from_dict(to_dict(r)))
 
 
 def odd_hits(point, normal):
