@@ -38,7 +38,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     found = list_of("contours", contours, Contour)
     if len(found) < 2:
         raise DegenerateCurvesError(
-            f"a common point is where two or more curves meet, got {len(found)}: give more, or the point"
+            f"the common point is where two or more curves meet, got {len(found)}: give more, or the point"
         )
     for number, contour in enumerate(found, 1):
         if len(contour.points) <= LEAST_CONTACTS:

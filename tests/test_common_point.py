@@ -107,8 +107,8 @@ ACROSS = LINE[:, [1, 0, 2]]
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ([], "a common point is where two or more curves meet, got 0"),
-        ([LINE], "a common point is where two or more curves meet, got 1"),
+        ([], "the common point is where two or more curves meet, got 0"),
+        ([LINE], "the common point is where two or more curves meet, got 1"),
         ([LINE, ACROSS[:3]], "curve 2 has 3 contacts, and 4 are needed"),
         ([LINE, ACROSS + 4 * UP], "the curves do not come near each other: curve 1"),
         ([LINE, ACROSS + 30 * RIGHT], "the curves do not come near each other"),

@@ -152,7 +152,7 @@ def test_measured_normals_show_what_curves_hide(empty, measured):
     ("text", "options", "words"),
     [
         ("x,y,z\n0,0,a\n", {}, '"contacts.csv", line 2, column "z": wanted a number'),
-        ("x,y,z\n0,0,1\n", {}, "A common point is where two or more curves meet, got 1"),
+        ("x,y,z\n0,0,1\n", {}, "The common point is where two or more curves meet, got 1"),
         ("x,y,z\n0,0,1\n", {"point": (0, 0, 0)}, "Curve 1 has 1 of the 3 contacts it needs"),
         ("x,y,z\n1e60,0,1\n", {}, "wanted numbers up to"),
         (None, {}, "There is no file"),
