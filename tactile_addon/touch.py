@@ -76,7 +76,6 @@ def touch(
         "source": obj.name,
         "status": result.status,
         "message": result.message,
-        "fit": {"status": result.status, "message": result.message},
         "method": fit["method"],
         "degree": result.patch.degree,
         "extent": extent,
@@ -214,6 +213,7 @@ def _suggestion_report(result, reference):
 def _reconstruction_report(result):
     d1, d2, n = result.frame.axes.T.tolist()
     return {
+        "fit": {"status": result.status, "message": result.message},
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
         "k1": result.patch.k1,
         "k2": result.patch.k2,
