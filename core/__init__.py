@@ -6,6 +6,7 @@ Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the calle
 convex body has negative curvatures under its outward normal.
 """
 
+from .common_point import common_point, in_running_order
 from .domain import Domain
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
@@ -14,6 +15,7 @@ from .reconstruction import METHODS, SOLVERS, reconstruct, reconstruct_many
 from .registration import Pose, register
 from .result import Reconstruction, mean_height_stds
 from .sampling import spaced
+from .serialization import from_dict, to_dict
 from .tracking import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane, Surface, track
 from .verification import distances, fit_error, overlapped, reachable, verify
 
@@ -34,8 +36,11 @@ __all__ = [
     "SamplingPlane",
     "Surface",
     "azimuth_of",
+    "common_point",
     "distances",
     "fit_error",
+    "from_dict",
+    "in_running_order",
     "mean_height_stds",
     "overlapped",
     "reachable",
@@ -44,6 +49,7 @@ __all__ = [
     "register",
     "spaced",
     "suggest_plane",
+    "to_dict",
     "track",
     "verify",
 ]

@@ -23,20 +23,24 @@ from numpy.typing import NDArray
 
 from .arguments import Array
 from .evidence import (
+    FREE_PRECISION,
     SCALE,
     USUAL_WAVINESS,
     Hyperparameters,
+    NormalEquations,
     Restricted,
     evidence,
+    evidence_with_slopes,
     noises,
     prior_variances,
     restricted,
 )
-from .monge import monomials
+from .monge import derived_monomials, monomials
 from .posterior import FREE, TERMS, Posterior
 from .tracking import cross
 
 MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
+SLOPE_MISFIT = 1e-2  # nor that of a measured slope
 PASSES = 8  # at most: two that turn the frame to what they found, and more for what is outlying
 SETTLED = 0.1  # of a weight, between passes
 UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
@@ -48,19 +52,23 @@ STUDENT = 4.0  # degrees of freedom
 class _System(NamedTuple):
     """Heights (b, n) ~ basis (b, n, 27) @ coefficients, less the prior's mean; and its normal equations.
 
-    gram (b, 27, 27) and seen (b, 27) are basis' basis and basis' heights, weighted.
+    gram (b, 27, 27) and seen (b, 27) are basis' basis and basis' heights, weighted. slopes (b, 2n, 27)
+    @ coefficients ~ steepness (b, 2n) in units of their deviation, weighted; None without normals.
     """
 
     basis: Array
     heights: Array
     gram: Array
     seen: Array
+    slopes: Array | None = None
+    steepness: Array | None = None
 
 
 class _Touches(NamedTuple):
     """What a pass of the fit needs to know of b touches; the last four are what it changes."""
 
     contacts: Array
+    normals: Array  # (b, 0, 3) without
     tangent: Array
     floor: Array
     axes: Array
@@ -70,7 +78,13 @@ class _Touches(NamedTuple):
 
 
 def joint_fit(
-    contacts: Array, weights: Array, k1: Array, k2: Array, tangent: Array, accuracy: Array
+    contacts: Array,
+    weights: Array,
+    k1: Array,
+    k2: Array,
+    tangent: Array,
+    accuracy: Array,
+    normals: Array | None = None,
 ) -> tuple[Array, Posterior]:
     """The Darboux frames and the surfaces that the contacts of b touches show, and how well they show them.
 
@@ -79,13 +93,15 @@ def joint_fit(
     k1, k2 : (b,), a first guess of the curvatures along its axes
     tangent : (b, 3), in that frame, which d1 is to follow
     accuracy : (b,), standard deviation of a contact, at least
+    normals : (b, n, 3), measured, over their standard deviation; 0 where there is none
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, and the posteriors in the new one, where
     the means of the slopes and of the mixed second derivative are 0. Where a residual is beyond
     OUTLYING standard deviations, contacts weigh as under a Student t distribution.
     """
     axes = np.broadcast_to(np.eye(3), (len(contacts), 3, 3))
-    touches = _Touches(contacts, tangent, np.maximum(accuracy, MISFIT), axes, k1, k2, weights)
+    given = contacts[:, :0] if normals is None else normals
+    touches = _Touches(contacts, given, tangent, np.maximum(accuracy, MISFIT), axes, k1, k2, weights)
     pending, found = np.arange(len(contacts)), []
     for step in range(PASSES):
         touches, settled, posterior = _pass(touches, step)
@@ -105,12 +121,16 @@ def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Po
     """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
     prior_mean = np.array([_prior_mean(*pair) for pair in zip(touches.k1, touches.k2, strict=True)])
     system = _system(touches.contacts @ touches.axes, touches.weights, prior_mean)
+    if touches.normals.shape[1]:
+        system = _with_slopes(system, touches, prior_mean)
     data = None if step == 0 else restricted(system.basis, system.heights, touches.weights)
     if data is None:
         waviness = np.full(len(prior_mean), USUAL_WAVINESS)
         hyper = Hyperparameters(waviness, prior_variances(waviness), touches.floor)
-    else:
+    elif system.slopes is None:
         hyper = evidence(data, noises(data, touches.floor))
+    else:
+        hyper = evidence_with_slopes(*_normal_equations(system, touches.weights), noises(data, touches.floor))
     solution = _solution(system, hyper)
     mean = prior_mean + solution
     turned = [_turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
@@ -124,7 +144,7 @@ def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Po
         settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED)
     if data is not None and settled.any():
         which = slice(None) if settled.all() else settled
-        posterior = _posterior(mean, system, data, hyper).at(which).turned(angle[which])
+        posterior = _posterior(mean, system, data, hyper, touches.weights).at(which).turned(angle[which])
         posterior.mean[:, [0, 1, 3]] = 0.0
         posterior.mean[:, 2], posterior.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
     return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, posterior
@@ -136,7 +156,7 @@ def posterior_of(k1: float, k2: float, contacts: Array, accuracy: float) -> Post
     system = _system(contacts[None], weights, prior_mean)
     data = restricted(system.basis, system.heights, weights)
     hyper = evidence(data, noises(data, np.array([max(accuracy, MISFIT)])))
-    return _posterior(prior_mean + _solution(system, hyper), system, data, hyper).at(0)
+    return _posterior(prior_mean + _solution(system, hyper), system, data, hyper, weights).at(0)
 
 
 def _prior_mean(k1: float, k2: float) -> Array:
@@ -168,26 +188,77 @@ def _system(local: Array, weights: Array, prior_mean: Array) -> _System:
     return _System(basis, heights, weighted @ basis, (weighted @ heights[..., None])[..., 0])
 
 
+def _with_slopes(system: _System, touches: _Touches, prior_mean: Array) -> _System:
+    """The system with what measured normals say: two equations a contact.
+
+    The unit normal m is across the surface's normal (-z_x, -z_y, 1) turned by no more than its error:
+    with a and b, unit and across m and each other, a . (-z_x, -z_y, 1) is 0 but for |(z_x, z_y, 1)| times
+    the deviation, and b . likewise. A patch has one height a place, so no normal of it points down: one
+    that does was measured inward. An outlying contact's normal weighs as little as the contact.
+    """
+    m = touches.normals @ touches.axes
+    m = np.where(m[..., 2:] < 0.0, -m, m)
+    certainty = np.sqrt(np.einsum("bni,bni->bn", m, m))
+    mx, my, mz = np.moveaxis(m / np.maximum(certainty, 1.0)[..., None], -1, 0)
+    deviation = np.maximum(1.0 / np.maximum(certainty, 1e-300), SLOPE_MISFIT)
+    scale = np.where(certainty > 0.0, np.sqrt(touches.weights) * mz / deviation, 0.0)
+    x, y, _ = (touches.contacts @ touches.axes).reshape(-1, 3).T
+    dx, dy = derived_monomials(x, y, TERMS, [(1, 0), (0, 1)]).swapaxes(1, 2).reshape(2, *mx.shape, -1)
+    share = mx * my / (1.0 + mz)
+    rows = [
+        (1.0 - mx**2 / (1.0 + mz))[..., None] * dx - share[..., None] * dy,
+        (1.0 - my**2 / (1.0 + mz))[..., None] * dy - share[..., None] * dx,
+    ]
+    slopes = np.concatenate([scale[..., None] * row for row in rows], axis=1)
+    steepness = np.concatenate([-scale * mx, -scale * my], axis=1)
+    return system._replace(slopes=slopes, steepness=steepness - (slopes @ prior_mean[..., None])[..., 0])
+
+
+def _normal_equations(system: _System, weights: Array) -> tuple[NormalEquations, NormalEquations]:
+    """Of the heights and of the slopes."""
+    square = np.sum(weights * system.heights**2, axis=1)
+    heights = NormalEquations(system.gram, system.seen, square, np.count_nonzero(weights, axis=1))
+    assert system.slopes is not None and system.steepness is not None
+    turned, steepness = np.swapaxes(system.slopes, 1, 2), system.steepness
+    return heights, NormalEquations(
+        turned @ system.slopes, (turned @ steepness[..., None])[..., 0], np.sum(steepness**2, axis=1)
+    )
+
+
 def _solution(system: _System, hyper: Hyperparameters) -> Array:
     """The likeliest coefficients less the prior's mean, (b, 27)."""
     # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
     precision = _precision(system, prior_variances(hyper.waviness), hyper.noise)
-    solution: Array = np.linalg.solve(precision, (system.seen / hyper.noise[:, None] ** 2)[..., None])
+    seen = (system.seen / hyper.noise[:, None] ** 2)[..., None]
+    if system.slopes is not None and system.steepness is not None:
+        seen = seen + np.swapaxes(system.slopes, 1, 2) @ system.steepness[..., None]
+    solution: Array = np.linalg.solve(precision, seen)
     return solution[..., 0]
 
 
-def _posterior(mean: Array, system: _System, data: Restricted, hyper: Hyperparameters) -> Posterior:
+def _posterior(
+    mean: Array, system: _System, data: Restricted, hyper: Hyperparameters, weights: Array
+) -> Posterior:
     covariance = np.linalg.inv(_precision(system, hyper.variances, hyper.noise))
     visibility = data.triangle * (SCALE / hyper.noise)[:, None, None]
+    if system.slopes is not None:
+        # What the slopes show of the free terms too: the QR of all there is, each in its deviation.
+        rows = np.concatenate(
+            [np.sqrt(weights)[..., None] * system.basis / hyper.noise[:, None, None], system.slopes], axis=1
+        )
+        triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
+        visibility = SCALE * triangle[:, FREE:, FREE:]
     return Posterior(mean, covariance, hyper.noise, visibility)
 
 
 def _precision(system: _System, variances: Array, noise: Array) -> Array:
     """(b, 27, 27), the inverse of the covariance."""
     precision = system.gram / noise[:, None, None] ** 2
+    if system.slopes is not None:
+        precision = precision + np.swapaxes(system.slopes, 1, 2) @ system.slopes
     diagonal = np.arange(len(TERMS))
-    # A slope or second derivative of 100 is no surface; and with that no contacts make it singular.
-    precision[:, diagonal[:FREE], diagonal[:FREE]] += 1e-4
+    # With that no contacts make it singular.
+    precision[:, diagonal[:FREE], diagonal[:FREE]] += FREE_PRECISION
     precision[:, diagonal[FREE:], diagonal[FREE:]] += 1.0 / variances
     return precision
 

@@ -15,6 +15,7 @@ SCALE = 0.1
 WAVINESS = np.geomspace(0.15, 1.3, 6)
 USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
 NOISES = 5  # grid points, from the floor up
+FREE_PRECISION = 1e-4  # of slopes and second derivatives: of 100 they are no surface
 GROUP = 4  # touches whose likelihoods are computed at once
 
 
@@ -37,6 +38,15 @@ class Hyperparameters(NamedTuple):
     waviness: Array
     variances: Array
     noise: Array
+
+
+class NormalEquations(NamedTuple):
+    """gram (b, 27, 27) @ coefficients ~ seen (b, 27), of data of this sum of squares (b,)."""
+
+    gram: Array
+    seen: Array
+    square: Array
+    contacts: Array = np.zeros(0)  # (b,), how many
 
 
 def prior_variances(waviness: Array) -> Array:
@@ -91,13 +101,19 @@ def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
     bordered[..., diagonal, diagonal] += (noises[:, None] ** 2 + rounding[..., None])[..., None]
     factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
     others = (data.contacts - len(TERMS))[:, None, None]  # directions no term explains
-    likelihood = -0.5 * (
+    surprise = (
         2.0 * np.sum(np.log(factors[..., :size]), axis=3)
         + (corner[:, None, None] - factors[..., size] ** 2)
         + others * np.log(noises[:, None] ** 2)
         + (data.square[:, None] / noises**2)[:, None]
-        + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2
     )
+    return _averaged(surprise, noises)
+
+
+def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
+    """Over a grid of waviness and noise, by -2 log likelihood there (b, 6, 5) and the waviness's prior."""
+    likelihood = -0.5 * (surprise + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2)
+    variances = prior_variances(WAVINESS)
     weights = np.exp(likelihood - likelihood.max(axis=(1, 2), keepdims=True))
     weights /= weights.sum(axis=(1, 2), keepdims=True)
     by_waviness = weights.sum(axis=2)
@@ -106,3 +122,33 @@ def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
         by_waviness @ variances,
         np.sqrt(np.sum(weights.sum(axis=1) * noises**2, axis=1)),
     )
+
+
+def evidence_with_slopes(heights: NormalEquations, slopes: NormalEquations, noises: Array) -> Hyperparameters:
+    """The same where measured slopes, in units of their deviations, tell of the waviness too.
+
+    Slopes leave no term free, so all coefficients are integrated out, by the determinant lemma: with the
+    precision A = gram / noise^2 + slopes' gram + prior^-1 and v = A @ the likeliest coefficients, one
+    Cholesky factor of [[A, v], [v', square]] has log |A| in its diagonal and what is left over in the last.
+    """
+    variances = prior_variances(WAVINESS)
+    size, at_noise = len(TERMS), noises[:, None, :, None]
+    bordered = np.zeros((*(len(noises), len(WAVINESS), noises.shape[1]), size + 1, size + 1))
+    diagonal = np.arange(size)
+    bordered[..., :size, :size] = heights.gram[:, None, None] / at_noise[..., None] ** 2
+    bordered[..., :size, :size] += slopes.gram[:, None, None]
+    bordered[..., diagonal[:FREE], diagonal[:FREE]] += FREE_PRECISION
+    bordered[..., diagonal[FREE:], diagonal[FREE:]] += 1.0 / variances[:, None]
+    seen = heights.seen[:, None, None] / at_noise**2 + slopes.seen[:, None, None]
+    bordered[..., :size, size] = bordered[..., size, :size] = seen
+    # One more, lest rounding leaves less than nothing over.
+    square = (heights.square[:, None] / noises**2 + slopes.square[:, None])[:, None] + 1.0
+    bordered[..., size, size] = square
+    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
+    surprise = (
+        2.0 * np.sum(np.log(factors[..., :size]), axis=3)
+        + np.sum(np.log(variances), axis=1)[:, None]
+        + factors[..., size] ** 2
+        + heights.contacts[:, None, None] * np.log(noises[:, None] ** 2)
+    )
+    return _averaged(surprise, noises)

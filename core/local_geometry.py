@@ -16,6 +16,7 @@ WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term
 LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
 LEAST_ANGLE = math.radians(1.0)  # between tangents that count as distinct
 OFF_PLANE = math.sin(math.radians(25.0))  # of a tangent, against the tangent plane
+EXACT = 1e-6  # radians, of a measured normal: no less is told apart
 UMBILIC = 1e-9  # the difference of curvatures, in unit radius, that is none
 
 
@@ -54,6 +55,8 @@ class Curves:
     along : (b, c, n), their signed distances from the point along the curve's direction, ascending
     tangents : (b, c, 3), unit, pointing the way the contour's points were given; 0 where there is no curve
     curvatures : (b, c, 3), the curvature vectors r''(s) at the point, in 1/length
+    normals : (b, c, n, 3), measured normals over their standard deviation (radians), 0 where there are
+        none; None where none is measured at all
     """
 
     points: Array
@@ -61,6 +64,7 @@ class Curves:
     along: Array
     tangents: Array
     curvatures: Array
+    normals: Array | None = None
 
     def at(self, index: int | list[int]) -> "Curves":
         """Those of one touch, without the leading dimension, or of several."""
@@ -70,11 +74,17 @@ class Curves:
             self.along[index],
             self.tangents[index],
             self.curvatures[index],
+            None if self.normals is None else self.normals[index],
         )
 
 
-def stacked(points: Array, touches: Sequence[Sequence[Contour]]) -> tuple[Array, NDArray[np.bool_]]:
-    """Contacts relative to their reference points (b, 3), (b, c, n, 3), and which of them there are."""
+def stacked(
+    points: Array, touches: Sequence[Sequence[Contour]]
+) -> tuple[Array, NDArray[np.bool_], Array | None]:
+    """Contacts relative to their reference points (b, 3), which of them there are, and measured normals.
+
+    points, present and normals of Curves, as given.
+    """
     # At least one place, empty where there is nothing at all.
     curves = max([1, *(len(contours) for contours in touches)])
     longest = max([1, *(len(contour.points) for contours in touches for contour in contours)])
@@ -84,14 +94,28 @@ def stacked(points: Array, touches: Sequence[Sequence[Contour]]) -> tuple[Array,
         for j, contour in enumerate(contours):
             r[i, j, : len(contour.points)] = contour.points - points[i]
             present[i, j, : len(contour.points)] = True
-    return r, present
+    if not any(has_measured_normals(contours) for contours in touches):
+        return r, present, None
+    measured = np.zeros_like(r)
+    for i, contours in enumerate(touches):
+        for j, contour in enumerate(contours):
+            if contour.normals is not None and contour.normal_std is not None:
+                normals = contour.normals / np.abs(contour.normals).max(axis=1, keepdims=True)
+                normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+                measured[i, j, : len(normals)] = normals / max(contour.normal_std, EXACT)
+    return r, present, measured
 
 
-def curves_through(r: Array, present: NDArray[np.bool_]) -> Curves:
+def has_measured_normals(contours: Sequence[Contour]) -> bool:
+    """Whether a fit of these contours has slopes in it."""
+    return any(contour.normal_std is not None for contour in contours)
+
+
+def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None = None) -> Curves:
     """Fits r(s) = t s + r'' s^2 / 2, through the point, to the nearest contacts of each curve (III-C).
 
-    r : (b, c, n, 3), contacts relative to the point; present : (b, c, n). s is the chord to the
-    contact, the arc length up to its cube.
+    r : (b, c, n, 3), contacts relative to the point; present : (b, c, n); normals as in Curves. s is
+    the chord to the contact, the arc length up to its cube.
     """
     shape, curve = present.shape, np.arange(present[..., 0].size)[:, None]
     r, present = r.reshape(len(curve), -1, 3), present.reshape(len(curve), -1)
@@ -116,14 +140,15 @@ def curves_through(r: Array, present: NDArray[np.bool_]) -> Curves:
         along[curve, order].reshape(shape),
         (tangents / speed).reshape(*shape[:2], 3),
         (curvatures / (scale * speed**2)).reshape(*shape[:2], 3),
+        None if normals is None else normals.reshape(len(curve), -1, 3)[curve, order].reshape(*shape, 3),
     )
 
 
-def misses(curves: Curves) -> tuple[Array, Array]:
-    """The distances at which the c curves of one touch pass its reference point, and their deviations.
+def local_curves(curves: Curves) -> tuple[Array, Array]:
+    """r = r0 + r1 s + r2 s^2 of the c curves of one touch, s along the tangent t; and the deviation of r0.
 
-    (c,) each: the part across the tangent t of r0 in r = r0 + r1 s + r2 s^2, s along t, fitted to the
-    nearest contacts. 0 where there are too few of them to tell.
+    (c, 3, 3), rows r0, r1 and r2, fitted to the nearest contacts, and (c,). 0 where there are too few
+    of them to tell.
     """
     distance = np.where(curves.present, np.abs(curves.along), np.inf)
     order = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
@@ -132,13 +157,23 @@ def misses(curves: Curves) -> tuple[Array, Array]:
     s = np.einsum("cni,ci->cn", r, curves.tangents)
     count, longest = np.count_nonzero(near, axis=1), np.abs(s).max(axis=1)
     told = (count > LEAST_CONTACTS) & (longest > 0.0)
-    basis = near[..., None] * (s / np.where(told, longest, 1.0)[:, None])[..., None] ** np.arange(3)
+    powers = np.where(told, longest, 1.0)[:, None] ** np.arange(3)
+    basis = near[..., None] * (s / powers[:, 1:2])[..., None] ** np.arange(3)
     inverse = np.linalg.pinv(basis)
     solution = inverse @ r
     variance = np.sum((r - basis @ solution) ** 2, axis=(1, 2)) / np.maximum(count - 3, 1)
     stds = np.sqrt(variance * np.sum(inverse[:, 0] ** 2, axis=1))
-    distances = np.linalg.norm(cross(solution[:, 0].T, curves.tangents.T), axis=0)
-    return np.where(told, distances, 0.0), np.where(told, stds, 0.0)
+    solution /= powers[..., None]
+    return np.where(told[:, None, None], solution, 0.0), np.where(told, stds, 0.0)
+
+
+def misses(curves: Curves) -> tuple[Array, Array]:
+    """The distances at which the c curves of one touch pass its reference point, and their deviations.
+
+    (c,) each: the part of r0 across the tangent. 0 where there are too few contacts to tell.
+    """
+    local, stds = local_curves(curves)
+    return np.linalg.norm(cross(local[:, 0].T, curves.tangents.T), axis=0), stds
 
 
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:

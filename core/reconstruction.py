@@ -20,6 +20,7 @@ from .local_geometry import (
     curves_through,
     darboux_frames,
     degeneracy,
+    has_measured_normals,
     stacked,
     surface_normals,
 )
@@ -97,13 +98,15 @@ def reconstruct_many(
     options = _options(method, degree, sensor_std, weight, solver)
     # Touches of like size together: a stack has room for its longest contour in all places.
     sizes = [len(c) * max((len(contour.points) for contour in c), default=0) for c in touches]
-    order = sorted(range(len(p)), key=sizes.__getitem__, reverse=True)
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
-    while order:
-        count = max(1, STACK // max(sizes[order[0]], 1))
-        chosen, order = order[:count], order[count:]
-        found = _stack(p[chosen], [touches[i] for i in chosen], up[chosen], options)
-        results.update(zip(chosen, found, strict=True))
+    for measured in (False, True):  # slopes of some would cost time in the fits of all
+        order = [i for i, contours in enumerate(touches) if has_measured_normals(contours) is measured]
+        order.sort(key=sizes.__getitem__, reverse=True)
+        while order:
+            count = max(1, STACK // max(sizes[order[0]], 1))
+            chosen, order = order[:count], order[count:]
+            found = _stack(p[chosen], [touches[i] for i in chosen], up[chosen], options)
+            results.update(zip(chosen, found, strict=True))
     return [results[i] for i in range(len(p))]
 
 
@@ -182,7 +185,12 @@ def _framed(
     degrees = [options.degree or 0] * count
     if options.method == "bayes" or options.degree is None:
         contacts, present = local.reshape(count, -1, 3), curves.present.reshape(count, -1)
-        turns, fitted = joint_fit(contacts, present.astype(float), k1, k2, tangents[:, 0], stds / radii)
+        measured = curves.normals
+        if measured is not None:
+            measured = (measured @ axes[:, None]).reshape(contacts.shape)
+        turns, fitted = joint_fit(
+            contacts, present.astype(float), k1, k2, tangents[:, 0], stds / radii, measured
+        )
         if options.degree is None:
             degrees = [fitted.at(i).degree_shown((contacts[i] @ turns[i])[present[i]]) for i in range(count)]
         if options.method == "bayes":
@@ -190,7 +198,7 @@ def _framed(
             farthest = np.hypot(local[..., 0], local[..., 1]).max(axis=(1, 2))
             radii, local = radii * farthest, local / farthest[:, None, None, None]
             posteriors = fitted.scaled(1.0 / farthest)
-    curves = replace(curves, points=local, tangents=tangents)
+    curves = replace(curves, points=local, tangents=tangents, normals=None)
     return [
         (
             _Touch(

@@ -73,12 +73,11 @@ class _Mesh(NamedTuple):
 def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: int = 5) -> list[Pose]:
     """The poses that bring a touch's contacts nearest to a mesh, the best first; `best` of them at most.
 
+    r : a Reconstruction, or what else has its frame, radius, patch and contacts
     vertices : (n, 3), in the contacts' unit; faces : (m, 3), indices, counterclockwise from outside
 
     Raises ValueError for bad arguments, and for a mesh that is smaller or very much larger than the patch.
     """
-    if not isinstance(r, Reconstruction):
-        raise ValueError(f"r: wanted a Reconstruction, got {shown(r)}")
     if not isinstance(best, int | np.integer) or best < 1:
         raise ValueError(f"best: wanted a whole number of 1 or more, got {shown(best)}")
     co = finite_array("vertices", vertices, (None, 3), LARGEST)
@@ -159,7 +158,9 @@ def _coarse(touch: Array, mesh: _Mesh) -> Array:
 
     touch = touch[:, :: math.ceil(touch.shape[1] / CONTACTS)]
     places, fields = _fields(mesh, 1.05 * np.linalg.norm(touch[0], axis=1).max())
-    turns = Rotation.from_euler("z", 2.0 * np.pi / TURNS * np.arange(TURNS)).as_matrix()
+    turns = Rotation.from_rotvec(
+        2.0 * np.pi / TURNS * np.arange(TURNS)[:, None] * [0.0, 0.0, 1.0]
+    ).as_matrix()
     scores = np.column_stack([_scores(touch @ turn.T, fields) for turn in turns])
     least = (scores <= np.roll(scores, 1, axis=1)) & (scores <= np.roll(scores, -1, axis=1))
     order = np.argsort(np.where(least, scores, np.inf), axis=None)[: min(COARSE, np.count_nonzero(least))]
@@ -269,16 +270,17 @@ def _feet(points: Array, triangles: Array) -> Array:
     across, corners = _across(triangles), np.moveaxis(triangles, -2, 0)
     height = np.sum((points - corners[0]) * across, axis=-1, keepdims=True)
     feet = points - height / np.sum(across**2, axis=-1, keepdims=True) * across
-    inside, least, nearest = np.full(feet.shape[:-1], True), np.full(feet.shape[:-1], np.inf), feet
+    nearest, least = feet, np.full(feet.shape[:-1], np.inf)
+    inside = np.ones(least.shape, dtype=bool)
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         edge, arm = end - start, points - start
-        inside = inside & (np.sum(np.cross(edge, arm) * across, axis=-1) >= 0.0)
+        inside &= np.sum(np.cross(edge, arm) * across, axis=-1) >= 0.0
         share = np.sum(arm * edge, axis=-1) / np.sum(edge**2, axis=-1)
         foot = start + np.clip(share, 0.0, 1.0)[..., None] * edge
         square = np.sum((points - foot) ** 2, axis=-1)
         nearest = np.where((square < least)[..., None], foot, nearest)
         least = np.minimum(square, least)
-    return np.where(np.expand_dims(inside, -1), feet, nearest)
+    return np.where(inside[..., None], feet, nearest)
 
 
 def _distinct(places: Array, residuals: Array) -> list[int]:

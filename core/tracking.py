@@ -75,12 +75,14 @@ class Contour:
 
     points : (n, 3), in any order, the reference point among them or not
     plane_normal : (3,), of the sampling plane, or None for a curve of unknown plane or of none
-    normals : (n, 3), the surface normal at each contact, or None
+    normals : (n, 3), the surface normal at each contact, of any length, outward or inward; or None
     noise : standard deviation of the contacts, or None where it is not known
     stops : why tracking ended at the first and at the last point, or None
+    normal_std : standard deviation of normals that were measured, in radians; the fit by "bayes" then takes
+        them for slopes. None where they are not to be fitted, as the paper's methods never do.
 
-    Raises ValueError for another shape, for numbers that are not finite, and for numbers of single
-    precision too far from the origin.
+    Raises ValueError for another shape, for numbers that are not finite, for numbers of single
+    precision too far from the origin, and for measured normals without a direction.
     """
 
     points: Array
@@ -88,6 +90,7 @@ class Contour:
     normals: Array | None = None
     noise: float | None = None
     stops: tuple[str, str] | None = None
+    normal_std: float | None = None
 
     def __post_init__(self) -> None:
         points = finite_array("points", self.points, (None, 3), LARGEST)
@@ -109,6 +112,12 @@ class Contour:
             object.__setattr__(self, "noise", number("noise", self.noise, least=0.0))
         if self.stops is not None and len(list_of("stops", self.stops, str)) != 2:
             raise ValueError(f"stops: wanted two words, got {shown(self.stops)}")
+        if self.normal_std is not None:
+            object.__setattr__(self, "normal_std", number("normal_std", self.normal_std, least=0.0))
+            if self.normals is None:
+                raise ValueError("normal_std: wanted measured normals that it is of, got none")
+            if not np.abs(self.normals).max(axis=1, initial=0.0).all():
+                raise ValueError("normals: wanted directions where normal_std is given, got (0, 0, 0)")
 
 
 def track(

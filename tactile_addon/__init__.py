@@ -6,6 +6,7 @@ import bpy
 
 from . import (
     command_line,
+    contact_operators,
     gizmos,
     live,
     map_object,
@@ -16,17 +17,20 @@ from . import (
     pick,
     probe,
     probe_operators,
+    registration,
     verification,
 )
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
     verification.TACTILE_OT_verify,
+    registration.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,
     pick.TACTILE_OT_pick,
     gizmos.TACTILE_OT_drag,
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
+    *contact_operators.CLASSES,
     *panel.PANELS,
     panel.TactilePreferences,
 )
@@ -40,6 +44,8 @@ def register():
         bpy.utils.register_class(cls)
     panel.restore_tab()
     bpy.types.VIEW3D_MT_object.append(panel.draw_menu)
+    for menu, draw in contact_operators.MENUS:
+        getattr(bpy.types, menu).append(draw)
     bpy.utils.register_manual_map(panel.manual_map)
     live.register()
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
@@ -52,6 +58,8 @@ def unregister():
     live.unregister()
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.utils.unregister_manual_map(panel.manual_map)
+    for menu, draw in contact_operators.MENUS:
+        getattr(bpy.types, menu).remove(draw)
     bpy.types.VIEW3D_MT_object.remove(panel.draw_menu)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

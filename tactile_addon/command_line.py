@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c tactile reconstruct|map [FILE]`: a patch or a stability map from the shell."""
+"""`blender -c tactile reconstruct|fit|map FILE`: a patch or a stability map from the shell."""
 
 import argparse
 import csv
@@ -11,9 +11,11 @@ from pathlib import Path
 
 import bpy
 
-from . import map_object, patch_object
+from . import contact_file, map_object, measured, patch_object
+from .registration import register_patch
 from .report import map_readable, readable, verification_columns
 from .settings import METHODS, SOLVERS
+from .units import ADAPTIVE, METRES
 from .verification import verify_patch
 
 
@@ -37,9 +39,25 @@ def _parser():
     vector = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
     patch.add_argument("--location", **vector, help="where to touch (default: the 3D cursor)")
     patch.add_argument("--normal", **vector, help="outward direction there (default: the surface's)")
-    patch.add_argument("--verify", type=Path, metavar="OUT", help="write the distances to the mesh as .csv")
+    patch.add_argument("--contacts", type=Path, metavar="CSV", help="write the simulated contacts")
     patch.set_defaults(
         operator=bpy.ops.tactile.reconstruct, record=patch_object.RECORD, words=readable, more={}
+    )
+    fit = commands.add_parser("fit", help="rebuild the patch that measured contacts show")
+    fit.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply, curves of one patch")
+    fit.add_argument("--unit", choices=list(contact_file.LENGTHS), help="of the numbers (what the file says)")
+    fit.add_argument("--point", **vector, help="where the curves meet (default: the point nearest to all)")
+    fit.add_argument("--outward", **vector, help="a direction on the outer side (default: by the normals)")
+    fit.add_argument("--flip", action="store_true", default=None, help="the other side is the outer one")
+    fit.add_argument("--sensor-std", type=float, help="standard deviation of a contact, at least")
+    fit.add_argument(
+        "--normal-std", type=float, metavar="DEGREES", help="of measured normals, to fit them too"
+    )
+    help = "put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts"
+    fit.add_argument("--onto", type=Path, metavar="MESH", help=help)
+    _add_fit(fit.add_argument)
+    fit.set_defaults(
+        operator=bpy.ops.tactile.import_contacts, record=patch_object.RECORD, words=readable, more={}
     )
     stability = commands.add_parser("map", help="touch a mesh all over and paint a copy by how well it goes")
     help = "distance between the points that are touched (a quarter of the extent)"
@@ -49,11 +67,13 @@ def _parser():
         record=map_object.RECORD,
         words=map_readable,
         more={"progress": True},
-        verify=None,
     )
     for command in (patch, stability):
         _add_inputs(command.add_argument)
-    parser.set_defaults(fail=parser.error)
+    for command in (patch, fit):
+        help = "write the distances to the mesh as .csv"
+        command.add_argument("--verify", type=Path, metavar="OUT", help=help)
+    parser.set_defaults(fail=parser.error, verify=None, contacts=None, onto=None)
     return parser
 
 
@@ -84,6 +104,11 @@ def _add_inputs(add):
     add("--step", type=float, help="distance between contacts (a twelfth of the extent)")
     add("--noise", type=float, help="standard deviation of the simulated sensor (0)")
     add("--seed", type=int, help="of the noise (0)")
+    _add_fit(add)
+
+
+def _add_fit(add):
+    """How to fit, and what to write."""
     add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (bayes)")
     add(
         "--degree",
@@ -98,17 +123,23 @@ def _add_inputs(add):
         "--output",
         type=Path,
         metavar="OUT",
-        help="save the scene with the result, .blend; a map also as .ply",
+        help="save the scene with the result, .blend; the result alone as .ply; a patch also as .json",
     )
 
 
 def _arguments(options):
     """What was given on the command line as the operator's arguments."""
     names = ["location", "normal", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"]
+    names += ["unit", "point", "outward", "flip", "sensor_std"]
     names = [name for name in names if getattr(options, name, None) is not None]
     given = {name: getattr(options, name) for name in names}
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
+    if getattr(options, "normal_std", None) is not None:
+        given["normal_std"] = math.radians(options.normal_std)
+    if "files" in options:
+        return given | _open_contacts(options)
+    given["target"] = options.target or _default_target()
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
             options.fail(f"--azimuths: wanted three to six, got {len(options.azimuths)}")
@@ -122,28 +153,69 @@ def _arguments(options):
 
 def _run(options):
     """Opens the file, runs the operator, saves; returns the report."""
-    arguments = _arguments(options)
-    for path in (options.json, options.output, options.verify):
+    if "files" in options and options.verify is not None and options.onto is None:
+        options.fail("--verify: wanted --onto MESH too, to compare with")
+    for path in (options.json, options.output, options.contacts, options.verify):
         if path not in (None, "-") and not Path(path).absolute().parent.is_dir():
             raise OSError(f'there is no folder "{Path(path).parent}" to write "{Path(path).name}" to')
-    if options.file is not None:
+    if getattr(options, "file", None) is not None:
         open_file(options.file)
+    arguments = _arguments(options)
     before = set(bpy.data.objects)
-    options.operator(target=options.target or _default_target(), **arguments, **options.more)
+    options.operator(**arguments, **options.more)
     # By name it may be another, and it is not active where the scene was saved in edit mode.
     (made,) = (obj for obj in set(bpy.data.objects) - before if options.record in obj)
     if options.record == patch_object.RECORD:
-        source = bpy.data.objects[made[options.record]["source"]]
-        verify_patch(made, source, bpy.context.evaluated_depsgraph_get())
+        _compare(made, options)
     report = made[options.record].to_dict()
+    if options.contacts is not None:
+        contact_file.write(options.contacts, patch_object.contacts_of(made))
     if options.output is not None:
         _save(options.output, made)
     return report
 
 
+def _compare(patch, options):
+    """The patch with the mesh that was touched, or with the one that it is put onto."""
+    target = None if "files" in options else bpy.data.objects[patch[patch_object.RECORD]["source"]]
+    if options.onto is not None:
+        before = set(bpy.data.objects)
+        _import(options.onto)
+        target = next(obj for obj in set(bpy.data.objects) - before if obj.type == "MESH")
+        register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
+    if target is not None:
+        verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
+
+
+def _open_contacts(options):
+    """The files as arguments; where no .blend is open, in an empty scene of their unit, so numbers stay."""
+    if not bpy.data.filepath:
+        bpy.ops.wm.read_homefile(use_empty=True)
+        _, unit = measured.read(options.files, options.unit or "FILE", 1.0)
+        settings = bpy.context.scene.unit_settings
+        name = {symbol: name for name, (symbol, _) in METRES.items()}.get(unit)
+        settings.system, settings.scale_length = (
+            "METRIC" if unit else "NONE",
+            contact_file.LENGTHS.get(unit, 1.0),
+        )
+        if name in ADAPTIVE["METRIC"]:
+            settings.length_unit = name
+    paths = [path.absolute() for path in options.files]
+    if len({path.parent for path in paths}) > 1:
+        options.fail("FILE: wanted files of one folder")
+    return {
+        "filepath": str(paths[0]),
+        "directory": str(paths[0].parent),
+        "files": [{"name": path.name} for path in paths],
+    }
+
+
 def _save(path, made):
-    """The scene; where it is a map and the path says so, that alone as a .ply with its attributes."""
-    if map_object.RECORD not in made or path.suffix.lower() != ".ply":
+    """The scene; where the path says so, the map or patch alone: .ply with its attributes, or .json."""
+    if path.suffix.lower() == ".json" and patch_object.RECORD in made:
+        path.write_text(patch_object.reconstruction_of(made) + "\n", encoding="utf-8")
+        return
+    if path.suffix.lower() != ".ply":
         bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()))
         return
     with bpy.context.temp_override(selected_objects=[made], window=bpy.context.window_manager.windows[0]):
@@ -157,12 +229,17 @@ def _save(path, made):
 
 def open_file(path):
     """Makes the file the scene: opens a .blend, imports a mesh into an empty one, coordinates as they are."""
+    if path.suffix.lower() == ".blend" and path.is_file():
+        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
+        return
+    _import(path, empty=True)
+
+
+def _import(path, empty=False):
+    """Adds the mesh of a file to the scene, or to an empty one."""
     if not path.is_file():
         raise OSError(f'there is no file "{path}"')
     full = str(path.absolute())
-    if path.suffix.lower() == ".blend":
-        bpy.ops.wm.open_mainfile(filepath=full, load_ui=False)
-        return
     imports = {
         ".ply": lambda: bpy.ops.wm.ply_import(filepath=full),
         ".stl": lambda: bpy.ops.wm.stl_import(filepath=full),
@@ -170,8 +247,9 @@ def open_file(path):
     }
     if path.suffix.lower() not in imports:
         raise OSError(f'cannot read "{path.name}": wanted a .blend, .ply, .stl or .obj file')
-    bpy.ops.wm.read_homefile(use_empty=True)
-    unreadable = f'no mesh could be read from "{path.name}": is the file whole?'
+    if empty:
+        bpy.ops.wm.read_homefile(use_empty=True)
+    unreadable, there = f'no mesh could be read from "{path.name}": is the file whole?', set(bpy.data.meshes)
     if path.suffix.lower() == ".ply" and not _has_header(path):
         raise OSError(unreadable)
     try:
@@ -180,7 +258,7 @@ def open_file(path):
             imports[path.suffix.lower()]()
     except RuntimeError as error:
         raise OSError(unreadable) from error
-    if not any(len(mesh.polygons) for mesh in bpy.data.meshes):
+    if not any(len(mesh.polygons) for mesh in set(bpy.data.meshes) - there):
         raise OSError(unreadable)
 
 

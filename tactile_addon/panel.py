@@ -20,6 +20,7 @@ from .probe_operators import (
     TACTILE_OT_update,
     shows_colours,
 )
+from .registration import TACTILE_OT_register
 from .settings import draw_sensor, draw_solver
 from .stability import REASONS
 from .verification import TACTILE_OT_verify, rows_of, table_of
@@ -104,6 +105,8 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         _draw_rows(box, _rows(record, unit))
         _draw_sentence(context, box, record["message"], ICONS[record["status"]])
         box.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
+        if found is None:
+            box.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
         if "verification" in record:
             _draw_verification(box, record["verification"], unit)
         if found is not None:
@@ -207,7 +210,9 @@ def _draw_sentence(context, layout, sentence, icon):
 
 def draw_menu(self, context):
     self.layout.separator()
-    for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_verify, TACTILE_OT_stability_map):
+    for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
+        self.layout.operator(operator.bl_idname)
+    for operator in (TACTILE_OT_verify, TACTILE_OT_register):
         self.layout.operator(operator.bl_idname)
     for operator in (TACTILE_OT_add_plane, TACTILE_OT_delete):
         self.layout.operator(operator.bl_idname)
@@ -219,6 +224,7 @@ def manual_map():
     pages = {
         "bpy.ops.tactile.pick": "#the-first-patch",
         "bpy.ops.tactile.verify": "#verify",
+        "bpy.ops.tactile.register": "#register",
         "bpy.ops.tactile.stability_map": "#stability-map",
         "bpy.types.object.tactile_map_colours": "#stability-map",
         "bpy.ops.tactile*": "#probe",

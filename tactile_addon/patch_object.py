@@ -2,14 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The reconstruction as objects of the scene: the patch, and the tracked contours."""
 
+import json
+
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from .. import core
 from . import colours
 
 COLLECTION = "Tactile Patches"
-RECORD = "tactile"  # the patch object's custom property that holds the report
+RECORD = "tactile"  # the patch object's custom property that holds the report,
+RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
 COLOUR = "curvature_colour"
 RINGS = 25  # of the patch mesh: 1951 vertices
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
@@ -62,6 +66,9 @@ def rewrite(patch, touched):
         names["contours"] = lines.name
     _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
     patch[RECORD] = touched.report | names
+    patch.pop(RECONSTRUCTION, None)
+    if touched.is_complete:
+        patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolour(patch)
 
 
@@ -69,6 +76,41 @@ def own_mesh(obj):
     """A linked copy shows something else than the others from now on."""
     if obj.data.users > 1:
         obj.data = obj.data.copy()
+
+
+def reconstruction_of(patch):
+    """core.to_dict of what the patch shows, as JSON. Raises ValueError while a gesture goes on."""
+    if RECONSTRUCTION not in patch:
+        raise ValueError(f'"{patch.name}" is not complete: end the gesture, or touch again')
+    return patch[RECONSTRUCTION]
+
+
+def contacts_of(patch):
+    """The contacts of a patch object as contours in the world. Raises ValueError where there are none."""
+    lines = contours_of(patch)
+    if lines is None or not {"contour", "contact"} <= set(lines.data.attributes.keys()):
+        raise ValueError(f'"{patch.name}" has no contours any more: touch again')
+    frame = patch[RECORD]["frame"]
+    axes = np.transpose([frame[name] for name in ("d1", "d2", "normal")])
+    curve, contact, points = (_values(lines.data, name) for name in ("contour", "contact", "position"))
+    normals = _values(lines.data, "contact_normal") if "contact_normal" in lines.data.attributes else None
+    contours = []
+    for number in range(int(curve.max()) + 1):
+        # An octahedron each, whose six tips are one after the other.
+        tips = np.flatnonzero((curve == number) & (contact >= 0))
+        centres = points[tips].reshape(-1, 6, 3).mean(axis=1)
+        up = None if normals is None else normals[tips[::6]] @ axes.T
+        contours.append(core.Contour(frame["origin"] + centres @ axes.T, normals=up))
+    return contours
+
+
+def _values(mesh, name):
+    """Of a point attribute, (n,) or (n, 3)."""
+    attribute = mesh.attributes[name]
+    key = KEYS[attribute.data_type]
+    values = np.empty((len(attribute.data), 3) if key == "vector" else len(attribute.data))
+    attribute.data.foreach_get(key, values.ravel())
+    return values
 
 
 def _place(patch, matrix):
@@ -163,14 +205,14 @@ def _fill_contours(mesh, touched):
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
     Point attributes tell them apart: `contour` counts the contours, `contact` the contacts along
-    one, and is -1 on the tubes.
+    one, and is -1 on the tubes; `contact_normal` is there where all contours have normals.
     """
     frame, thickness = touched.result.frame, 0.009 * touched.result.radius
     points, triangles, contour_index, contact_index = [], [], [], []
     count = 0
     for number, contour in enumerate(touched.contours):
         path = frame.to_local(contour.points)
-        across = frame.axes.T @ contour.plane_normal
+        across = frame.axes.T @ contour.plane_normal if contour.plane_normal is not None else _across(path)
         for mesh_points, mesh_triangles, contact in (
             (*_tube(path, across, thickness), np.full(4 * len(path), -1)),
             (*_octahedra(path, 3.6 * thickness), np.repeat(np.arange(len(path)), 6)),
@@ -184,6 +226,12 @@ def _fill_contours(mesh, touched):
         ("contour", "INT", np.concatenate(contour_index)),
         ("contact", "INT", np.concatenate(contact_index)),
     ]
+    if all(contour.normals is not None for contour in touched.contours):
+        each = [
+            np.vstack([np.zeros((4 * len(c.points), 3)), np.repeat(c.normals @ frame.axes, 6, axis=0)])
+            for c in touched.contours
+        ]
+        attributes.append(("contact_normal", "FLOAT_VECTOR", np.vstack(each)))
     fill(mesh, np.vstack(points), np.vstack(triangles), attributes)
 
 
@@ -191,13 +239,19 @@ def _tube(path, across, thickness):
     """A square tube along a path (n, 3) in the plane normal to `across`: points (4n, 3) and triangles."""
     ahead = np.gradient(path, axis=0)
     up = np.cross(across, ahead)
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-30)
     corners = [path + thickness * (a * up + b * across) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
     ring = np.arange(4)
     a = (4 * np.arange(len(path) - 1)[:, None] + ring).ravel()
     b = (4 * np.arange(len(path) - 1)[:, None] + (ring + 1) % 4).ravel()
     triangles = np.vstack([np.column_stack([a, b, b + 4]), np.column_stack([a, b + 4, a + 4])])
     return np.stack(corners, axis=1).reshape(-1, 3), triangles
+
+
+def _across(path):
+    """A direction in the tangent plane across a path (n, 3) that is in no plane."""
+    x, y, _ = path[-1] - path[0]
+    return np.array([-y, x, 0.0]) / max(np.hypot(x, y), 1e-30)
 
 
 def _octahedra(centres, radius):

@@ -15,13 +15,15 @@ VERIFIED = (
 def readable(report):
     """Lines of label and value; lengths in the unit of the scene or file."""
     seconds = report["seconds"]
-    stops = sorted({stop for pair in report["stops"] for stop in pair})
+    contacts = (
+        f"{report['contacts']} on {report['curves']} curves" if "curves" in report else _tracked(report)
+    )
     rows = [
         ("touched", report["source"]),
         ("status", f"{report['status']}: {report['message']}"),
         ("fit", f"{report['method']}, degree {report['degree']}"),
-        ("contacts", f"{report['contacts']} on {len(report['planes'])} curves, ended by: {', '.join(stops)}"),
-        ("step, extent, radius", f"{report['step']:.4g}, {report['extent']:.4g}, {report['radius']:.4g}"),
+        ("contacts", contacts),
+        *_lengths(report),
         ("point", _vector(report["frame"]["origin"])),
         ("normal", _vector(report["frame"]["normal"])),
         ("direction d1", _vector(report["frame"]["d1"])),
@@ -31,6 +33,7 @@ def readable(report):
         ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
         ("height std", f"{report['height_std']:.4g}, {_share(report, 'height_std')} of the radius"),
         ("mesh to patch", _verification(report)),
+        *([("put onto", registration_summary(report["registration"]))] if "registration" in report else []),
         *_verified_rows(report.get("verification")),
         ("suggested next plane", _suggestion(report["suggested_plane"])),
         ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
@@ -38,6 +41,23 @@ def readable(report):
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
     return _table(rows)
+
+
+def _tracked(report):
+    stops = sorted({stop for pair in report["stops"] for stop in pair})
+    return f"{report['contacts']} on {len(report['planes'])} curves, ended by: {', '.join(stops)}"
+
+
+def _lengths(report):
+    """Those of a touch; of measured curves, how far they miss their common point."""
+    if "step" in report:
+        lengths = f"{report['step']:.4g}, {report['extent']:.4g}, {report['radius']:.4g}"
+        return [("step, extent, radius", lengths)]
+    rows = [("unit", report["unit"])] if report["unit"] else []
+    rows.append(("radius", f"{report['radius']:.4g}"))
+    if "misses" in report:
+        rows.append(("curves miss it by", ", ".join(f"{miss:.3g}" for miss in report["misses"])))
+    return rows
 
 
 def map_readable(record):
@@ -75,6 +95,8 @@ def sentence(error):
 
 
 def _verification(report):
+    if "curves" in report:
+        return "there is none"
     if not report["vertices"]:
         return "no vertex of the mesh lies over the patch"
     share = _share(report, "vertex_distance_mean")
@@ -98,6 +120,15 @@ def _verified_rows(found):
         ("(6) on more curves", f"{more}{found['extra_points']} points on {found['extra_contours']} curves"),
         ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
     ]
+
+
+def registration_summary(found):
+    """Where a patch was put, in a sentence."""
+    residual = found["residuals"][found["pose"] - 1]
+    words = f'The contacts are {residual:.3g} off "{found["target"]}" (root mean square)'
+    if not found["is_ambiguous"]:
+        return words
+    return f"{words}; others of its {len(found['residuals'])} poses are about as good"
 
 
 def verification_summary(record):

@@ -46,8 +46,34 @@ def changed(settings, context):
         context.view_layer.update()
 
 
-class TouchSettings:
-    """Mixed into operators and property groups; lengths in units of the world, angles in radians."""
+class FitSettings:
+    """Mixed into operators and property groups."""
+
+    method: EnumProperty(name="Method", description="How to fit the patch", items=METHODS, update=changed)
+    degree: IntProperty(
+        name="Degree",
+        description="Of the polynomial that describes the patch, 2 to 6; 0 for the least that says what "
+        "the contacts show",
+        default=4,
+        min=0,
+        max=6,
+        update=changed,
+    )
+    weight: FloatProperty(
+        name="Weight",
+        description="Of the contacts against the smoothness, in the two fits by curvature",
+        default=1000.0,
+        soft_min=1.0,
+        soft_max=1e5,
+        update=changed,
+    )
+    solver: EnumProperty(
+        name="Solver", description="How to minimise the curvature", items=SOLVERS, update=changed
+    )
+
+
+class TouchSettings(FitSettings):
+    """The same; lengths in units of the world, angles in radians."""
 
     plane_count: IntProperty(
         name="Planes",
@@ -102,30 +128,9 @@ class TouchSettings:
         min=0,
         update=changed,
     )
-    method: EnumProperty(name="Method", description="How to fit the patch", items=METHODS, update=changed)
-    degree: IntProperty(
-        name="Degree",
-        description="Of the polynomial that describes the patch, 2 to 6; 0 for the least that says what "
-        "the contacts show",
-        default=4,
-        min=0,
-        max=6,
-        update=changed,
-    )
-    weight: FloatProperty(
-        name="Weight",
-        description="Of the contacts against the smoothness, in the two fits by curvature",
-        default=1000.0,
-        soft_min=1.0,
-        soft_max=1e5,
-        update=changed,
-    )
-    solver: EnumProperty(
-        name="Solver", description="How to minimise the curvature", items=SOLVERS, update=changed
-    )
 
 
-NAMES = tuple(TouchSettings.__annotations__)
+NAMES = (*TouchSettings.__annotations__, *FitSettings.__annotations__)
 
 
 def touch_arguments(settings):

@@ -77,6 +77,14 @@ class MeshSurface:
             normals[near] @ self._inverse,
         )
 
+    def triangles(self):
+        """Vertices (n, 3) in the world, and triangles (m, 3), counterclockwise from outside."""
+        self._mesh.calc_loop_triangles()
+        faces = np.empty((len(self._mesh.loop_triangles), 3), dtype=np.int32)
+        self._mesh.loop_triangles.foreach_get("vertices", faces.ravel())
+        mirrored = np.linalg.det(self._linear) < 0.0
+        return self._co @ self._linear.T + self._origin, faces[:, ::-1] if mirrored else faces
+
     def project(self, location):
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""
         found = self._walk(location, location)

@@ -20,16 +20,23 @@ COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about cur
 
 @dataclass(frozen=True)
 class Touch:
-    """What a touch gave; `report` is a dict of plain values, which `verify` completes."""
+    """What a touch gave; `report` is a dict of plain values, which `verify` completes.
 
-    surface: MeshSurface
+    surface : None where the contours were measured elsewhere
+    """
+
+    surface: MeshSurface | None
     result: core.Reconstruction
     contours: list[core.Contour]
     report: dict
 
     @property
-    def is_verified(self):
+    def is_complete(self):
         return "vertices" in self.report
+
+    @property
+    def is_verified(self):
+        return self.surface is not None and self.is_complete
 
 
 def touch(
@@ -74,15 +81,13 @@ def touch(
     clock.append(perf_counter())
     report = {
         "source": obj.name,
-        "status": result.status,
-        "message": result.message,
         "method": fit["method"],
         "degree": result.patch.degree,
         "extent": extent,
         "step": step,
         "noise": noise,
         "seed": seed,
-        **_reconstruction_report(result),
+        **reconstruction_report(result),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
         "axes": axes.tolist(),
         "stops": [list(contour.stops) for contour in contours],
@@ -100,7 +105,7 @@ def verify(touched, most=None):
     touched.report.update(_verification_report(touched.surface, touched.result, most))
     touched.report.update(judgement(touched.report, touched.report.get("vertex_distance_mean", 0.0)))
     clock.append(perf_counter())
-    touched.report["suggested_plane"] = _suggestion_report(touched.result, np.array(touched.report["axes"]))
+    touched.report["suggested_plane"] = suggestion_report(touched.result, np.array(touched.report["axes"]))
     clock.append(perf_counter())
     touched.report["seconds"] |= dict(zip(("verify", "suggest"), np.diff(clock).tolist(), strict=True))
 
@@ -198,7 +203,7 @@ def judgement(report, mean, scale=1.0):
     }
 
 
-def _suggestion_report(result, reference):
+def suggestion_report(result, reference):
     """The plane that would tell most, as an azimuth like those of `planes`, and what it would bring."""
     plane, expected = core.suggest_plane(result)
     d1, _, n = result.frame.axes.T
@@ -210,10 +215,12 @@ def _suggestion_report(result, reference):
     }
 
 
-def _reconstruction_report(result):
+def reconstruction_report(result):
     d1, d2, n = result.frame.axes.T.tolist()
     return {
-        "fit": {"status": result.status, "message": result.message},
+        "status": result.status,
+        "message": result.message,
+        "fit": {"status": result.status, "message": result.message},  # a mesh may say otherwise
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
         "k1": result.patch.k1,
         "k2": result.patch.k2,

@@ -168,7 +168,7 @@ class TACTILE_OT_verify(bpy.types.Operator):
         if found is not None and is_pending(found):  # or what completes it would undo the verification
             probe.refresh(found, context)
         try:
-            target = target_object(context, self.target or _selected(context))
+            target = target_object(context, self.target or selected_mesh(context))
             verify_patch(patch, target, context.evaluated_depsgraph_get(), self.write)
         except ValueError as error:
             return report_error(self, error)
@@ -184,7 +184,7 @@ class TACTILE_OT_verify(bpy.types.Operator):
         layout.prop(self, "write")
 
 
-def _selected(context):
+def selected_mesh(context):
     """The name of the selected mesh that is no result of a touch; empty for none."""
     selected = context.view_layer.objects.selected
     names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]

@@ -213,7 +213,6 @@ SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ({"r": "touch"}, "r: wanted a Reconstruction"),
         ({"vertices": np.zeros((4, 2))}, "vertices: wanted shape"),
         ({"vertices": [[0.0, 0.0, np.nan]]}, "vertices: wanted finite numbers"),
         ({"vertices": "mesh"}, "vertices: wanted numbers"),

@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured contours, from files to a reconstruction and its report; nothing in the scene changes."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from .. import core
+from . import contact_file
+from .touch import Touch, reconstruction_report, reference_axes, suggestion_report
+
+FLAT = 0.02  # of k1 + k2, in unit radius: less bulges to no side
+
+
+def read(paths, unit, metres):
+    """(contours, unit) of files whose curves belong together, in a world of so many metres a unit.
+
+    unit : of the numbers, as in contact_file.LENGTHS; "FILE" for what each file names; "NONE" to take
+        them as they are, as those of a file that names none are taken.
+    """
+    contours, found = [], "" if unit in ("FILE", "NONE") else unit
+    for path in paths:
+        curves, named = contact_file.read(path)
+        named = {"FILE": named, "NONE": ""}.get(unit, unit)
+        factor = contact_file.LENGTHS[named] / metres if named else 1.0
+        # 1 / 0.1 and the like are not exact: a file in the world's unit stays as it is.
+        factor = 1.0 if math.isclose(factor, 1.0, rel_tol=1e-6) else factor
+        contours += [replace(curve, points=factor * curve.points) for curve in curves]
+        found = named or found
+    return contours, found
+
+
+def fit(source, contours, *, point=None, outward=None, flip=False, sensor_std=0.0, normal_std=0.0, **options):
+    """The patch that contours show, as a Touch without a surface.
+
+    point : where the curves meet, exact; None for core.common_point
+    outward : None for the mean of the normals, or where there are none for the side to which the surface
+        bulges, +z where it is flat; `flip` takes the other
+    sensor_std, normal_std : in the contours' unit and in radians; 0 where it is not known, and then
+        normals are not fitted
+    options : what else core.reconstruct takes
+
+    Raises ValueError with a sentence for the user.
+    """
+    clock = [perf_counter()]
+    if normal_std:
+        contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
+    distances = None
+    if point is None:
+        point, distances = core.common_point(contours)
+    contours = [core.in_running_order(contour, point) for contour in contours]
+
+    def reconstructed(side):
+        return core.reconstruct(point, contours, outward=side, sensor_std=sensor_std or None, **options)
+
+    result = reconstructed(outward or _mean_normal(contours))
+    bulges = (result.patch.k1 + result.patch.k2) * result.radius
+    unknown = outward is None and not any(c.normals is not None for c in contours)
+    if flip is not (unknown and bulges > FLAT):
+        result = reconstructed(-result.frame.axes[:, 2])
+    clock.append(perf_counter())
+    axes = reference_axes(result.frame.axes[:, 2])
+    report = {
+        "source": source,
+        "method": options["method"],
+        "degree": result.patch.degree,
+        **reconstruction_report(result),
+        "curves": len(contours),
+        "axes": axes.tolist(),
+        "vertices": 0,
+        "suggested_plane": suggestion_report(result, axes),
+        "seconds": {"fit": clock[1] - clock[0]},
+    }
+    if distances is not None:
+        report["misses"] = distances.tolist()
+    return Touch(None, result, contours, report)
+
+
+def _mean_normal(contours):
+    """Of all that were measured; +z without any."""
+    normals = [contour.normals for contour in contours if contour.normals is not None]
+    mean = np.sum(np.vstack(normals), axis=0) if normals else np.zeros(3)
+    return mean if mean.any() else np.array([0.0, 0.0, 1.0])
+
+
+def name_of(paths):
+    """What the patch is called after."""
+    return Path(paths[0]).name

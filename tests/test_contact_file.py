@@ -1,0 +1,243 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact data in files, as people's machines write them."""
+
+import struct
+
+import numpy as np
+import pytest
+import surfaces
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from core import Contour, SamplingPlane, track
+
+WANTED = np.array([[[0.0, 0, 0], [1, 2, 3], [2, 4, 6.5]], [[0, 0, 0], [-1, 0.5, 1e-3], [0, 1, 0]]])
+PLAIN = "curve,x,y,z\n1,0,0,0\n1,1,2,3\n1,2,4,6.5\n2,0,0,0\n2,-1,0.5,1e-3\n2,0,1,0\n"
+
+
+@pytest.fixture(scope="module")
+def contact_file(extension):
+    return extension.tactile_addon.contact_file
+
+
+@pytest.fixture
+def read(contact_file, tmp_path):
+    def read(data, name="contacts.csv"):
+        (tmp_path / name).write_bytes(data if isinstance(data, bytes) else data.encode())
+        return contact_file.read(tmp_path / name)
+
+    return read
+
+
+def points(contours):
+    return [c.points.tolist() for c in contours]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        PLAIN.rstrip("\n"),
+        PLAIN.replace("\n", "\r\n"),
+        PLAIN.replace("\n", "\r"),
+        "\ufeff" + PLAIN,
+        PLAIN.encode("utf-16"),
+        b"# \xb5m, in an old encoding\n" + PLAIN.encode(),
+        PLAIN.replace(",", ";"),
+        PLAIN.replace(",", "\t"),
+        PLAIN.replace(",", ";").replace(".", ","),
+        PLAIN.replace(",", "\t").replace(".", ","),
+        PLAIN.replace("6.5", '"6,5"'),
+        PLAIN.replace(",", ", "),
+        "# made by a robot\n\n" + PLAIN.replace("\n2,0,0", "\n  # the second\n\n,,,\n2,0,0"),
+        PLAIN.replace("curve", "Curve").replace("x", " X "),
+        "\n".join(",".join(reversed(line.split(","))) for line in PLAIN.split()),
+        PLAIN.replace("z\n", "z,force,x_offset\n").replace("6.5\n", "6.5,0.3,hard\n"),
+        PLAIN.replace("1,1,2,3\n", "1,1,2,3\n1,1,2,3\n1,1,2,3\n"),
+        "curve,x,y,z\n1,0,0,0\n2,0,0,0\n1,1,2,3\n2,-1,0.5,1e-3\n2,0,1,0\n1,2,4,6.5\n",
+    ],
+    ids=str,
+)  # fmt: skip
+def test_one_set_of_contacts_in_many_spellings(read, text):
+    contours, unit = read(text)
+    assert unit == ""
+    assert points(contours) == WANTED.tolist()
+    assert all(c.normals is None and c.noise is None for c in contours)
+
+
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("curve,x [mm],y [mm],z [mm]", "mm"),
+        ("curve,x_mm,y_mm,z_mm", "mm"),
+        ("curve,X (in),Y(in),Z ( in )", "in"),
+        ("curve,x [µm],y [μm],z_um", "µm"),
+        ("curve,x_m,y_m,z_m", "m"),
+        ("curve,x[],y,z", ""),
+    ],
+)
+def test_the_unit_is_in_the_columns(read, header, unit):
+    contours, found = read(PLAIN.replace("curve,x,y,z", header))
+    assert found == unit
+    assert points(contours) == WANTED.tolist()
+
+
+def test_times_put_contacts_in_order(read):
+    contours, _ = read("curve,time [s],x,y,z\na,3,2,4,6.5\na,1,0,0,0\nb,9,0,0,0\na,2.5,1,2,3\n")
+    assert points(contours) == [WANTED[0].tolist(), [[0, 0, 0]]]
+
+
+def test_normals_go_with_their_contacts(read):
+    text = "curve,x,y,z,nx,ny,nz\n1,0,0,0,0,0,1\n1,1,0,0,0,1,0\n2,0,0,0,,,\n2,0,1,0,,,\n"
+    one, other = read(text)[0]
+    assert one.normals.tolist() == [[0, 0, 1], [0, 1, 0]]
+    assert one.normal_std is None
+    assert other.normals is None
+
+
+def test_without_a_curve_column_a_file_is_one_curve(read):
+    (contour,), _ = read("x,y,z\n0,0,0\n1,2,3\n2,4,6.5\n")
+    assert contour.points.tolist() == WANTED[0].tolist()
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ("", '"contacts.csv": wanted a header with the columns curve, x, y, z, got an empty file'),
+        ("# nothing\n\n", "got an empty file"),
+        ("curve,x,y,z\n", '"contacts.csv": wanted contacts below the header, got none'),
+        ("1,2,3,4\n1,2,3,4\n", '"contacts.csv", line 1: wanted the column "x", got "1, 2, 3, 4"'),
+        ("#\ncurve,x,y\n", '"contacts.csv", line 2: wanted the column "z"'),
+        ("curve,x,y,z,nx\n", 'line 1: wanted the column "ny"'),
+        ("curve,x,y,x,z\n", 'line 1: wanted one column "x", got two'),
+        ("curve,x_mm,y_cm,z_mm\n", "line 1: wanted x, y and z in one unit, got cm and mm"),
+        ("curve,x [furlong],y,z\n", 'line 1: wanted a unit out of km, m, cm, mm.* got "furlong"'),
+        (PLAIN.replace("3", "three"), '"contacts.csv", line 3, column "z": wanted a number, got "three"'),
+        (PLAIN.replace("6.5", "nan"), 'line 4, column "z": wanted a number, got "nan"'),
+        (PLAIN.replace("6.5", "1e999"), 'line 4, column "z": wanted a number'),
+        (PLAIN.replace("6.5", "1_0"), 'line 4, column "z": wanted a number, got "1_0"'),
+        (PLAIN.replace("6.5", "1.000,5"), "line 4: wanted 4 fields, got 5"),
+        (PLAIN.replace("2,3\n", "2\n"), 'line 3, column "z": wanted a number, got ""'),
+        (PLAIN.replace("1,1,2,3", "1,1,5,2,5,3,5"), "line 3: wanted 4 fields, got 7: decimal commas need"),
+        (PLAIN.replace("1,1,2,3", ",1,2,3"), "line 3: wanted a number or a name in the column"),
+        ("curve,x,y,z,nx,ny,nz\n1,0,0,0,0,0,1\n1,0,0,1,,,\n", "line 3: wanted normals all along a curve"),
+        ("curve,x,y,z,nx,ny,nz\n1,0,0,0,0,,1\n", 'line 2, column "ny": wanted a number, got ""'),
+        ("curve,time,x,y,z\n1,,0,0,0\n", 'column "time": wanted a number, got ""'),
+        (b"PK\x03\x04\x00\x00", '"contacts.csv": wanted a text file, got bytes that are none'),
+        (PLAIN.replace("3", "3" * 200_000), "line 3: wanted fields of some letters, got a longer one"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_with_its_place(read, data, words):
+    with pytest.raises(ValueError, match=words):
+        read(data)
+
+
+def test_files_that_are_none(contact_file, read, tmp_path):
+    with pytest.raises(OSError, match="there is no file"):
+        contact_file.read(tmp_path / "missing.csv")
+    with pytest.raises(OSError, match=r"wanted a \.csv or \.ply file of contacts"):
+        read(PLAIN, "contacts.xlsx")
+
+
+def test_what_the_tracker_made_comes_back_as_it_was(contact_file, tmp_path):
+    s = surfaces.pear()
+    planes = [SamplingPlane(np.radians(a)) for a in (0, 60, 120)]
+    contours = track(s, s.point, s.normal, planes, extent=12, step=1, noise=0.05, rng=1)
+    contact_file.write(tmp_path / "out.csv", contours, "mm")
+    found, unit = contact_file.read(tmp_path / "out.csv")
+    assert unit == "mm"
+    for one, other in zip(contours, found, strict=True):
+        assert np.array_equal(one.points, other.points)
+        assert np.array_equal(one.normals, other.normals)
+    head = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
+    assert head[0] == "# Tactile Patch contacts, version 1, lengths in mm"
+    assert head[1] == "curve,x [mm],y [mm],z [mm],nx,ny,nz"
+
+
+@given(
+    arrays(float, (6, 3), elements=st.floats(-1e50, 1e50), unique=True),
+    st.sampled_from(["", "mm", "µm", "in"]),
+)
+def test_any_numbers_come_back_as_they_were(contact_file, tmp_path_factory, coordinates, unit):
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    contact_file.write(path, [Contour(coordinates[:2]), Contour(coordinates[2:])], unit)
+    contours, found = contact_file.read(path)
+    assert found == unit
+    assert np.array_equal(np.vstack([c.points for c in contours]), coordinates)
+
+
+PROPERTIES = "property {0} x\nproperty {0} y\nproperty {0} z\nproperty {1} curve\n"
+
+
+DOUBLES = PROPERTIES.format("double", "int")
+
+
+def ply(kind, count=6, properties=DOUBLES, before="", after=""):
+    vertices = f"{before}element vertex {count}\n{properties}{after}"
+    return f"ply\nformat {kind} 1.0\ncomment by hand\n{vertices}end_header\n".encode()
+
+
+ROWS = [(*p, number) for number, curve in enumerate(WANTED, 1) for p in curve.tolist()]
+
+
+def packed(order, kinds, rows=ROWS):
+    return b"".join(struct.pack(order + kinds, *row) for row in rows)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        ply("ascii") + "\n".join(" ".join(map(str, row)) for row in ROWS).encode(),
+        (ply("ascii") + "\n".join(" ".join(map(str, row)) for row in ROWS).encode()).replace(b"\n", b"\r\n"),
+        ply("binary_little_endian") + packed("<", "dddi"),
+        ply("binary_big_endian") + packed(">", "dddi"),
+        ply("binary_big_endian", properties=PROPERTIES.format("float64", "uchar")) + packed(">", "dddB"),
+        ply("binary_little_endian", before="element camera 2\nproperty float fov\nproperty uchar id\n")
+        + b"\1" * 10 + packed("<", "dddi"),
+        ply("ascii", before="element camera 2\nproperty float fov\n") + b"1\n2\n"
+        + "\n".join(" ".join(map(str, row)) for row in ROWS).encode(),
+        ply("binary_little_endian", after="element face 1\nproperty list uchar int vertex_indices\n")
+        + packed("<", "dddi") + b"\3" + b"\0" * 12,
+    ],
+    ids=range(8),
+)  # fmt: skip
+def test_ply_of_all_kinds(read, data):
+    contours, unit = read(data, "contacts.ply")
+    assert unit == ""
+    assert points(contours) == WANTED.tolist()
+
+
+def test_ply_with_normals_and_times_in_single_precision(read):
+    properties = "".join(f"property float {name}\n" for name in ("time", "x", "y", "z", "nx", "ny", "nz"))
+    rows = [(2, 1, 0, 0, 0, 1, 0), (1, 0, 0, 0, 0, 0, 1)]
+    (contour,), _ = read(ply("binary_little_endian", 2, properties) + packed("<", "7f", rows), "contacts.ply")
+    assert contour.points.tolist() == [[0, 0, 0], [1, 0, 0]]
+    assert contour.normals.tolist() == [[0, 0, 1], [0, 1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", '"contacts.ply": wanted the header of a .ply file'),
+        (b"ply\nformat ascii 1.0\n", "wanted the header"),
+        (b"ply\nformat morse 1.0\nend_header\n", "wanted the header"),
+        (b"ply\nend_header\n", "wanted the header"),
+        (PLAIN.encode(), "wanted the header"),
+        (ply("ascii", properties="property float x\n"), "wanted vertices with the properties x, y and z"),
+        (ply("ascii", properties="property list uchar int x\n"), "wanted vertices with the properties"),
+        (ply("ascii", 0), "wanted vertices with the properties"),
+        (ply("ascii", "many"), 'wanted an element or a property, got "element vertex many"'),
+        (ply("ascii", properties="property half x\n"), 'got "property half x"'),
+        (ply("ascii", properties="property x\n"), "wanted an element or a property"),
+        (ply("ascii") + b"1 2 3 4\n1 2 3\n", '"contacts.ply", line 11: wanted 4 numbers, got 3'),
+        (ply("ascii") + b"1 2 3 4\n", "line 11: wanted 4 numbers, got 0: is the file whole?"),
+        (ply("ascii") + b"1 2 three 4\n", 'line 10, "z": wanted a number, got "three"'),
+        (ply("binary_little_endian") + b"1234", "wanted 6 contacts, got a file that ends before"),
+        (ply("binary_little_endian") + packed("<", "dddi", [(np.nan,) * 3 + (1,)] * 6), "wanted finite"),
+    ],
+)
+def test_a_damaged_ply_is_refused_with_a_sentence(read, data, words):
+    with pytest.raises(ValueError, match=words):
+        read(data, "contacts.ply")
