@@ -35,12 +35,12 @@ from .evidence import (
     prior_variances,
     restricted,
 )
-from .monge import derived_monomials, monomials
+from .monge import monomials
 from .posterior import FREE, TERMS, Posterior
+from .slopes import slope_equations
 from .tracking import cross
 
 MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
-SLOPE_MISFIT = 1e-2  # nor that of a measured slope
 PASSES = 8  # at most: two that turn the frame to what they found, and more for what is outlying
 SETTLED = 0.1  # of a weight, between passes
 UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
@@ -120,9 +120,12 @@ def joint_fit(
 def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
     """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
     prior_mean = np.array([_prior_mean(*pair) for pair in zip(touches.k1, touches.k2, strict=True)])
-    system = _system(touches.contacts @ touches.axes, touches.weights, prior_mean)
+    local = touches.contacts @ touches.axes
+    system = _system(local, touches.weights, prior_mean)
     if touches.normals.shape[1]:
-        system = _with_slopes(system, touches, prior_mean)
+        slopes, steepness = slope_equations(touches.normals @ touches.axes, local, touches.weights)
+        steepness -= (slopes @ prior_mean[..., None])[..., 0]
+        system = system._replace(slopes=slopes, steepness=steepness)
     data = None if step == 0 else restricted(system.basis, system.heights, touches.weights)
     if data is None:
         waviness = np.full(len(prior_mean), USUAL_WAVINESS)
@@ -186,32 +189,6 @@ def _system(local: Array, weights: Array, prior_mean: Array) -> _System:
     heights = local[..., 2] - (basis @ prior_mean[..., None])[..., 0]
     weighted = np.swapaxes(weights[..., None] * basis, 1, 2)
     return _System(basis, heights, weighted @ basis, (weighted @ heights[..., None])[..., 0])
-
-
-def _with_slopes(system: _System, touches: _Touches, prior_mean: Array) -> _System:
-    """The system with what measured normals say: two equations a contact.
-
-    The unit normal m is across the surface's normal (-z_x, -z_y, 1) turned by no more than its error:
-    with a and b, unit and across m and each other, a . (-z_x, -z_y, 1) is 0 but for |(z_x, z_y, 1)| times
-    the deviation, and b . likewise. A patch has one height a place, so no normal of it points down: one
-    that does was measured inward. An outlying contact's normal weighs as little as the contact.
-    """
-    m = touches.normals @ touches.axes
-    m = np.where(m[..., 2:] < 0.0, -m, m)
-    certainty = np.sqrt(np.einsum("bni,bni->bn", m, m))
-    mx, my, mz = np.moveaxis(m / np.maximum(certainty, 1.0)[..., None], -1, 0)
-    deviation = np.maximum(1.0 / np.maximum(certainty, 1e-300), SLOPE_MISFIT)
-    scale = np.where(certainty > 0.0, np.sqrt(touches.weights) * mz / deviation, 0.0)
-    x, y, _ = (touches.contacts @ touches.axes).reshape(-1, 3).T
-    dx, dy = derived_monomials(x, y, TERMS, [(1, 0), (0, 1)]).swapaxes(1, 2).reshape(2, *mx.shape, -1)
-    share = mx * my / (1.0 + mz)
-    rows = [
-        (1.0 - mx**2 / (1.0 + mz))[..., None] * dx - share[..., None] * dy,
-        (1.0 - my**2 / (1.0 + mz))[..., None] * dy - share[..., None] * dx,
-    ]
-    slopes = np.concatenate([scale[..., None] * row for row in rows], axis=1)
-    steepness = np.concatenate([-scale * mx, -scale * my], axis=1)
-    return system._replace(slopes=slopes, steepness=steepness - (slopes @ prior_mean[..., None])[..., 0])
 
 
 def _normal_equations(system: _System, weights: Array) -> tuple[NormalEquations, NormalEquations]:

@@ -189,13 +189,15 @@ def _read_ply(name, data):
         raise ValueError(f"{name}: wanted the header of a .ply file, got another or half of one")
     body = body.partition(b"\n")[2]
     before, count, fields = _ply_vertices(name, lines, order)
-    if lines[1][1] == "ascii":
-        rows = _ply_rows(name, len(lines) + 2, body, len(before), count, fields)
+    text = body.splitlines() if lines[1][1] == "ascii" else None
+    sizes = [number * (1 if text is not None else np.dtype(kinds).itemsize) for kinds, number in before]
+    start, size = sum(sizes), 1 if text is not None else np.dtype(fields).itemsize
+    if len(body if text is None else text) < start + count * size:
+        raise ValueError(f"{name}: wanted {count} contacts, got a file that ends before: is it whole?")
+    if text is None:
+        rows = np.frombuffer(body, fields, count, start)
     else:
-        kind, start = np.dtype(fields), sum(np.dtype(kinds).itemsize for kinds in before)
-        if len(body) < start + count * kind.itemsize:
-            raise ValueError(f"{name}: wanted {count} contacts, got a file that ends before: is it whole?")
-        rows = np.frombuffer(body, kind, count, start)
+        rows = _ply_rows(name, len(lines) + 2 + start, text[start : start + count], fields)
     table = {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
     points = np.column_stack([table[key] for key in POINT])
     if not np.isfinite(points).all():
@@ -206,7 +208,7 @@ def _read_ply(name, data):
 
 
 def _ply_vertices(name, lines, order):
-    """Fields of each of the rows before the vertices, how many vertices there are, and their fields."""
+    """(fields, how many) of the rows before the vertices; how many vertices there are, and their fields."""
     elements = []
     for line in lines[2:]:
         try:
@@ -220,24 +222,23 @@ def _ply_vertices(name, lines, order):
             raise ValueError(f'{name}: wanted an element or a property, got "{" ".join(line)}"') from None
     before = []
     for element, count, properties in elements:
-        if any(kind == "list" for _, kind in properties):
+        if count < 0 or any(kind == "list" for _, kind in properties):
             break
         fields = [(key, order + kind) for key, kind in properties]
         if element == "vertex":
-            if not {*POINT} <= {key for key, _ in fields} or count < 1 or len(dict(fields)) < len(fields):
+            if not {*POINT} <= {*dict(fields)} or count < 1 or len(dict(fields)) < len(fields):
                 break
             return before, count, fields
-        before += [fields] * count
+        before.append((fields, count))
     raise ValueError(f"{name}: wanted vertices with the properties x, y and z, got none of that kind")
 
 
-def _ply_rows(name, first, body, skip, count, fields):
-    lines = body.decode("latin-1").splitlines()[skip : skip + count]
-    rows = np.zeros(count, [(key, "f8") for key, _ in fields])
-    for i in range(count):
-        at = f"{name}, line {first + skip + i}"
-        words = lines[i].split() if i < len(lines) else []
+def _ply_rows(name, first, lines, fields):
+    """The values of lines of text, the first of them the file's line `first`."""
+    rows = np.zeros(len(lines), [(key, "f8") for key, _ in fields])
+    for i, line in enumerate(lines):
+        at, words = f"{name}, line {first + i}", line.decode("latin-1").split()
         if len(words) != len(fields):
-            raise ValueError(f"{at}: wanted {len(fields)} numbers, got {len(words)}: is the file whole?")
+            raise ValueError(f"{at}: wanted {len(fields)} numbers, got {len(words)}")
         rows[i] = tuple(_number(f'{at}, "{key}"', word) for (key, _), word in zip(fields, words, strict=True))
     return rows

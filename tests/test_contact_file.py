@@ -231,9 +231,14 @@ def test_ply_with_normals_and_times_in_single_precision(read):
         (ply("ascii", "many"), 'wanted an element or a property, got "element vertex many"'),
         (ply("ascii", properties="property half x\n"), 'got "property half x"'),
         (ply("ascii", properties="property x\n"), "wanted an element or a property"),
-        (ply("ascii") + b"1 2 3 4\n1 2 3\n", '"contacts.ply", line 11: wanted 4 numbers, got 3'),
-        (ply("ascii") + b"1 2 3 4\n", "line 11: wanted 4 numbers, got 0: is the file whole?"),
-        (ply("ascii") + b"1 2 three 4\n", 'line 10, "z": wanted a number, got "three"'),
+        (ply("ascii") + b"1 2 3 4\n1 2 3\n" * 3, '"contacts.ply", line 11: wanted 4 numbers, got 3'),
+        (ply("ascii") + b"1 2 3 4\n", "wanted 6 contacts, got a file that ends before: is it whole?"),
+        (ply("ascii", 10**15) + b"1 2 3 4\n", "got a file that ends before"),
+        (
+            ply("ascii", before="element camera 99999999999\nproperty float x\n"),
+            "got a file that ends before",
+        ),
+        (ply("ascii") + b"1 2 three 4\n" * 6, 'line 10, "z": wanted a number, got "three"'),
         (ply("binary_little_endian") + b"1234", "wanted 6 contacts, got a file that ends before"),
         (ply("binary_little_endian") + packed("<", "dddi", [(np.nan,) * 3 + (1,)] * 6), "wanted finite"),
     ],
@@ -241,3 +246,20 @@ def test_ply_with_normals_and_times_in_single_precision(read):
 def test_a_damaged_ply_is_refused_with_a_sentence(read, data, words):
     with pytest.raises(ValueError, match=words):
         read(data, "contacts.ply")
+
+
+WHOLE = [PLAIN.encode(), ply("ascii") + b"1 2 3 4\n" * 6, ply("binary_little_endian") + packed("<", "dddi")]
+
+
+@given(st.sampled_from(WHOLE), st.integers(0, 300), st.integers(0, 30), st.binary(max_size=12))
+def test_whatever_happens_to_a_file_it_is_read_or_refused_with_a_sentence(
+    contact_file, tmp_path_factory, data, at, lost, put
+):
+    path = tmp_path_factory.getbasetemp() / ("any.csv" if data is WHOLE[0] else "any.ply")
+    path.write_bytes(data[:at] + put + data[at + lost :])
+    try:
+        contours, _ = contact_file.read(path)
+    except ValueError as error:
+        assert ": wanted " in str(error)
+    else:
+        assert all(np.isfinite(c.points).all() and len(c.points) for c in contours)

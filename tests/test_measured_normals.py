@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from core import Contour, SamplingPlane, bayes, evidence, posterior, reconstruct, reconstruct_many, track
 from core.monge import monomials
+from core.slopes import slope_equations
 
 PLANES = [SamplingPlane(np.radians(a)) for a in (0, 60, 120)]
 HIDDEN = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})  # zero in these planes
@@ -159,21 +160,19 @@ def test_slopes_are_the_derivatives_of_the_heights():
     dy = (height(x, y + h) - height(x, y - h)) / (2.0 * h)
     normals = np.column_stack([-dx, -dy, np.ones(9)])
     normals /= 0.05 * np.linalg.norm(normals, axis=1, keepdims=True)
-    axes, one = np.eye(3)[None], np.ones((1, 9))
-    touches = bayes._Touches(local, normals[None], axes[:, 0], one[:, 0], axes, one[:, 0], one[:, 0], one)
-    system = bayes._with_slopes(bayes._system(local, one, np.zeros((1, 27))), touches, np.zeros((1, 27)))
-    assert system.slopes[0] @ b == pytest.approx(system.steepness[0], abs=1e-6)
+    slopes, steepness = slope_equations(normals[None], local, np.ones((1, 9)))
+    assert slopes[0] @ b == pytest.approx(steepness[0], abs=1e-6)
+    up = np.column_stack([dx, dy, -np.ones(9)])
     # A change of slope counts by the angle that it turns the normal by: in units of 0.05 radians.
     for direction in rng.normal(size=(5, 27)):
-        misses = system.slopes[0] @ (1e-5 * direction)
-        d = np.column_stack([dx, dy, -np.ones(9)]), None
+        misses = slopes[0] @ (1e-5 * direction)
         change = np.column_stack([
             (monomials(x + h, y, posterior.TERMS) - monomials(x - h, y, posterior.TERMS)) @ direction,
             (monomials(x, y + h, posterior.TERMS) - monomials(x, y - h, posterior.TERMS)) @ direction,
         ]) / (2.0 * h)  # fmt: skip
-        turned = np.column_stack([d[0][:, :2] + 1e-5 * change, -np.ones(9)])
-        cross = np.linalg.norm(np.cross(d[0], turned), axis=1)
-        angles = cross / np.linalg.norm(d[0], axis=1) / np.linalg.norm(turned, axis=1)
+        turned = np.column_stack([up[:, :2] + 1e-5 * change, -np.ones(9)])
+        cross = np.linalg.norm(np.cross(up, turned), axis=1)
+        angles = cross / np.linalg.norm(up, axis=1) / np.linalg.norm(turned, axis=1)
         assert np.hypot(misses[:9], misses[9:]) == pytest.approx(angles / 0.05, rel=1e-3, abs=1e-9)
 
 

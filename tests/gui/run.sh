@@ -49,6 +49,8 @@ GUI_ARGS="$out/scene.blend" step "the verification's checks" \
   $gui shot tests/gui/verify.py "$out/verify.png"
 GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the stability map's checks" \
   $gui shot tests/gui/stability.py "$out/stability.png"
+GUI_ARGS="$out/scene.blend" step "the contacts' checks" \
+  $gui shot tests/gui/contacts.py "$out/contacts.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the endurance checks" \
   $gui shot tests/gui/endurance.py "$out/endurance.png" 640 480
 [ -e "$pear" ] || echo "skipped: the scan of a pear, there is no ../shared/data."

@@ -117,6 +117,25 @@ def check_errors():
         check(f"{what} ends with 2", good, f"code {code}\n{stderr}")
 
 
+def check_contacts():
+    """Simulated contacts, and the patch that they show when nothing else is known."""
+    file = folder / "simulated.csv"
+    touched = report_of("--contacts writes a file", "-c", "tactile", "reconstruct", scene, "--contacts", file)
+    if touched is None:
+        return
+    for background in ([], ["-b"]):
+        what = " ".join(["blender", *background, "-c tactile fit"])
+        fitted = report_of(what, *background, "-c", "tactile", "fit", file)
+        if fitted is not None:
+            off = max(
+                abs(a - b) for a, b in zip(*(r["frame"]["normal"] for r in (touched, fitted)), strict=True)
+            )
+            check("... the same patch, by its contacts alone", off < 0.02, curvatures(fitted))
+    code, stdout, stderr = blender("-c", "tactile", "fit", folder / "notes.txt")
+    good = code == 1 and stderr.startswith("tactile: ") and "Traceback" not in stdout + stderr
+    check("fit says what a file of no contacts lacks", good, f"code {code}\n{stderr}\n{stdout}")
+
+
 def check_map():
     """A stability map, saved as a mesh file."""
     file = folder / "map.ply"
@@ -161,5 +180,6 @@ if first is not None:
     check_files(first)
     check_output(first)
 check_errors()
+check_contacts()
 check_map()
 check_example()

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run in a window of Blender on the scene of make_scene.py, with the extension installed.
+
+File > Import as its menu has it, the menu of a dropped .ply, the dialog of a dropped .csv, undo by
+keyboard. A drop itself comes from the desktop: here it is the operator that Blender runs for it. The
+pictures are for eyes: drop.png, drop_menu.png and the window at the end.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+import bpy
+import gui
+
+sys.path.insert(0, str(Path(__file__).parent))
+from common import check, data_blocks, last_report, look
+
+FOLDER = Path(os.environ["GUI_SHOT"]).parent
+
+
+def drop(name):
+    """What Blender does once a file is let go over the viewport."""
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.wm.drop_import_file("INVOKE_DEFAULT", directory=str(FOLDER), files=[{"name": name}])
+
+
+def patch():
+    return next((obj for obj in bpy.data.objects if "tactile" in obj), None)
+
+
+def write_contacts():
+    """Of a touch, as .csv and as .ply."""
+    bpy.ops.tactile.reconstruct(target="Suzanne", extent=0.3)
+    csv = FOLDER / "contacts.csv"
+    bpy.ops.tactile.export_contacts("EXEC_DEFAULT", filepath=str(csv))
+    rows = [line.split(",") for line in csv.read_text().splitlines()[2:]]
+    properties = ["int curve", *(f"float {name}" for name in ("x", "y", "z", "nx", "ny", "nz"))]
+    head = ["ply", "format ascii 1.0", f"element vertex {len(rows)}", *(f"property {p}" for p in properties)]
+    lines = [*head, "end_header", *(" ".join(row) for row in rows)]
+    (FOLDER / "contacts.ply").write_text("\n".join(lines) + "\n")
+
+
+def steps():
+    yield 1
+    write_contacts()
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    gui.xdo("mousemove", 600, 400)
+    bpy.ops.ed.undo_push(message="Empty")
+    data = data_blocks()
+    yield 0.5
+    bpy.ops.tactile.import_contacts("EXEC_DEFAULT", True, filepath=str(FOLDER / "contacts.csv"))
+    yield 0.5
+    good = patch() is not None and patch()["tactile"]["source"] == "contacts.csv"
+    check("File, Import, Contact Data makes a patch", good, data_blocks())
+    gui.xdo("key", "ctrl+z")
+    yield 0.5
+    check("Ctrl Z takes the patch and all its data away", data_blocks() == data, data_blocks())
+
+    drop("contacts.csv")
+    yield 1
+    gui.shot(FOLDER / "drop.png")
+    check("a dropped .csv asks first", patch() is None, data_blocks())
+    gui.xdo("key", "Return")
+    yield 1
+    check("... and Return makes the patch", patch() is not None, last_report())
+    if patch() is not None:
+        axes = patch().matrix_world
+        look(axes.translation, axes.col[2].xyz + 0.5 * axes.col[0].xyz, 4.0 * patch()["tactile"]["radius"])
+    yield 1
+    count = len(bpy.data.objects)
+    drop("contacts.ply")
+    yield 1
+    gui.shot(FOLDER / "drop_menu.png")
+    check("a dropped .ply leaves the choice", len(bpy.data.objects) == count, data_blocks())
+    gui.xdo("key", "Escape")
+    yield 0.5
+    check("... and Escape leaves the scene", len(bpy.data.objects) == count, data_blocks())
+    gui.xdo("mousemove", 600, 400)
+    yield 0.5
+
+
+gui.play(steps())
