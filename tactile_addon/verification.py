@@ -35,6 +35,8 @@ class Placed(NamedTuple):
 def placed(patch):
     """The patch object where it is now. Raises ValueError where it is no longer of its shape."""
     record, scale = patch[patch_object.RECORD], 1.0
+    if not {"ends", "points", "fit"} <= set(record.keys()):
+        raise ValueError(f'"{patch.name}" does not say what it was fitted to: touch again to verify it')
     axes, origin = patch_object.touched_frame(patch)
     if not patch_object.is_at(patch, axes, origin):  # where it is, that is in double precision
         matrix = np.array(patch.matrix_world, dtype=float)

@@ -266,6 +266,10 @@ def several(bpy, patch):
     activate(bpy, patch, add_ball(bpy, name="One"), add_ball(bpy, name="Two"))
 
 
+def of_an_earlier_version(bpy, patch):
+    del patch["tactile"]["ends"]
+
+
 def with_modifier(bpy, patch):
     bpy.data.objects["Sphere"].modifiers.new("Subdivision", "SUBSURF")
     return {"write": True}
@@ -301,6 +305,7 @@ def with_no_faces(bpy, patch):
         (with_empty, '"Nothing" is no mesh'),
         (with_no_faces, '"Bare" has no faces'),
         (several, "2 meshes are selected: select one besides the patch"),
+        (of_an_earlier_version, "does not say what it was fitted to: touch again"),
         (with_modifier, 'The modifiers of "Sphere" make or take away vertices'),
         (scaled(1.0, 2.0, 1.0), "is stretched, mirrored or scaled to nothing"),
         (scaled(-1.0, 1.0, 1.0), "is stretched, mirrored or scaled to nothing"),
