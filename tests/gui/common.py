@@ -30,6 +30,15 @@ def look(point, direction, distance, perspective="PERSP"):
     area.spaces.active.shading.color_type = "VERTEX"
 
 
+def until(reached, seconds=40):
+    """Waits until something is so: a window without a graphics card may take its time."""
+    for _ in range(10 * seconds):
+        yield 0.1
+        if reached():
+            break
+    yield 0.5
+
+
 def last_report():
     """The last line of Blender's log of reports, which only its own editor and the clipboard give out."""
     area = next(area for area in bpy.context.window.screen.areas if area.type != "VIEW_3D")

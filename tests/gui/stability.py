@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, last_report, look
+from common import check, data_blocks, last_report, look, until
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
@@ -42,14 +42,6 @@ def is_clean():
     from bl_ui.space_statusbar import STATUSBAR_HT_header as bar
 
     return not running() and bar.draw.__module__.startswith("bl_ui")
-
-
-def until(reached, seconds=40):
-    for _ in range(10 * seconds):
-        yield 0.1
-        if reached():
-            break
-    yield 0.5
 
 
 def activate(name):

@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 from mathutils import Quaternion, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, look
+from common import check, data_blocks, look, until
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
@@ -87,15 +87,6 @@ def undo_redo(what, before, after):
     gui.xdo("key", "ctrl+shift+z")
     yield 1
     check(f"{what}: Ctrl Shift Z brings it again", same(state(), after), (state(), after))
-
-
-def until(reached, seconds=8):
-    """Waits until something is so: a window without a graphics card may take its time."""
-    for _ in range(4 * seconds):
-        yield 0.25
-        if reached():
-            break
-    yield 0.25
 
 
 def is_complete():

@@ -16,7 +16,7 @@ import gui
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, look
+from common import check, data_blocks, look, until
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 OBJECT_MENU = 330, 40  # where its name is in a window 1280 wide
@@ -40,7 +40,7 @@ def choose_in_menu():
     gui.xdo("type", "--delay", 100, "fit tactile")
     yield 1
     gui.xdo("key", "Return", "sleep", 1, "mousemove", 600, 400)
-    yield 0.5
+    yield from until(lambda: bpy.context.object is not None and "tactile" in bpy.context.object)
 
 
 def check_patch(when, name):
@@ -75,7 +75,7 @@ def suzanne():
     yield 0.5
     at = [round(v) for v in gui.view_point(place)]
     gui.xdo("mousemove", *at, "keydown", "shift", "sleep", 0.1, "click", 3, "sleep", 0.1, "keyup", "shift")
-    yield 0.5
+    yield from until(lambda: cursor.location.length > 0.0)
     distance = (cursor.location - place).length
     check("Shift and the right mouse button set the 3D cursor on the surface", distance < 0.02, distance)
 
