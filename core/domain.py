@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,38 +25,20 @@ class Domain:
     ends: Array
 
     @cached_property
-    def _pieces(self) -> tuple[Array, Array, Array]:
-        """The boundary between end i and end i + 1: the ends after, the chords (m,), and the bends (m, 2).
+    def _boundary(self) -> tuple[Array, Any]:
+        """Lengths along the chords at the ends, and at the first once more (m + 1,); the spline over them."""
+        from scipy.interpolate import CubicSpline
 
-        A cubic spline by chord length; the bends are its second derivatives at the ends.
-        """
-        row = np.arange(len(self.ends))
-        after = self.ends[row - len(row) + 1]
-        steps = after - self.ends
-        chords = np.sqrt(np.einsum("mi,mi->m", steps, steps))
-        slopes, before = steps / chords[:, None], chords[row - 1]
-        system = np.zeros((len(row), len(row)))
-        system[row, row] = 2.0 * (before + chords)
-        system[row, row - 1] = system[row - 1, row] = before
-        return after, chords, np.linalg.solve(system, 6.0 * (slopes - slopes[row - 1]))
-
-    def _spline(self, piece: NDArray[np.intp], share: Array) -> tuple[Array, Array]:
-        """Points (n, 2) at a share of the way from end `piece` (n,) to the next, and derivatives by it."""
-        after, chords, bends = self._pieces
-        t, rest = share[:, None], 1.0 - share[:, None]
-        start, end, scale = self.ends[piece], after[piece], (chords[piece] ** 2 / 6.0)[:, None]
-        one, other = scale * bends[piece], scale * bends[piece - len(bends) + 1]
-        points = rest * start + t * end + (rest**3 - rest) * one + (t**3 - t) * other
-        return points, end - start + (1.0 - 3.0 * rest**2) * one + (3.0 * t**2 - 1.0) * other
+        closed = np.vstack([self.ends, self.ends[:1]])
+        lengths = np.linalg.norm(np.diff(closed, axis=0), axis=1)
+        at = np.concatenate([[0.0], np.cumsum(lengths)])
+        return at, CubicSpline(at, closed, bc_type="periodic")
 
     @cached_property
     def _polar(self) -> tuple[Array, Array]:
         """Azimuths, ascending, and radii of the boundary."""
-        chords = self._pieces[1]
-        starts = np.cumsum(chords) - chords
-        at = (starts[-1] + chords[-1]) / SAMPLES * np.arange(SAMPLES)
-        piece = np.searchsorted(starts, at, side="right") - 1
-        x, y = self._spline(piece, (at - starts[piece]) / chords[piece])[0].T
+        at, spline = self._boundary
+        x, y = spline(at[-1] / SAMPLES * np.arange(SAMPLES)).T
         azimuths = np.arctan2(y, x)
         order = np.argsort(azimuths)
         return azimuths[order], np.hypot(x, y)[order]
@@ -67,7 +50,10 @@ class Domain:
         In circles parallel to the boundary.
         """
         piece, share, along, out, outward = _gauss(len(self.ends))
-        points, ahead = self._spline(piece, share)
+        at, spline = self._boundary
+        chords = np.diff(at)[piece]
+        places = at[piece] + share * chords
+        points, ahead = spline(places), chords[:, None] * spline(places, 1)
         weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 

@@ -220,6 +220,7 @@ def _section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float
     (x0, y0, z0), (tx, ty, tz), (ux, uy, uz) = origin, t, u
 
     def cast(start: complex, direction: complex, distance: float) -> _Contact | None:
+        """What the surface answers; direction is unit."""
         a, b, c, d = start.real, start.imag, direction.real, direction.imag
         hit = surface.ray_cast(
             (x0 + a * tx + b * ux, y0 + a * ty + b * uy, z0 + a * tz + b * uz),

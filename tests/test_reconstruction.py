@@ -45,12 +45,13 @@ TILTED = [SamplingPlane(a, t) for a, t in zip(AZIMUTHS, np.radians([12, -18, 8])
     ids=["plane", "sphere", "cylinder", "torus outer", "torus inner", "ellipsoid", "bottle neck", "quartic"],
 )
 def test_exact_surfaces_of_paper_size(surface, method, planes):
-    """The errors these methods have on 12 mm patches: 2 % of the radius, 4 % where the surface is convex and
-    least |K| flattens the rim, or the ellipsoid's radius is down to 18 mm; the curvatures to 0.0025 / mm."""
+    """The errors these methods have on 12 mm patches: 2 % of the radius, 2.5 % on the sphere, whose rim least
+    |K| flattens, 4 % where the ellipsoid's radius is down to 18 mm; the curvatures to 0.0025 / mm."""
     contours = track(surface, surface.point, surface.normal, planes, extent=12, step=1)
     r = reconstruct(surface.point, contours, outward=surface.normal, method=method)
-    flattened = method == "tagc" and surface.k2 < 0.0
-    assert surfaces.off_data(surface, r) < (0.04 if flattened or surface.k1 < -0.05 else 0.02) * r.radius
+    flattened = method == "tagc" and surface.k2 - surface.k1 < 1e-6 and surface.k2 < 0.0
+    bound = 0.04 if surface.k1 < -0.05 else 0.025 if flattened else 0.02
+    assert surfaces.off_data(surface, r) < bound * r.radius
     assert [r.patch.k1, r.patch.k2] == pytest.approx([surface.k1, surface.k2], abs=2.5e-3)
     assert r.fit_error == pytest.approx(
         np.mean(np.abs(r.patch.height(*r.contacts[:, :2].T) - r.contacts[:, 2]))
