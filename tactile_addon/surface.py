@@ -36,8 +36,8 @@ class MeshSurface:
         )
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
         self._ray_cast = evaluated.ray_cast
-        if np.array_equal(self._linear, np.eye(3)) and not self._origin.any():
-            self.ray_cast = _untransformed(evaluated.ray_cast, depsgraph)
+        # Scans mostly are neither moved, turned nor scaled.
+        self._is_in_place = np.array_equal(self._linear, np.eye(3)) and not self._origin.any()
         self.size = size_of(evaluated, self._linear)
 
     @property
@@ -47,6 +47,11 @@ class MeshSurface:
 
     def ray_cast(self, origin, direction, distance):
         """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
+        if self._is_in_place:
+            hit, point, normal, _ = self._ray_cast(
+                origin, direction, distance=distance, depsgraph=self._depsgraph
+            )
+            return (point, normal) if hit and any(normal) else None
         back, (x, y, z) = self._inverse_rows, self._at
         local = product(back, *direction)
         hit, point, normal, _ = self._ray_cast(
@@ -176,16 +181,6 @@ def disabled(obj):
     return ValueError(
         f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
     )
-
-
-def _untransformed(cast, depsgraph):
-    """MeshSurface.ray_cast for an object that is neither moved, turned nor scaled: scans mostly are not."""
-
-    def ray_cast(origin, direction, distance):
-        hit, point, normal, _ = cast(origin, direction, distance=distance, depsgraph=depsgraph)
-        return (point, normal) if hit and any(normal) else None
-
-    return ray_cast
 
 
 def evaluated_mesh(obj, depsgraph):
