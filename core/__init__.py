@@ -7,6 +7,7 @@ convex body has negative curvatures under its outward normal.
 """
 
 from .common_point import common_point, in_running_order
+from .contour import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane
 from .domain import Domain
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
@@ -16,7 +17,7 @@ from .registration import Pose, register
 from .result import Reconstruction, mean_height_stds
 from .sampling import spaced
 from .serialization import from_dict, to_dict
-from .tracking import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane, Surface, track
+from .tracking import Surface, track
 from .verification import distances, fit_error, overlapped, reachable, verify
 
 __all__ = [

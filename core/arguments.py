@@ -36,9 +36,10 @@ def finite_array(
     )
     if not fits:
         raise ValueError(f"{name}: wanted shape {_shape_text(shape)}, got {array.shape}")
-    if not np.isfinite(array).all():
+    size = np.abs(array).max(initial=0.0)
+    if not math.isfinite(size):
         raise ValueError(f"{name}: wanted finite numbers, got NaN or infinity among them")
-    if np.abs(array).max(initial=0.0) > largest:
+    if size > largest:
         raise ValueError(
             f"{name}: wanted numbers up to {largest:g}, got larger ones: take another unit of length"
         )
@@ -68,12 +69,13 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 
 def unit_vector(name: str, value: ArrayLike) -> Array:
     """`value` (3,) scaled to length 1. Raises ValueError where it has no direction."""
-    vector = finite_array(name, value, (3,))
-    largest = np.abs(vector).max()
+    x, y, z = finite_array(name, value, (3,)).tolist()
+    largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:
         raise ValueError(f"{name}: wanted a vector with a direction, got (0, 0, 0)")
-    vector /= largest  # the square of a denormal or of 1e200 has no length
-    return vector / math.sqrt(vector @ vector)
+    x, y, z = x / largest, y / largest, z / largest  # the square of a denormal or of 1e200 has no length
+    length = math.hypot(x, y, z)
+    return np.array([x / length, y / length, z / length])
 
 
 def number(name: str, value: float, *, above: float | None = None, least: float | None = None) -> float:

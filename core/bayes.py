@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import Array
+from .contour import cross
 from .evidence import (
     FREE_PRECISION,
     SCALE,
@@ -38,7 +39,6 @@ from .evidence import (
 from .monge import monomials
 from .posterior import FREE, TERMS, Posterior
 from .slopes import slope_equations
-from .tracking import cross
 
 MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
 PASSES = 8  # at most: two that turn the frame to what they found, and more for what is outlying

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import LARGEST, Array, finite_array, list_of
+from .contour import Contour
 from .local_geometry import (
     LEAST_ANGLE,
     LEAST_CONTACTS,
@@ -18,7 +19,6 @@ from .local_geometry import (
     local_curves,
     stacked,
 )
-from .tracking import Contour
 
 APART = 0.1  # of a curve's size, that it may miss the point by
 GAP = 0.25  # of a curve's size, that it may have no contacts in around the point

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import SMALLEST, Array
-from .tracking import Contour, cross
+from .contour import Contour, cross
 
 WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
 LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns

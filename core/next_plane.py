@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import unit_vector
+from .contour import SamplingPlane
 from .monge import monomials
 from .posterior import TERMS
 from .result import Reconstruction
-from .tracking import SamplingPlane
 
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from . import fitting, tagc
 from .arguments import LARGEST, Array, finite_array, list_of, number, shown, unit_vector
 from .bayes import joint_fit
+from .contour import Contour
 from .domain import Domain, closed_spline_domain
 from .local_geometry import (
     Curves,
@@ -27,7 +28,6 @@ from .local_geometry import (
 from .monge import MongePatch
 from .posterior import Posterior
 from .result import Reconstruction
-from .tracking import Contour
 
 METHODS = ("bayes", "tagc", "quadratic-variation", "least-squares")
 SOLVERS = ("fast", "descent")

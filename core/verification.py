@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import Array, finite_array
+from .contour import SamplingPlane, Vector
 from .domain import Domain
 from .fitting import GRID
 from .local_geometry import Frame
 from .monge import MongePatch
-from .tracking import SamplingPlane, Surface, Vector, track
+from .tracking import Surface, track
 
 if TYPE_CHECKING:
     from .result import Reconstruction
