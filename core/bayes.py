@@ -99,7 +99,7 @@ def joint_fit(
     the means of the slopes and of the mixed second derivative are 0. Where a residual is beyond
     OUTLYING standard deviations, contacts weigh as under a Student t distribution.
     """
-    axes = np.broadcast_to(np.eye(3), (len(contacts), 3, 3))
+    axes = np.eye(3)[None].repeat(len(contacts), axis=0)
     given = contacts[:, :0] if normals is None else normals
     touches = _Touches(contacts, given, tangent, np.maximum(accuracy, MISFIT), axes, k1, k2, weights)
     pending, found = np.arange(len(contacts)), []
@@ -109,6 +109,8 @@ def joint_fit(
             found.append((pending[settled], touches.axes[settled], *posterior))
         if settled.all():
             break
+        if not settled.any():
+            continue
         touches, pending = _Touches(*(values[~settled] for values in touches)), pending[~settled]
     if len(found) == 1:  # all at once, as nearly always: in the order they came
         return found[0][1], Posterior(*found[0][2:])
@@ -193,12 +195,12 @@ def _system(local: Array, weights: Array, prior_mean: Array) -> _System:
 
 def _normal_equations(system: _System, weights: Array) -> tuple[NormalEquations, NormalEquations]:
     """Of the heights and of the slopes."""
-    square = np.sum(weights * system.heights**2, axis=1)
-    heights = NormalEquations(system.gram, system.seen, square, np.count_nonzero(weights, axis=1))
+    square = (weights * system.heights**2).sum(axis=1)
+    heights = NormalEquations(system.gram, system.seen, square, (weights > 0.0).sum(axis=1))
     assert system.slopes is not None and system.steepness is not None
     turned, steepness = np.swapaxes(system.slopes, 1, 2), system.steepness
     return heights, NormalEquations(
-        turned @ system.slopes, (turned @ steepness[..., None])[..., 0], np.sum(steepness**2, axis=1)
+        turned @ system.slopes, (turned @ steepness[..., None])[..., 0], (steepness**2).sum(axis=1)
     )
 
 
@@ -233,18 +235,19 @@ def _precision(system: _System, variances: Array, noise: Array) -> Array:
     precision = system.gram / noise[:, None, None] ** 2
     if system.slopes is not None:
         precision = precision + np.swapaxes(system.slopes, 1, 2) @ system.slopes
-    diagonal = np.arange(len(TERMS))
-    # With that no contacts make it singular.
-    precision[:, diagonal[:FREE], diagonal[:FREE]] += FREE_PRECISION
-    precision[:, diagonal[FREE:], diagonal[FREE:]] += 1.0 / variances
+    diagonal = np.einsum("bii->bi", precision)  # a view
+    diagonal[:, :FREE] += FREE_PRECISION  # with that no contacts make it singular
+    diagonal[:, FREE:] += 1.0 / variances
     return precision
 
 
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
     """Weights of the contacts, (b, n): all 1 where none of a touch is outlying; 0 where there is none."""
     misses = np.abs(residuals)
+    if np.all(misses <= OUTLYING * floor[:, None]):  # as most often: no need to look closer
+        return present.astype(float)
     ordered, row = np.sort(np.where(present, misses, np.inf), axis=1), np.arange(len(misses))
-    count = np.count_nonzero(present, axis=1)
+    count = present.sum(axis=1)
     median = 0.5 * (ordered[row, (count - 1) // 2] + ordered[row, count // 2])
     deviation = np.maximum(floor, 1.4826 * median)
     if np.all(ordered[row, count - 1] <= OUTLYING * deviation):

@@ -63,18 +63,20 @@ def restricted(basis: Array, heights: Array, weights: Array) -> Restricted:
     rows[:, :n] *= np.sqrt(weights)[..., None]
     triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
     target, square = triangle[:, FREE:-1, -1], triangle[:, -1, -1] ** 2
-    return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, np.count_nonzero(weights, axis=1))
+    return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, (weights > 0.0).sum(axis=1))
 
 
 def noises(data: Restricted, floor: Array) -> Array:
     """A grid of the noise, (b, 5), from the floor to beyond what the quadric leaves over."""
-    left = np.sum(data.target**2, axis=1) + data.square
+    left = (data.target**2).sum(axis=1) + data.square
     largest = 2.0 * floor + 3.0 * np.sqrt(left / data.contacts)
     return floor[:, None] * (largest / floor)[:, None] ** (np.arange(NOISES) / (NOISES - 1.0))
 
 
 def evidence(data: Restricted, noises: Array) -> Hyperparameters:
     """Waviness and noise by their marginal likelihood, group by group: one fits into a processor's cache."""
+    if len(noises) <= GROUP:
+        return _evidence_of(data, noises)
     groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
     found = [_evidence_of(Restricted(*(part[group] for part in data)), noises[group]) for group in groups]
     return Hyperparameters(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
@@ -90,19 +92,19 @@ def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
     b, size = target.shape
     variances = prior_variances(WAVINESS)
     explained = (triangle[:, None] * variances[:, None]) @ np.swapaxes(triangle, 1, 2)[:, None]
-    corner = 2.0 * np.sum(target**2, axis=1) / noises[:, 0] ** 2 + 1.0  # more than t' K^-1 t
+    corner = 2.0 * (target**2).sum(axis=1) / noises[:, 0] ** 2 + 1.0  # more than t' K^-1 t
     bordered = np.zeros((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
     bordered[..., :size, :size] = explained[:, :, None]
     bordered[..., :size, size] = bordered[..., size, :size] = target[:, None, None]
     bordered[..., size, size] = corner[:, None, None]
     # Beside the noise, what rounding leaves of contacts that are no surface.
     rounding = 1e-13 * np.trace(explained, axis1=2, axis2=3)
-    diagonal = np.arange(size)
-    bordered[..., diagonal, diagonal] += (noises[:, None] ** 2 + rounding[..., None])[..., None]
+    diagonal = np.einsum("...ii->...i", bordered)  # a view
+    diagonal[..., :size] += (noises[:, None] ** 2 + rounding[..., None])[..., None]
     factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
     others = (data.contacts - len(TERMS))[:, None, None]  # directions no term explains
     surprise = (
-        2.0 * np.sum(np.log(factors[..., :size]), axis=3)
+        2.0 * np.log(factors[..., :size]).sum(axis=3)
         + (corner[:, None, None] - factors[..., size] ** 2)
         + others * np.log(noises[:, None] ** 2)
         + (data.square[:, None] / noises**2)[:, None]
@@ -120,7 +122,7 @@ def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
     return Hyperparameters(
         np.exp(by_waviness @ np.log(WAVINESS)),
         by_waviness @ variances,
-        np.sqrt(np.sum(weights.sum(axis=1) * noises**2, axis=1)),
+        np.sqrt((weights.sum(axis=1) * noises**2).sum(axis=1)),
     )
 
 
@@ -134,11 +136,11 @@ def evidence_with_slopes(heights: NormalEquations, slopes: NormalEquations, nois
     variances = prior_variances(WAVINESS)
     size, at_noise = len(TERMS), noises[:, None, :, None]
     bordered = np.zeros((*(len(noises), len(WAVINESS), noises.shape[1]), size + 1, size + 1))
-    diagonal = np.arange(size)
+    diagonal = np.einsum("...ii->...i", bordered)  # a view
     bordered[..., :size, :size] = heights.gram[:, None, None] / at_noise[..., None] ** 2
     bordered[..., :size, :size] += slopes.gram[:, None, None]
-    bordered[..., diagonal[:FREE], diagonal[:FREE]] += FREE_PRECISION
-    bordered[..., diagonal[FREE:], diagonal[FREE:]] += 1.0 / variances[:, None]
+    diagonal[..., :FREE] += FREE_PRECISION
+    diagonal[..., FREE:size] += 1.0 / variances[:, None]
     seen = heights.seen[:, None, None] / at_noise**2 + slopes.seen[:, None, None]
     bordered[..., :size, size] = bordered[..., size, :size] = seen
     # One more, lest rounding leaves less than nothing over.
@@ -146,8 +148,8 @@ def evidence_with_slopes(heights: NormalEquations, slopes: NormalEquations, nois
     bordered[..., size, size] = square
     factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
     surprise = (
-        2.0 * np.sum(np.log(factors[..., :size]), axis=3)
-        + np.sum(np.log(variances), axis=1)[:, None]
+        2.0 * np.log(factors[..., :size]).sum(axis=3)
+        + np.log(variances).sum(axis=1)[:, None]
         + factors[..., size] ** 2
         + heights.contacts[:, None, None] * np.log(noises[:, None] ** 2)
     )

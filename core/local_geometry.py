@@ -124,7 +124,7 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
     present = present & (distance > least)
     distance = np.where(present, distance, np.inf)
     near = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
-    counts = np.count_nonzero(present, axis=1)[:, None]
+    counts = present.sum(axis=1)[:, None]
     farthest = near[curve, np.clip(counts, 1, WINDOW) - 1]
     along = np.copysign(np.where(present, distance, 0.0), np.einsum("cni,cji->cn", r, r[curve, farthest]))
     given = np.cumsum(present, axis=1) - (counts + 1) / 2.0
@@ -195,7 +195,7 @@ def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
 def surface_normals(tangents: Array, outward: Array) -> Array:
     """The unit n (..., 3) that minimise sum (n . t)^2 over tangents (..., c, 3), on the side of `outward`."""
     n = np.linalg.eigh(np.swapaxes(tangents, -1, -2) @ tangents)[1][..., 0]
-    return np.where(np.sum(n * outward, axis=-1, keepdims=True) >= 0.0, n, -n)
+    return np.where((n * outward).sum(axis=-1, keepdims=True) >= 0.0, n, -n)
 
 
 def principal_curvatures(
@@ -226,7 +226,7 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
     largest distance of a contact from the point in the tangent plane.
     """
     tangents = curves.tangents
-    e1 = tangents[:, 0] - np.sum(tangents[:, 0] * n, axis=1, keepdims=True) * n
+    e1 = tangents[:, 0] - (tangents[:, 0] * n).sum(axis=1, keepdims=True) * n
     e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
     e2 = np.array(cross(n.T, e1.T)).T
     plane = np.array([e1.T, e2.T]).transpose(2, 1, 0)
@@ -249,7 +249,7 @@ def degeneracy(
     contours: Sequence[Contour], present: NDArray[np.bool_], tangents: Array, normal: Array
 ) -> DegenerateCurvesError | None:
     """Why one touch of Curves carries no frame, and what to move; None where it carries one."""
-    for i, (contour, count) in enumerate(zip(contours, np.count_nonzero(present, axis=1), strict=False), 1):
+    for i, (contour, count) in enumerate(zip(contours, present.sum(axis=1), strict=False), 1):
         if count < LEAST_CONTACTS:
             why = f" (it ended by: {', '.join(contour.stops)})" if contour.stops else ""
             return DegenerateCurvesError(

@@ -3,7 +3,6 @@
 """From contours to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -198,7 +197,7 @@ def _framed(
             farthest = np.hypot(local[..., 0], local[..., 1]).max(axis=(1, 2))
             radii, local = radii * farthest, local / farthest[:, None, None, None]
             posteriors = fitted.scaled(1.0 / farthest)
-    curves = replace(curves, points=local, tangents=tangents, normals=None)
+    curves = Curves(local, curves.present, curves.along, tangents, curves.curvatures)
     return [
         (
             _Touch(
