@@ -196,7 +196,7 @@ def _system(local: Array, weights: Array, prior_mean: Array) -> _System:
 def _normal_equations(system: _System, weights: Array) -> tuple[NormalEquations, NormalEquations]:
     """Of the heights and of the slopes."""
     square = (weights * system.heights**2).sum(axis=1)
-    heights = NormalEquations(system.gram, system.seen, square, (weights > 0.0).sum(axis=1))
+    heights = NormalEquations(system.gram, system.seen, square, (weights > 0.0).sum(axis=1, dtype=float))
     assert system.slopes is not None and system.steepness is not None
     turned, steepness = np.swapaxes(system.slopes, 1, 2), system.steepness
     return heights, NormalEquations(

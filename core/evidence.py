@@ -63,7 +63,7 @@ def restricted(basis: Array, heights: Array, weights: Array) -> Restricted:
     rows[:, :n] *= np.sqrt(weights)[..., None]
     triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
     target, square = triangle[:, FREE:-1, -1], triangle[:, -1, -1] ** 2
-    return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, (weights > 0.0).sum(axis=1))
+    return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, (weights > 0.0).sum(axis=1, dtype=float))
 
 
 def noises(data: Restricted, floor: Array) -> Array:
