@@ -7,8 +7,9 @@ convex body has negative curvatures under its outward normal.
 """
 
 from .common_point import common_point, in_running_order
-from .contour import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, Contour, SamplingPlane
+from .contour import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, UNEXPLAINED, Contour, SamplingPlane
 from .domain import Domain
+from .exploration import Exploration, explore
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import azimuth_of, suggest_plane
@@ -27,9 +28,11 @@ __all__ = [
     "NOT_MONGE",
     "NO_CONTACT",
     "SOLVERS",
+    "UNEXPLAINED",
     "Contour",
     "DegenerateCurvesError",
     "Domain",
+    "Exploration",
     "Frame",
     "MongePatch",
     "Pose",
@@ -39,6 +42,7 @@ __all__ = [
     "azimuth_of",
     "common_point",
     "distances",
+    "explore",
     "fit_error",
     "from_dict",
     "in_running_order",

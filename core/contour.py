@@ -13,6 +13,7 @@ from .arguments import LARGEST, Array, finite_array, list_of, number, shown, uni
 
 COARSE = 0.01  # of a curve's size; coordinates rounded by more say nothing about curvature
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
+UNEXPLAINED = "not explained"
 
 Vector = tuple[float, float, float]
 

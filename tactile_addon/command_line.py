@@ -100,8 +100,12 @@ def _add_inputs(add):
         help="three to six plane directions (0 60 120)",
     )
     add("--tilts", type=float, nargs="+", metavar="DEGREES", help="as many plane tilts (0)")
-    add("--extent", type=float, help="length of each half curve (an eighth of the object's size)")
-    add("--step", type=float, help="distance between contacts (a twelfth of the extent)")
+    add(
+        "--extent",
+        type=float,
+        help="length of each half curve (as far as a patch can be trusted; map: size / 8)",
+    )
+    add("--step", type=float, help="distance between contacts (so many that more would tell little)")
     add("--noise", type=float, help="standard deviation of the simulated sensor (0)")
     add("--seed", type=int, help="of the noise (0)")
     _add_fit(add)
@@ -114,7 +118,7 @@ def _add_fit(add):
         "--degree",
         type=str.strip,
         choices=["auto", *"23456"],
-        help="of the polynomial; auto: the least that says what the contacts show (4)",
+        help="of the polynomial (auto: the least that says what the contacts show)",
     )
     add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000)")
     add("--solver", choices=[name for name, _, _ in SOLVERS], help="of tagc (fast)")

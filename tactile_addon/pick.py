@@ -115,7 +115,6 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         settings.target = target
         for name in NAMES:
             setattr(settings, name, getattr(self, name))
-        settings.extent = self.extent = touched.report["extent"]
         probe.adopt(found, touched, depsgraph, complete=True)
         settings.is_probe = True
         make_active(context, found)

@@ -128,11 +128,12 @@ def _put(probe, touched):
 def update(probe, depsgraph, complete):
     """Touches again and rewrites the probe's patch; the probe's message says why where that fails.
 
-    complete : with what is dear, the distances to the mesh, and the probe put onto the surface
+    complete : with what is dear, an extent that suits the surface and the distances to the mesh, and with
+        the probe put onto the surface
     """
     settings, patch = probe.tactile_probe, patch_of(probe)
     try:
-        touched = _touch(probe, depsgraph)
+        touched = _touch(probe, depsgraph, complete)
     except ValueError as error:
         settings.message = sentence(error)
         if patch is not None:
@@ -157,8 +158,8 @@ def adopt(probe, touched, depsgraph, complete):
     _sign(probe, depsgraph)
 
 
-def _touch(probe, depsgraph):
-    settings, matrix = probe.tactile_probe, probe.matrix_world
+def _touch(probe, depsgraph, complete):
+    settings, matrix, record = probe.tactile_probe, probe.matrix_world, record_of(probe)
     if settings.target is None:
         raise ValueError("the probe has no target: choose the mesh to touch")
     if not _is_there(settings.target, depsgraph):
@@ -167,13 +168,16 @@ def _touch(probe, depsgraph):
         )
     if not all(0.0 < abs(scale) < math.inf for scale in matrix.to_scale()):  # where no child can be placed
         raise ValueError("the probe is scaled to nothing, or beyond all numbers: give it a scale of 1")
+    arguments = touch_arguments(settings)
+    if not complete and record is not None:  # to find out how far a patch can be trusted is dear
+        arguments |= {name: arguments[name] or record[name] for name in ("extent", "step")}
     return touch(
         settings.target,
         depsgraph,
         list(matrix.translation),
         toward=list(matrix.col[2].xyz),
         tangent=list(matrix.col[0].xyz),
-        **touch_arguments(settings),
+        **arguments,
     )
 
 

@@ -54,7 +54,7 @@ class FitSettings:
         name="Degree",
         description="Of the polynomial that describes the patch, 2 to 6; 0 for the least that says what "
         "the contacts show",
-        default=4,
+        default=0,
         min=0,
         max=6,
         update=changed,
@@ -102,14 +102,15 @@ class TouchSettings(FitSettings):
     )
     extent: FloatProperty(
         name="Extent",
-        description="How far to feel to either side of the point; 0 for an eighth of the object's size",
+        description="How far to feel to either side of the point; 0 for as far as a patch can be trusted. "
+        "In a map 0 is an eighth of the object's size",
         subtype="DISTANCE",
         soft_min=0.0,
         update=changed,
     )
     step: FloatProperty(
         name="Step",
-        description="Distance between contacts; 0 for a twelfth of the extent",
+        description="Distance between contacts; 0 for so many that more would tell little",
         subtype="DISTANCE",
         soft_min=0.0,
         update=changed,

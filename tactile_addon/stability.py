@@ -11,8 +11,9 @@ import numpy as np
 from .. import core
 from .snapshot import MeshSnapshot
 from .surface import evaluated_mesh
-from .touch import lengths, require_fine
+from .touch import STEPS, require_fine, require_lengths
 
+EXTENT_SHARE = 1.0 / 8.0  # of the object's size, where no extent is given
 SPACING_SHARE = 1.0 / 4.0  # of the extent, where no spacing is given
 BATCH = 20  # touches that are fitted at once: in a hundredth of a second
 SAMPLES = 15  # of a patch, that are compared with the mesh
@@ -51,7 +52,9 @@ class StabilityMap:
         self.surface = MeshSnapshot(obj, depsgraph)
         if spacing < 0.0:
             raise ValueError(f"The spacing is a length of 0 or more, got {spacing:g}")
-        self.extent, self.step = lengths(obj.name, self.surface.size, extent, step, noise)
+        self.extent = extent or EXTENT_SHARE * self.surface.size
+        self.step = step or self.extent / STEPS
+        require_lengths(obj.name, self.surface.size, self.extent, self.step, noise)
         self.spacing = spacing or SPACING_SHARE * self.extent
         require_fine(self.surface.spacing, self.step)
         self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit

@@ -3,6 +3,7 @@
 """One touch, from an object of the scene to a reconstruction and its report; nothing in the scene changes."""
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -12,9 +13,18 @@ from .. import core
 from .settings import STEEPEST
 from .surface import MeshSurface
 
-EXTENT_SHARE = 1.0 / 8.0  # of the object's largest dimension, where no extent is given
-STEPS = 12  # of a half contour, where no step is given
+FARTHEST = 1.0 / 2.0  # of the object's largest dimension: of a half contour that ends by itself
+AWAY = 1.0 / 8.0  # of it, that the location may be off the surface where no extent is given
+FINEST = 1.0 / 128.0  # of it, a step where neither is given
+STEPS = 12  # of a half contour at least, where no step is given
 BEYOND = 3.0  # times its own deviation, that a patch may be off the mesh in the mean
+ENDS = {
+    core.UNEXPLAINED: "end where the patch could not be trusted any more",
+    core.EXTENT: "are as long as may be",
+    core.NO_CONTACT: "end at an edge",
+    core.CREASE: "end at a crease",
+    core.NOT_MONGE: "end where the surface turns away",
+}
 COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about curvature
 
 
@@ -52,6 +62,7 @@ def touch(
     step,
     noise,
     seed,
+    farthest=None,
     **fit,
 ):
     """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
@@ -59,41 +70,66 @@ def touch(
     location : world coordinates, projected onto the object
     normal : outward, or None for the surface's; on the side of it that `toward` points to, where given
     tangent : azimuth 0 of the planes, see core.SamplingPlane.axes; None for its choice
-    extent, step : 0 for a choice by the object's size
+    extent, step : 0 for what the surface there asks for, see core.explore
+    farthest : of an extent that is chosen, half the object's size where it is None
     fit : what core.reconstruct takes
 
     Raises ValueError with a sentence for the user.
     """
     clock = [perf_counter()]
     surface = MeshSurface(obj, depsgraph)
-    extent, step = lengths(obj.name, surface.size, extent, step, noise)
+    require_lengths(obj.name, surface.size, extent, step, noise)
     point, surface_normal = _reference_point(obj.name, surface, location, extent, step)
     outward = surface_normal if normal is None else normal
     if toward is not None and np.dot(outward, toward) < 0.0:
         outward = [-v for v in outward]
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
-    contours = core.track(
-        surface, point, outward, planes, extent=extent, step=step, noise=noise, rng=seed, tangent=axes[:, 0]
+    found = core.explore(
+        surface,
+        point,
+        outward,
+        planes,
+        farthest=farthest or FARTHEST * surface.size,
+        extent=extent or "auto",
+        step=step or "auto",
+        noise=noise,
+        rng=seed,
+        tangent=axes[:, 0],
+        **fit,
     )
     clock.append(perf_counter())
-    result = core.reconstruct(point, contours, outward=outward, **fit)
-    clock.append(perf_counter())
+    result, contours = found.result, found.contours
+    said = reconstruction_report(result)
+    if not extent:
+        ended = _ends(contours)
+        said["message"] += ended
+        said["fit"]["message"] += ended
     report = {
         "source": obj.name,
         "method": fit["method"],
         "degree": result.patch.degree,
-        "extent": extent,
-        "step": step,
+        "extent": found.extent,
+        "step": found.step,
         "noise": noise,
         "seed": seed,
-        **reconstruction_report(result),
+        **said,
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
         "axes": axes.tolist(),
         "stops": [list(contour.stops) for contour in contours],
-        "seconds": dict(zip(("prepare", "track", "fit"), np.diff(clock).tolist(), strict=True)),
+        "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
     return Touch(surface, result, contours, report)
+
+
+def _ends(contours):
+    """A sentence on what has ended curves that were free to grow."""
+    counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
+    if len(counts) == 1:
+        return f" All half curves {ENDS[counts[0][0]]}."
+    return (
+        f" Of {2 * len(contours)} half curves {', '.join(f'{count} {ENDS[stop]}' for stop, count in counts)}."
+    )
 
 
 def verify(touched, most=None):
@@ -110,20 +146,19 @@ def verify(touched, most=None):
     touched.report["seconds"] |= dict(zip(("verify", "suggest"), np.diff(clock).tolist(), strict=True))
 
 
-def lengths(name, size, extent, step, noise):
-    """Extent and step, chosen by the object's size where they are 0. Raises ValueError for bad ones."""
+def require_lengths(name, size, extent, step, noise):
+    """Raises ValueError for lengths, 0 where they are not given, that no touch of an object can have."""
     if not all(length >= 0.0 for length in (extent, step, noise)):  # NaN is none
         raise ValueError(
             f"Extent, step and noise are lengths of 0 or more, got {extent:g}, {step:g} and {noise:g}"
         )
     if extent > size:
         raise ValueError(f'The extent {extent:g} is longer than "{name}" ({size:g}): take a shorter one')
-    extent = extent or size * EXTENT_SHARE
-    if step > extent:
-        raise ValueError(f"The step {step:g} is longer than the extent {extent:g}: take a shorter one")
-    if noise > extent:
-        raise ValueError(f"The noise {noise:g} is larger than the extent {extent:g}: take a smaller one")
-    return extent, step or extent / STEPS
+    longest = extent or FARTHEST * size
+    if step > longest:
+        raise ValueError(f"The step {step:g} is longer than the extent {longest:g}: take a shorter one")
+    if noise > longest:
+        raise ValueError(f"The noise {noise:g} is larger than the extent {longest:g}: take a smaller one")
 
 
 def _reference_point(name, surface, location, extent, step):
@@ -131,12 +166,13 @@ def _reference_point(name, surface, location, extent, step):
     if not np.isfinite(location).all():
         raise ValueError("The location has coordinates that are not finite: set it on the surface")
     point, normal, distance = surface.project(location)
-    if distance > extent:
+    farthest = extent or AWAY * surface.size
+    if distance > farthest:
         raise ValueError(
-            f'The location is {distance:g} away from "{name}", farther than the extent {extent:g}: '
+            f'The location is {distance:g} away from "{name}", farther than {farthest:g}: '
             "move it to the surface"
         )
-    require_fine(surface.spacing(point), step)
+    require_fine(surface.spacing(point), step or extent / STEPS or FINEST * surface.size)
     return point, normal
 
 

@@ -192,8 +192,9 @@ def test_a_mesh_without_vertices_over_the_patch_says_so(empty, extension):
 
 def test_the_same_seed_gives_the_same_patch_and_another_does_not(empty, ball):
     reports = [reconstruct(empty, target="Sphere", **TOUCH, noise=0.01, seed=seed)[1] for seed in (1, 1, 2)]
-    assert reports[0]["coefficients"] == reports[1]["coefficients"]
-    assert reports[0]["coefficients"] != reports[2]["coefficients"]
+    assert reports[0]["points"] == reports[1]["points"]
+    assert reports[0]["points"] != reports[2]["points"]
+    assert [report["k1"] for report in reports[:2]] == [reports[0]["k1"]] * 2
 
 
 def test_several_patches_share_collection_and_materials(empty, ball):
@@ -228,8 +229,10 @@ def test_without_a_location_the_cursor_is_projected(empty, ball):
 
 def test_extent_and_step_suit_the_object_where_they_are_not_given(empty, ball):
     _, report = reconstruct(empty, location=TOP)
-    assert report["extent"] == pytest.approx(4.0 / 8.0, rel=1e-3)
+    assert 1.0 <= report["extent"] <= 2.0  # of a ball of radius 2 as much as a finger can see from the top
     assert report["step"] == pytest.approx(report["extent"] / 12.0)
+    assert report["vertex_distance_max"] < 0.02 * report["radius"]
+    assert report["message"].endswith(("trusted any more.", "as may be."))
 
 
 def test_the_chosen_extent_does_not_depend_on_how_the_object_is_turned(empty, ball):
@@ -240,7 +243,7 @@ def test_the_chosen_extent_does_not_depend_on_how_the_object_is_turned(empty, ba
         empty.context.view_layer.update()
         place = ball.matrix_world @ Vector(TOP)
         extents.append(reconstruct(empty, target="Sphere", location=place)[1]["extent"])
-    assert extents == pytest.approx([8.0 / 8.0] * 2, rel=1e-3)
+    assert extents[0] == pytest.approx(extents[1], rel=1e-3)
 
 
 def test_all_inputs_reach_the_core(empty, ball):

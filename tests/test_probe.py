@@ -150,7 +150,8 @@ def test_a_pick_makes_a_probe_with_its_patch(empty, ball):
     assert (empty.context.view_layer.objects.active, empty.context.selected_objects) == (probe, [probe])
     settings, report = probe.tactile_probe, report_of(patch)
     assert (settings.is_probe, settings.target, settings.live) == (True, ball, True)
-    assert [settings.extent, report["extent"]] == pytest.approx([2.0 * RADIUS / 8.0] * 2, rel=1e-3)
+    assert settings.extent == 0.0  # the surface's own
+    assert 0.5 * RADIUS < report["extent"] <= RADIUS
     assert report["vertices"] > 100
     assert_touches(probe, patch)
     # On the ray from the centre through the location; azimuth 0 is along x.
@@ -218,7 +219,7 @@ def test_probes_do_not_share_what_they_write(empty, ball):
         ("noise", 0.01, "bayes"),
         ("seed", 5, "bayes"),
         ("method", "tagc", "bayes"),
-        ("degree", 3, "bayes"),
+        ("degree", 5, "bayes"),
         ("plane_count", 5, "bayes"),
         ("weight", 10.0, "tagc"),
         ("solver", "descent", "tagc"),
@@ -377,8 +378,7 @@ def test_a_probe_off_the_surface_says_so_and_keeps_its_patch(empty, ball):
         probe.location = (0.0, 0.0, height)
         update(empty)
         assert probe.tactile_probe.message == (
-            f'The location is {height - 2:g} away from "Sphere", farther than the extent 0.6: '
-            "move it to the surface"
+            f'The location is {height - 2:g} away from "Sphere", farther than 0.6: move it to the surface'
         )
         assert state(patch) == before
         assert in_world(patch) == pytest.approx(points, abs=1e-5)

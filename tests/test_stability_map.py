@@ -69,7 +69,7 @@ def edited(bpy, **cuts):
 
 
 def test_a_ball_is_alike_all_over(empty, ball):
-    painted, record = stability_map(empty, spacing=0.4)
+    painted, record = stability_map(empty, spacing=0.4, degree=4)
     assert record["points"] == record["touched"] == record["patches"]
     assert record["in_doubt"] == 0
     assert not any(record["refused"].values())

@@ -1,0 +1,213 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A touch that chooses its own size: curves as long as a patch can be trusted, contacts as many as tell.
+
+Beside the paper. Half curves grow outward from the reference point like the regions of a segmentation
+by surface fitting: fit, go on where the fit explains the contacts, fit again.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arguments import LARGEST, Array, finite_array, number
+from .bayes import MISFIT
+from .contour import UNEXPLAINED, Contour, SamplingPlane
+from .local_geometry import DegenerateCurvesError
+from .monge import monomials
+from .posterior import TERMS
+from .reconstruction import reconstruct
+from .result import DOUBTFUL_STD, Reconstruction
+from .tracking import Surface, track
+
+CONTACTS = (12, 24, 48)  # of the longest half curve: the first that are enough
+NOTICEABLE = 0.15  # of the mean deviation of the height, that twice as many contacts take off
+LEAST = 4  # contacts of the shortest half curve
+FELT = 64  # contacts of a half curve as long as may be
+SEEDS = (16, 8, 4)  # of them, that a half curve may begin with
+GROWTH = 1.5  # of a half curve at once
+EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
+
+Counts = NDArray[np.intp]  # of the contacts of the c contours on either side of the point, (c, 2)
+
+
+class Exploration(NamedTuple):
+    """What was felt and found, and the length of the longest half curve and the step that it took."""
+
+    contours: list[Contour]
+    result: Reconstruction
+    extent: float
+    step: float
+
+
+def explore(
+    surface: Surface,
+    point: ArrayLike,
+    normal: ArrayLike,
+    planes: Sequence[SamplingPlane],
+    *,
+    farthest: float,
+    extent: float | str = "auto",
+    step: float | str = "auto",
+    noise: float = 0.0,
+    rng: np.random.Generator | int | None = None,
+    tangent: ArrayLike | None = None,
+    **fit: Any,
+) -> Exploration:
+    """Tracks `surface` from `point` and reconstructs the patch, as large and as densely felt as it needs.
+
+    farthest : the longest that a half curve may become
+    extent : of each half curve, as in `track`; "auto" has each grow until the default fit no longer
+        explains its contacts by their accuracy, or the patch could be trusted no longer
+    step : as in `track`; "auto" for so many contacts that twice as many would not lower the deviation of
+        the height noticeably
+    fit : what `reconstruct` takes; all else as in `track`
+
+    Where a contour was not followed any farther, its `stops` say UNEXPLAINED. Raises what `track` and
+    `reconstruct` raise.
+    """
+    p = finite_array("point", point, (3,), LARGEST)
+    length, spacing = (
+        None if value == "auto" else number(name, value, above=0.0)  # type: ignore[arg-type]
+        for name, value in (("extent", extent), ("step", step))
+    )
+    feel = partial(track, surface, p, normal, planes, noise=noise, rng=rng, tangent=tangent)
+    reaches = None
+    if length is None:
+        between = max(spacing or 0.0, number("farthest", farthest, above=0.0) / FELT)
+        felt = feel(extent=farthest, step=between)
+        reaches = between * _grown(felt, p, normal, fit | {"method": "bayes"})
+        length = float(reaches.max())
+
+    def touched(step: float) -> Exploration:
+        if reaches is None:
+            contours = feel(extent=length, step=step)
+        else:
+            contours = feel(extent=min(length + step, farthest), step=step)  # the end of a half curve shows
+            counts = (reaches / step * (1.0 + 1e-6)).astype(np.intp)
+            contours = [_shortened(*each, p) for each in zip(contours, counts, strict=True)]
+        return Exploration(contours, reconstruct(p, contours, outward=normal, **fit), length, step)
+
+    if spacing is not None:
+        return touched(spacing)
+    shortest = length if reaches is None else float(reaches[reaches > 0.0].min())
+    coarsest = max(shortest / LEAST, length / CONTACTS[-1])
+    return _enough(touched, [min(length / count, coarsest) for count in CONTACTS])
+
+
+def _enough(touched: Callable[[float], Exploration], steps: Sequence[float]) -> Exploration:
+    """The touch with the first of these steps that brings enough contacts, or with the last."""
+    for step in steps:
+        try:
+            found = touched(step)
+        except DegenerateCurvesError:
+            if step == steps[-1]:
+                raise
+        else:
+            if _is_enough(found.result):
+                break
+    return found
+
+
+def _is_enough(r: Reconstruction) -> bool:
+    """Whether twice as many contacts would take less than NOTICEABLE off the mean deviation of the height.
+
+    They would tell nothing where that is less than a polynomial may be off.
+    """
+    x, y, _ = r.curves.points[r.curves.present].T
+    basis = monomials(x, y, TERMS)
+    precision = np.linalg.inv(r.posterior.covariance) + basis.T @ basis / r.posterior.noise**2
+    (u, v), weights = r.domain.nodes[0].T / r.radius, r.domain.nodes[1]
+    over = monomials(u, v, TERMS)
+    stds = (
+        weights @ np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", over, covariance, over), 0.0))
+        for covariance in (r.posterior.covariance, np.linalg.inv(precision))
+    )
+    now, then = stds
+    return bool(then >= (1.0 - NOTICEABLE) * now or now <= MISFIT)
+
+
+def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, Any]) -> Counts:
+    """To how many contacts on either side of p the contours can be followed."""
+    whole = np.array([_on_either_side(contour, p) for contour in felt])
+    counts, doubt = _seed(felt, whole, p, normal, fit)
+    growing = (counts < whole) & (doubt <= 1.0)
+    while growing.any():
+        longer = np.minimum(np.ceil(GROWTH * counts).astype(np.intp), whole)
+        trial = np.where(growing, longer, counts)
+        try:
+            misfits, spread = _doubts(felt, trial, p, normal, fit)
+        except DegenerateCurvesError:
+            break
+        if misfits.max() > 1.0:  # the half curve that is explained worst ends here
+            growing.flat[np.argmax(np.where(growing, misfits, -1.0))] = False
+        elif spread > 1.0:
+            break
+        else:
+            counts = trial
+            growing &= counts < whole
+    return counts
+
+
+def _seed(
+    felt: Sequence[Contour], whole: Counts, p: Array, normal: ArrayLike, fit: dict[str, Any]
+) -> tuple[Counts, float]:
+    """The longest of SEEDS that is in no doubt, or the one in the least; and its doubt, at most 1 for none.
+
+    Raises DegenerateCurvesError where none of them carries a fit.
+    """
+    found, error = [], None
+    for seed in SEEDS:
+        try:
+            misfits, spread = _doubts(felt, np.minimum(seed, whole), p, normal, fit)
+        except DegenerateCurvesError as why:
+            error = why
+            continue
+        found.append((max(float(misfits.max()), spread), seed))
+        if found[-1][0] <= 1.0:
+            break
+    if not found and error is not None:
+        raise error
+    doubt, seed = min(found)
+    return np.minimum(seed, whole), doubt
+
+
+def _doubts(
+    felt: Sequence[Contour], counts: Counts, p: Array, normal: ArrayLike, fit: dict[str, Any]
+) -> tuple[Array, float]:
+    """How far contacts are off the fit of so many, (c, 2), and its mean deviation; above 1 is too much."""
+    few = [_shortened(*each, p, most=CONTACTS[0]) for each in zip(felt, counts, strict=True)]
+    r = reconstruct(p, few, outward=normal, **fit)
+    x, y, z = r.frame.to_local(np.vstack([contour.points for contour in felt])).T
+    squares = np.split((z - r.patch.height(x, y)) ** 2, np.cumsum([len(c.points) for c in felt])[:-1])
+    misfits = np.zeros(counts.shape)
+    for i, (contour, (before, after)) in enumerate(zip(felt, counts, strict=True)):
+        at = _on_either_side(contour, p)[0]
+        sides = squares[i][at - before : at], squares[i][at + 1 : at + after + 1]
+        misfits[i] = [np.sqrt(side.mean()) if len(side) else 0.0 for side in sides]
+    limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
+    return misfits / limit, r.mean_height_std / (DOUBTFUL_STD * r.radius)
+
+
+def _on_either_side(contour: Contour, p: Array) -> tuple[int, int]:
+    """How many contacts a tracked contour has before p and after it."""
+    at = int(np.argmax((contour.points == p).all(axis=1)))
+    return at, len(contour.points) - 1 - at
+
+
+def _shortened(contour: Contour, counts: Counts, p: Array, most: float = np.inf) -> Contour:
+    """Not more than so many contacts on either side of p, (2,); thinned to some `most` of them."""
+    whole = _on_either_side(contour, p)
+    before, after = (np.arange(n, 0, -max(1, round(n / most))) for n in np.minimum(counts, whole))
+    which = whole[0] + np.concatenate([-before, [0], after[::-1]])
+    assert contour.normals is not None and contour.stops is not None
+    first, last = (
+        stop if count >= there else UNEXPLAINED
+        for stop, count, there in zip(contour.stops, counts, whole, strict=True)
+    )
+    points, normals = contour.points[which], contour.normals[which]
+    return replace(contour, points=points, normals=normals, stops=(first, last))
