@@ -90,10 +90,10 @@ def main():
     extension = blender.start(parser.parse_args().zip)
     import bpy
 
-    addon, clock = extension.tactile_addon, Clock()
+    addon, exploration, clock = extension.tactile_addon, extension.core.exploration, Clock()
     clock.wrap(addon.surface.MeshSurface, "ray_cast", "ray casts")
-    clock.wrap(addon.touch.core, "track", "tracking")
-    clock.wrap(addon.touch.core, "reconstruct", "fit")
+    clock.wrap(exploration, "track", "tracking")
+    clock.wrap(exploration, "reconstruct", "fit")
     clock.wrap(addon.touch, "reconstruction_report", "fit")
     clock.wrap(addon.patch_object, "rewrite", "mesh write")
     # As in a window, where what is dear waits for the end of the gesture.

@@ -75,7 +75,7 @@ def main():
     print("|---|---|--:|--:|--:|--:|--:|--:|")
     print(*rows, "", _caption(), "", sep="\n")
     print(f"Medians over {options.touches} random touches. Calibration: distance over mean height std.\n")
-    print("| object, extent | bayes | tagc | ratio | height std | calibration | uncertain | fit, ms |")
+    print("| object, extent | bayes | tagc | ratio | height std | calibration | uncertain | ms |")
     print("|---|--:|--:|--:|--:|--:|--:|--:|")
     print(*touches, sep="\n")
 
@@ -101,7 +101,7 @@ def _rows(extension, scan, data):
             f"{report['vertices']}",
             f"{scan.scale * report['vertex_distance_mean']:.4f}",
             f"{scan.scale * report['vertex_distance_max']:.3f}",
-            f"{1e3 * median(s['track'] + s['fit'] for s in seconds):.1f}",
+            f"{1e3 * median(s['touch'] for s in seconds):.1f}",
         )
         yield f"| {' | '.join(cells)} |"
 
@@ -146,7 +146,7 @@ def _random_row(extension, scan, data, count):
     std = median(scan.scale * bayes["height_std"] for bayes, _ in found)
     calibration = median(bayes["vertex_distance_mean"] / bayes["height_std"] for bayes, _ in found)
     uncertain = sum(bayes["status"] != "ok" for bayes, _ in found)
-    fit = median(bayes["seconds"]["fit"] for bayes, _ in found)
+    touch = median(bayes["seconds"]["touch"] for bayes, _ in found)
     cells = (
         f"{scan.name}, {scan.scale * scan.extent:g} {scan.unit}",
         f"{ours:.4f}",
@@ -155,7 +155,7 @@ def _random_row(extension, scan, data, count):
         f"{std:.4f}",
         f"{calibration:.2f}",
         f"{uncertain} of {len(found)}",
-        f"{1e3 * fit:.1f}",
+        f"{1e3 * touch:.1f}",
     )
     return f"| {' | '.join(cells)} |"
 

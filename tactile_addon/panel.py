@@ -21,7 +21,7 @@ from .probe_operators import (
     shows_colours,
 )
 from .registration import TACTILE_OT_register
-from .settings import draw_sensor, draw_solver
+from .settings import draw_chosen, draw_sensor, draw_solver
 from .stability import REASONS
 from .verification import TACTILE_OT_verify, rows_of, table_of
 
@@ -52,7 +52,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row.operator(TACTILE_OT_delete.bl_idname, text="", icon="TRASH")
         settings = found.tactile_probe
         layout.prop(settings, "target")
-        layout.prop(settings, "extent")
+        draw_chosen(layout, settings, "extent")
         _draw_planes(layout, settings)
         row = layout.row()
         row.prop(settings, "live")

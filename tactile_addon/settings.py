@@ -35,6 +35,7 @@ SOLVERS = [
     ("fast", "Fast", "Quasi-Newton minimisation"),
     ("descent", "Steepest Descent", "The paper's minimisation, slower, to compare with"),
 ]
+AUTO = {"extent": "Extent (Auto)", "step": "Step (Auto)", "degree": "Degree (Auto)"}
 MOST_PLANES = 6
 STEEPEST = math.radians(60)  # of a tilt, by mouse
 
@@ -146,14 +147,23 @@ def touch_arguments(settings):
     }
 
 
+def draw_chosen(layout, settings, name):
+    """A number that the surface chooses where it is 0, which the label says."""
+    if getattr(settings, name):
+        layout.prop(settings, name)
+    else:
+        layout.prop(settings, name, text=AUTO[name])
+
+
 def draw_sensor(layout, settings):
-    for name in ("step", "noise", "seed"):
+    draw_chosen(layout, settings, "step")
+    for name in ("noise", "seed"):
         layout.prop(settings, name)
 
 
 def draw_solver(layout, settings):
-    for name in ("method", "degree"):
-        layout.prop(settings, name)
+    layout.prop(settings, "method")
+    draw_chosen(layout, settings, "degree")
     if settings.method in ("tagc", "quadratic-variation"):
         layout.prop(settings, "weight")
     if settings.method == "tagc":
@@ -162,7 +172,7 @@ def draw_solver(layout, settings):
 
 def draw_all(layout, settings):
     """Everything, with nothing folded away, as Adjust Last Operation has it."""
-    layout.prop(settings, "extent")
+    draw_chosen(layout, settings, "extent")
     layout.prop(settings, "plane_count")
     for i in range(settings.plane_count):
         column = layout.column(align=True)
