@@ -39,6 +39,8 @@ def _parser():
     vector = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
     patch.add_argument("--location", **vector, help="where to touch (default: the 3D cursor)")
     patch.add_argument("--normal", **vector, help="outward direction there (default: the surface's)")
+    help = "add planes until the height is good to this in the mean, or no plane would help (0: that alone)"
+    patch.add_argument("--tolerance", type=float, help=help)
     patch.add_argument("--contacts", type=Path, metavar="CSV", help="write the simulated contacts")
     patch.set_defaults(
         operator=bpy.ops.tactile.reconstruct, record=patch_object.RECORD, words=readable, more={}
@@ -134,6 +136,7 @@ def _add_fit(add):
 def _arguments(options):
     """What was given on the command line as the operator's arguments."""
     names = ["location", "normal", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"]
+    names += ["tolerance"]
     names += ["unit", "point", "outward", "flip", "sensor_std"]
     names = [name for name in names if getattr(options, name, None) is not None]
     given = {name: getattr(options, name) for name in names}

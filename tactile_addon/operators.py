@@ -3,7 +3,7 @@
 """The operator behind the menu entry, the scripts and the command line."""
 
 import bpy
-from bpy.props import FloatVectorProperty, StringProperty
+from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 
 from . import map_object, patch_object
 from .probe import record_of
@@ -37,6 +37,14 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         options={"SKIP_PRESET"},
     )
 
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="Add planes until the height is good to this, where it is set, or no plane would help",
+        subtype="DISTANCE",
+        soft_min=0.0,
+        options={"SKIP_PRESET"},
+    )
+
     @classmethod
     def poll(cls, context):
         return context.scene is not None
@@ -51,6 +59,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
                 depsgraph,
                 list(self.location) if given("location") else list(context.scene.cursor.location),
                 normal=list(self.normal) if given("normal") else None,
+                tolerance=self.tolerance if given("tolerance") else None,
                 **touch_arguments(self),
             )
         except ValueError as error:
@@ -74,6 +83,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         for name in filter(self.properties.is_property_set, ("location", "normal")):
             layout.prop(self, name)
         draw_all(layout, self)
+        layout.prop(self, "tolerance")
 
 
 def report_error(operator, error):

@@ -14,6 +14,7 @@ from .operators import TACTILE_OT_reconstruct
 from .pick import TACTILE_OT_pick
 from .probe_operators import (
     TACTILE_OT_add_plane,
+    TACTILE_OT_add_planes,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
     TACTILE_OT_show_colours,
@@ -111,6 +112,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             _draw_verification(box, record["verification"], unit)
         if found is not None:
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
+            layout.operator(TACTILE_OT_add_planes.bl_idname, icon="PLUS")
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):

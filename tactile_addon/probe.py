@@ -133,7 +133,7 @@ def update(probe, depsgraph, complete):
     """
     settings, patch = probe.tactile_probe, patch_of(probe)
     try:
-        touched = _touch(probe, depsgraph, complete)
+        touched = touch_at(probe, depsgraph, complete)
     except ValueError as error:
         settings.message = sentence(error)
         if patch is not None:
@@ -158,7 +158,8 @@ def adopt(probe, touched, depsgraph, complete):
     _sign(probe, depsgraph)
 
 
-def _touch(probe, depsgraph, complete):
+def touch_at(probe, depsgraph, complete, **more):
+    """A touch with the probe's inputs. Raises ValueError, with a sentence, where there can be none."""
     settings, matrix, record = probe.tactile_probe, probe.matrix_world, record_of(probe)
     if settings.target is None:
         raise ValueError("the probe has no target: choose the mesh to touch")
@@ -178,6 +179,7 @@ def _touch(probe, depsgraph, complete):
         toward=list(matrix.col[2].xyz),
         tangent=list(matrix.col[0].xyz),
         **arguments,
+        **more,
     )
 
 

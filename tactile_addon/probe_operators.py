@@ -5,9 +5,11 @@
 import math
 
 import bpy
-from bpy.props import IntProperty
+from bpy.props import FloatProperty, IntProperty
 
-from . import patch_object, probe
+from . import patch_object, probe, units
+from .operators import report_error
+from .report import added_planes
 from .settings import MOST_PLANES
 
 
@@ -27,11 +29,8 @@ class _ProbeOperator:
         return True
 
 
-class TACTILE_OT_add_plane(_ProbeOperator, bpy.types.Operator):
-    """Feel along one more plane: the one that tells most of what is still open"""
-
-    bl_idname = "tactile.add_plane"
-    bl_label = "Add Suggested Plane"
+class _PlaneOperator(_ProbeOperator):
+    """Mixed into operators that add planes."""
 
     @classmethod
     def poll(cls, context):
@@ -42,17 +41,60 @@ class TACTILE_OT_add_plane(_ProbeOperator, bpy.types.Operator):
             return False
         return True
 
+
+class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
+    """Feel along one more plane: the one that tells most of what is still open"""
+
+    bl_idname = "tactile.add_plane"
+    bl_label = "Add Suggested Plane"
+
     def execute(self, context):
         found = probe.probe_of(context.view_layer.objects.active)
-        settings, record = found.tactile_probe, probe.record_of(found)
-        number = settings.plane_count
-        if record is not None and "suggested_plane" in record:
-            settings.azimuths[number] = math.radians(record["suggested_plane"]["azimuth"])
-            settings.tilts[number] = 0.0
-        settings.plane_count = number + 1
-        settings.active_plane = number
+        record = probe.record_of(found)
+        _add(found.tactile_probe, None if record is None else record.get("suggested_plane"))
         probe.refresh(found, context)
         return {"FINISHED"}
+
+
+class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
+    """Feel along more planes, each time the one that tells most, until it is enough or none would help"""
+
+    bl_idname = "tactile.add_planes"
+    bl_label = "Add Planes While They Help"
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="Standard deviation of the height that is good enough; 0 to go on while a plane helps",
+        subtype="DISTANCE",
+        soft_min=0.0,
+    )
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        depsgraph = context.evaluated_depsgraph_get()
+        try:
+            touched = probe.touch_at(found, depsgraph, complete=True, tolerance=self.tolerance)
+        except ValueError as error:
+            return report_error(self, error)
+        settings = found.tactile_probe
+        settings.is_probe = False  # not to be touched again for each of these
+        for plane in touched.report["added_planes"]:
+            _add(settings, plane)
+        probe.adopt(found, touched, depsgraph, complete=True)
+        settings.is_probe = True
+        unit = units.unit_of(context.scene, touched.result.radius)
+        self.report({"INFO"}, added_planes(touched.report, unit))
+        return {"FINISHED"}
+
+
+def _add(settings, suggested):
+    """One more plane, where it is suggested, or as it was there before."""
+    number = settings.plane_count
+    if suggested is not None:
+        settings.azimuths[number] = math.radians(suggested["azimuth"])
+        settings.tilts[number] = 0.0
+    settings.plane_count = number + 1
+    settings.active_plane = number
 
 
 class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
@@ -146,6 +188,7 @@ def shows_colours(space):
 
 OPERATORS = (
     TACTILE_OT_add_plane,
+    TACTILE_OT_add_planes,
     TACTILE_OT_remove_plane,
     TACTILE_OT_update,
     TACTILE_OT_delete,

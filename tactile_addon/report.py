@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The report of a reconstruction as a table for people, and errors as sentences."""
 
+from .units import say
+
 SPREAD = ("mean", "median", "max", "rms")
 # What core.verify finds, in the order of a table.
 VERIFIED = (
@@ -24,6 +26,7 @@ def readable(report):
         ("fit", f"{report['method']}, degree {report['degree']}"),
         ("contacts", contacts),
         *_lengths(report),
+        *([("more planes", added_planes(report, ("", 1.0)))] if report.get("added_planes") else []),
         ("point", _vector(report["frame"]["origin"])),
         ("normal", _vector(report["frame"]["normal"])),
         ("direction d1", _vector(report["frame"]["d1"])),
@@ -41,6 +44,16 @@ def readable(report):
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
     return _table(rows)
+
+
+def added_planes(report, unit):
+    """What more planes have brought, in the unit."""
+    added = report["added_planes"]
+    if not added:
+        return "No further plane would help much"
+    before, after = (say(added[i][key], 1, unit) for i, key in ((0, "height_std_before"), (-1, "height_std")))
+    azimuths = ", ".join(f"{plane['azimuth']:.0f}°" for plane in added)
+    return f"Planes added at {azimuths}: ± {before} has become ± {after}"
 
 
 def _tracked(report):

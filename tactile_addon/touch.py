@@ -10,13 +10,14 @@ from time import perf_counter
 import numpy as np
 
 from .. import core
-from .settings import STEEPEST
+from .settings import MOST_PLANES, STEEPEST
 from .surface import MeshSurface
 
 FARTHEST = 1.0 / 2.0  # of the object's largest dimension: of a half contour that ends by itself
 AWAY = 1.0 / 8.0  # of it, that the location may be off the surface where no extent is given
 FINEST = 1.0 / 128.0  # of it, a step where neither is given
 STEPS = 12  # of a half contour at least, where no step is given
+HELPS = 0.1  # of the mean deviation of the height, that one more plane is to take off
 BEYOND = 3.0  # times its own deviation, that a patch may be off the mesh in the mean
 ENDS = {
     core.UNEXPLAINED: "end where the patch could not be trusted any more",
@@ -49,7 +50,28 @@ class Touch:
         return self.surface is not None and self.is_complete
 
 
-def touch(
+def touch(obj, depsgraph, location, planes, *, tolerance=None, **inputs):
+    """A touch as `touch_along` gives, with more planes where a tolerance asks for them.
+
+    tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
+        added, up to MOST_PLANES, as long as one would take HELPS off. None for the given planes only.
+    """
+    touched = touch_along(obj, depsgraph, location, planes, **inputs)
+    added, farthest = [], touched.report["extent"]  # more planes are for a better patch, not for a larger one
+    while tolerance is not None and len(planes) < MOST_PLANES:
+        std, report = touched.result.mean_height_std, touched.report
+        plane = suggestion_report(touched.result, np.array(report["axes"]))
+        if std <= tolerance or plane["expected_height_std"] > (1.0 - HELPS) * std:
+            break
+        planes = [*planes, core.SamplingPlane(math.radians(plane["azimuth"]))]
+        touched = touch_along(obj, depsgraph, location, planes, farthest=farthest, **inputs)
+        after = touched.result.mean_height_std
+        added.append({"azimuth": plane["azimuth"], "height_std_before": std, "height_std": after})
+    touched.report["added_planes"] = added
+    return touched
+
+
+def touch_along(
     obj,
     depsgraph,
     location,
