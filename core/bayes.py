@@ -23,22 +23,9 @@ from numpy.typing import NDArray
 
 from .arguments import Array
 from .contour import cross
-from .evidence import (
-    FREE_PRECISION,
-    SCALE,
-    USUAL_WAVINESS,
-    Hyperparameters,
-    NormalEquations,
-    Restricted,
-    evidence,
-    evidence_with_slopes,
-    noises,
-    prior_variances,
-    restricted,
-)
-from .monge import monomials
-from .posterior import FREE, TERMS, Posterior
-from .slopes import slope_equations
+from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances, restricted
+from .posterior import FREE, Posterior
+from .system import hyperparameters, linear_system, posterior, prior_mean, solution
 
 MISFIT = 2e-3  # of the radius: no surface is a polynomial, so the noise is never less
 PASSES = 8  # at most: two that turn the frame to what they found, and more for what is outlying
@@ -47,21 +34,6 @@ UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by a
 LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
 OUTLYING = 5.0  # standard deviations
 STUDENT = 4.0  # degrees of freedom
-
-
-class _System(NamedTuple):
-    """Heights (b, n) ~ basis (b, n, 27) @ coefficients, less the prior's mean; and its normal equations.
-
-    gram (b, 27, 27) and seen (b, 27) are basis' basis and basis' heights, weighted. slopes (b, 2n, 27)
-    @ coefficients ~ steepness (b, 2n) in units of their deviation, weighted; None without normals.
-    """
-
-    basis: Array
-    heights: Array
-    gram: Array
-    seen: Array
-    slopes: Array | None = None
-    steepness: Array | None = None
 
 
 class _Touches(NamedTuple):
@@ -104,9 +76,9 @@ def joint_fit(
     touches = _Touches(contacts, given, tangent, np.maximum(accuracy, MISFIT), axes, k1, k2, weights)
     pending, found = np.arange(len(contacts)), []
     for step in range(PASSES):
-        touches, settled, posterior = _pass(touches, step)
-        if posterior is not None:
-            found.append((pending[settled], touches.axes[settled], *posterior))
+        touches, settled, surface = _pass(touches, step)
+        if surface is not None:
+            found.append((pending[settled], touches.axes[settled], *surface))
         if settled.all():
             break
         if not settled.any():
@@ -114,131 +86,48 @@ def joint_fit(
         touches, pending = _Touches(*(values[~settled] for values in touches)), pending[~settled]
     if len(found) == 1:  # all at once, as nearly always: in the order they came
         return found[0][1], Posterior(*found[0][2:])
-    order, turns, *posteriors = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order, turns, *surfaces = (np.concatenate(parts) for parts in zip(*found, strict=True))
     back = np.argsort(order)
-    return turns[back], Posterior(*(values[back] for values in posteriors))
+    return turns[back], Posterior(*(values[back] for values in surfaces))
 
 
 def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
     """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
-    prior_mean = np.array([_prior_mean(*pair) for pair in zip(touches.k1, touches.k2, strict=True)])
-    local = touches.contacts @ touches.axes
-    system = _system(local, touches.weights, prior_mean)
-    if touches.normals.shape[1]:
-        slopes, steepness = slope_equations(touches.normals @ touches.axes, local, touches.weights)
-        steepness -= (slopes @ prior_mean[..., None])[..., 0]
-        system = system._replace(slopes=slopes, steepness=steepness)
-    data = None if step == 0 else restricted(system.basis, system.heights, touches.weights)
-    if data is None:
-        waviness = np.full(len(prior_mean), USUAL_WAVINESS)
+    expected = np.array([prior_mean(*pair) for pair in zip(touches.k1, touches.k2, strict=True)])
+    local, normals = touches.contacts @ touches.axes, touches.normals @ touches.axes
+    system, data = linear_system(local, touches.weights, expected, normals), None
+    if step == 0:
+        waviness = np.full(len(expected), USUAL_WAVINESS)
         hyper = Hyperparameters(waviness, prior_variances(waviness), touches.floor)
-    elif system.slopes is None:
-        hyper = evidence(data, noises(data, touches.floor))
     else:
-        hyper = evidence_with_slopes(*_normal_equations(system, touches.weights), noises(data, touches.floor))
-    solution = _solution(system, hyper)
-    mean = prior_mean + solution
+        data = restricted(system.basis, system.heights, touches.weights)
+        hyper = hyperparameters(system, data, touches.weights, touches.floor)
+    found = solution(system, hyper)
+    mean = expected + found
     turned = [_turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
     axes, k1, k2, angle = (np.array(values) for values in zip(*turned, strict=True))
     # Outliers show against a surface in level axes.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
-    weights, settled, posterior = touches.weights, np.full(len(mean), step == PASSES - 1), None
+    weights, settled, surface = touches.weights, np.full(len(mean), step == PASSES - 1), None
     if data is not None and level.any():
-        residuals = system.heights - (system.basis @ solution[..., None])[..., 0]
+        residuals = system.heights - (system.basis @ found[..., None])[..., 0]
         weights = np.where(level[:, None], _student_weights(residuals, weights > 0.0, touches.floor), weights)
         settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED)
     if data is not None and settled.any():
         which = slice(None) if settled.all() else settled
-        posterior = _posterior(mean, system, data, hyper, touches.weights).at(which).turned(angle[which])
-        posterior.mean[:, [0, 1, 3]] = 0.0
-        posterior.mean[:, 2], posterior.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
-    return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, posterior
+        surface = posterior(mean, system, data, hyper, touches.weights).at(which).turned(angle[which])
+        surface.mean[:, [0, 1, 3]] = 0.0
+        surface.mean[:, 2], surface.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
+    return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, surface
 
 
 def posterior_of(k1: float, k2: float, contacts: Array, accuracy: float) -> Posterior:
     """What contacts (n, 3) say in a frame and about curvatures that are given; all in unit radius."""
-    weights, prior_mean = np.ones((1, len(contacts))), _prior_mean(k1, k2)[None]
-    system = _system(contacts[None], weights, prior_mean)
+    weights, expected = np.ones((1, len(contacts))), prior_mean(k1, k2)[None]
+    system = linear_system(contacts[None], weights, expected, contacts[None, :0])
     data = restricted(system.basis, system.heights, weights)
-    hyper = evidence(data, noises(data, np.array([max(accuracy, MISFIT)])))
-    return _posterior(prior_mean + _solution(system, hyper), system, data, hyper, weights).at(0)
-
-
-def _prior_mean(k1: float, k2: float) -> Array:
-    """The prior's mean, (27,): the quartic and sextic of a surface that goes on with its curvatures.
-
-    With Q = (k1 x^2 + k2 y^2) / 2 and G = |grad Q|^2 they are Q G / 4 and Q G^2 / 8, as on a sphere and
-    a cylinder. A torus, whose parallels have k2 at the point, has k1 k2^2 / 4 for x^2 y^2: here is the
-    mean of that and of the other case.
-    """
-    # Where the radius of curvature is less than L no surface goes on like that.
-    k1, k2 = (min(max(k, -1.0), 1.0) for k in (k1, k2))
-    a, b = k1**2, k2**2
-    mean = np.zeros(len(TERMS))
-    mean[9:14:2] = k1 * a / 8.0, (k1 * b + k2 * a) / 8.0, k2 * b / 8.0
-    mean[20:27:2] = (
-        k1 * a**2 / 16.0,
-        (2.0 * k1 * a * b + k2 * a**2) / 16.0,
-        (k1 * b**2 + 2.0 * k2 * a * b) / 16.0,
-        k2 * b**2 / 16.0,
-    )
-    return mean
-
-
-def _system(local: Array, weights: Array, prior_mean: Array) -> _System:
-    flat = local.reshape(-1, 3)
-    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
-    heights = local[..., 2] - (basis @ prior_mean[..., None])[..., 0]
-    weighted = np.swapaxes(weights[..., None] * basis, 1, 2)
-    return _System(basis, heights, weighted @ basis, (weighted @ heights[..., None])[..., 0])
-
-
-def _normal_equations(system: _System, weights: Array) -> tuple[NormalEquations, NormalEquations]:
-    """Of the heights and of the slopes."""
-    square = (weights * system.heights**2).sum(axis=1)
-    heights = NormalEquations(system.gram, system.seen, square, (weights > 0.0).sum(axis=1, dtype=float))
-    assert system.slopes is not None and system.steepness is not None
-    turned, steepness = np.swapaxes(system.slopes, 1, 2), system.steepness
-    return heights, NormalEquations(
-        turned @ system.slopes, (turned @ steepness[..., None])[..., 0], (steepness**2).sum(axis=1)
-    )
-
-
-def _solution(system: _System, hyper: Hyperparameters) -> Array:
-    """The likeliest coefficients less the prior's mean, (b, 27)."""
-    # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
-    precision = _precision(system, prior_variances(hyper.waviness), hyper.noise)
-    seen = (system.seen / hyper.noise[:, None] ** 2)[..., None]
-    if system.slopes is not None and system.steepness is not None:
-        seen = seen + np.swapaxes(system.slopes, 1, 2) @ system.steepness[..., None]
-    solution: Array = np.linalg.solve(precision, seen)
-    return solution[..., 0]
-
-
-def _posterior(
-    mean: Array, system: _System, data: Restricted, hyper: Hyperparameters, weights: Array
-) -> Posterior:
-    covariance = np.linalg.inv(_precision(system, hyper.variances, hyper.noise))
-    visibility = data.triangle * (SCALE / hyper.noise)[:, None, None]
-    if system.slopes is not None:
-        # What the slopes show of the free terms too: the QR of all there is, each in its deviation.
-        rows = np.concatenate(
-            [np.sqrt(weights)[..., None] * system.basis / hyper.noise[:, None, None], system.slopes], axis=1
-        )
-        triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
-        visibility = SCALE * triangle[:, FREE:, FREE:]
-    return Posterior(mean, covariance, hyper.noise, visibility)
-
-
-def _precision(system: _System, variances: Array, noise: Array) -> Array:
-    """(b, 27, 27), the inverse of the covariance."""
-    precision = system.gram / noise[:, None, None] ** 2
-    if system.slopes is not None:
-        precision = precision + np.swapaxes(system.slopes, 1, 2) @ system.slopes
-    diagonal = np.einsum("bii->bi", precision)  # a view
-    diagonal[:, :FREE] += FREE_PRECISION  # with that no contacts make it singular
-    diagonal[:, FREE:] += 1.0 / variances
-    return precision
+    hyper = hyperparameters(system, data, weights, np.array([max(accuracy, MISFIT)]))
+    return posterior(expected + solution(system, hyper), system, data, hyper, weights).at(0)
 
 
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:

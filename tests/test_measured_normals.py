@@ -9,7 +9,7 @@ import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import Contour, SamplingPlane, bayes, evidence, posterior, reconstruct, reconstruct_many, track
+from core import Contour, SamplingPlane, evidence, posterior, reconstruct, reconstruct_many, system, track
 from core.monge import monomials
 from core.slopes import slope_equations
 
@@ -181,12 +181,10 @@ def test_without_slopes_both_likelihoods_are_one():
     rng = np.random.default_rng(4)
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
-    system = bayes._system(local, weights, nothing)
-    data = evidence.restricted(system.basis, system.heights, weights)
-    noises = evidence.noises(data, np.array([2e-3]))
-    empty = system._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
-    one = evidence.evidence(data, noises)
-    other = evidence.evidence_with_slopes(*bayes._normal_equations(empty, weights), noises)
+    alone = system.linear_system(local, weights, nothing, local[:, :0])
+    data = evidence.restricted(alone.basis, alone.heights, weights)
+    empty = alone._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
+    one, other = (system.hyperparameters(s, data, weights, np.array([2e-3])) for s in (alone, empty))
     for a, b in zip(one, other, strict=True):
         assert b == pytest.approx(a, rel=1e-4)
 
