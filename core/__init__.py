@@ -6,6 +6,7 @@ Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the calle
 convex body has negative curvatures under its outward normal.
 """
 
+from .coefficients import SOLVERS
 from .common_point import common_point, in_running_order
 from .contour import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, UNEXPLAINED, Contour, SamplingPlane
 from .domain import Domain
@@ -13,7 +14,7 @@ from .exploration import Exploration, explore
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import azimuth_of, suggest_plane
-from .reconstruction import METHODS, SOLVERS, reconstruct, reconstruct_many
+from .reconstruction import METHODS, reconstruct, reconstruct_many
 from .registration import Pose, register
 from .result import Reconstruction, mean_height_stds
 from .sampling import spaced

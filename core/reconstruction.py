@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import fitting, tagc
 from .arguments import LARGEST, Array, finite_array, list_of, number, shown, unit_vector
 from .bayes import joint_fit
+from .coefficients import PAPER_METHODS, SOLVERS, coefficients
 from .contour import Contour
 from .domain import Domain, closed_spline_domain
 from .local_geometry import (
@@ -28,8 +28,7 @@ from .monge import MongePatch
 from .posterior import Posterior
 from .result import Reconstruction
 
-METHODS = ("bayes", "tagc", "quadratic-variation", "least-squares")
-SOLVERS = ("fast", "descent")
+METHODS = ("bayes", *PAPER_METHODS)
 DEFAULT_WEIGHT = 1000.0  # lambda L^2: the paper's 9.99/mm^2 at L = 10 mm
 COARSE = 1e-3  # of a touch: what rounding far from the origin may take; bayes.MISFIT has room for it
 STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache
@@ -127,6 +126,7 @@ class _Touch(NamedTuple):
     k2: float
     accuracy: float
     degree: int
+    posterior: Posterior | None  # of the joint fit, where that makes the patch
 
 
 def _options(
@@ -164,7 +164,7 @@ def _stack(
     found = iter(
         _framed(points[good], curves.at(good), normals[good], np.array(stds), options) if good else ()
     )
-    return [error or _result(*next(found), options) for error in errors]
+    return [error or _result(next(found), options) for error in errors]
 
 
 def _coarse(gap: float, size: float) -> DegenerateCurvesError:
@@ -174,24 +174,17 @@ def _coarse(gap: float, size: float) -> DegenerateCurvesError:
     )
 
 
-def _framed(
-    points: Array, curves: Curves, normals: Array, stds: Array, options: _Options
-) -> list[tuple[_Touch, Posterior | None]]:
-    """Touches in the Darboux frames that the method finds, with what the joint fit says of them."""
+def _framed(points: Array, curves: Curves, normals: Array, stds: Array, options: _Options) -> list[_Touch]:
+    """Touches in the Darboux frames that the method finds."""
     axes, k1, k2, radii = darboux_frames(curves, normals)
     local, tangents = curves.points @ axes[:, None] / radii[:, None, None, None], curves.tangents @ axes
     count, posteriors = len(points), None
     degrees = [options.degree or 0] * count
     if options.method == "bayes" or options.degree is None:
-        contacts, present = local.reshape(count, -1, 3), curves.present.reshape(count, -1)
-        measured = curves.normals
-        if measured is not None:
-            measured = (measured @ axes[:, None]).reshape(contacts.shape)
-        turns, fitted = joint_fit(
-            contacts, present.astype(float), k1, k2, tangents[:, 0], stds / radii, measured
-        )
+        turns, fitted = _joint(curves, local, axes, k1, k2, tangents[:, 0], stds / radii)
         if options.degree is None:
-            degrees = [fitted.at(i).degree_shown((contacts[i] @ turns[i])[present[i]]) for i in range(count)]
+            turned = local @ turns[:, None]
+            degrees = [fitted.at(i).degree_shown(turned[i][curves.present[i]]) for i in range(count)]
         if options.method == "bayes":
             axes, local, tangents = axes @ turns, local @ turns[:, None], tangents @ turns
             farthest = np.hypot(local[..., 0], local[..., 1]).max(axis=(1, 2))
@@ -199,25 +192,32 @@ def _framed(
             posteriors = fitted.scaled(1.0 / farthest)
     curves = Curves(local, curves.present, curves.along, tangents, curves.curvatures)
     return [
-        (
-            _Touch(
-                Frame(points[i], axes[i]),
-                float(radii[i]),
-                curves.at(i),
-                float(k1[i]),
-                float(k2[i]),
-                float(stds[i] / radii[i]),
-                degrees[i],
-            ),
+        _Touch(
+            Frame(points[i], axes[i]),
+            float(radii[i]),
+            curves.at(i),
+            float(k1[i]),
+            float(k2[i]),
+            float(stds[i] / radii[i]),
+            degrees[i],
             posteriors and posteriors.at(i),
         )
         for i in range(count)
     ]
 
 
-def _result(
-    touch: _Touch, posterior: Posterior | None, options: _Options
-) -> Reconstruction | DegenerateCurvesError:
+def _joint(
+    curves: Curves, local: Array, axes: Array, k1: Array, k2: Array, tangent: Array, accuracy: Array
+) -> tuple[Array, Posterior]:
+    """The joint fit of all the contacts of each touch."""
+    contacts, present = local.reshape(len(local), -1, 3), curves.present.reshape(len(local), -1)
+    normals = curves.normals
+    if normals is not None:
+        normals = (normals @ axes[:, None]).reshape(contacts.shape)
+    return joint_fit(contacts, present.astype(float), k1, k2, tangent, accuracy, normals)
+
+
+def _result(touch: _Touch, options: _Options) -> Reconstruction | DegenerateCurvesError:
     try:
         domain = _domain(touch.curves)
     except ValueError:
@@ -226,13 +226,12 @@ def _result(
             "turn the sampling planes, or move the point away from the edge"
         )
     converged = True
-    if posterior is None:
-        contacts = touch.curves.points[touch.curves.present]
-        data = fitting.problem(touch.k1, touch.k2, touch.degree, contacts)
-        a, converged = _coefficients(data, domain, touch.curves, options)
+    if touch.posterior is None:
+        paper = options.method, options.weight, options.solver
+        a, converged = coefficients(touch.curves, touch.k1, touch.k2, touch.degree, domain, *paper)
         patch = MongePatch(touch.k1, touch.k2, a)
     else:
-        patch = posterior.patch(touch.degree)
+        patch = touch.posterior.patch(touch.degree)
     return Reconstruction(
         frame=touch.frame,
         radius=touch.radius,
@@ -242,7 +241,7 @@ def _result(
         accuracy=touch.accuracy,
         method=options.method,
         converged=converged,
-        joint_posterior=posterior,
+        joint_posterior=touch.posterior,
     )
 
 
@@ -253,32 +252,3 @@ def _domain(curves: Curves) -> Domain:
     before, after = curves.present[:, 0] & (curves.along[:, 0] < 0.0), curves.along[rows, last] > 0.0
     ends = np.vstack([curves.points[before, 0], curves.points[rows, last][after & curves.present[:, 0]]])
     return closed_spline_domain(ends[:, :2], 1.0)
-
-
-def _half_curves(curves: Curves) -> list[Array]:
-    """The contacts (n_i, 3) on either side of the point, outward, by azimuth."""
-    halves = []
-    each = zip(curves.points, curves.present, curves.along, curves.tangents, strict=True)
-    for points, present, along, tangent in each:
-        for half, sign in (
-            (points[present & (along < 0.0)][::-1], -1.0),
-            (points[present & (along > 0.0)], 1.0),
-        ):
-            if len(half):
-                halves.append((np.arctan2(sign * tangent[1], sign * tangent[0]), half))
-    return [half for _, half in sorted(halves, key=lambda half: half[0])]
-
-
-def _coefficients(
-    data: fitting.Problem, domain: Domain, curves: Curves, options: _Options
-) -> tuple[Array, bool]:
-    """a of (1) by one of the paper's methods, and whether its solver converged."""
-    if options.method == "least-squares":
-        return fitting.least_squares(data), True
-    if options.method == "quadratic-variation":
-        return fitting.quadratic_variation(data, domain, options.weight), True
-    objective = tagc.Objective(data, domain, options.weight)
-    if options.solver == "descent":
-        return tagc.descent_minimum(objective, fitting.tagc_start(data, _half_curves(curves)))
-    # On convex surfaces (9) has many minima: from the quadric they are lower than from the paper's start.
-    return tagc.newton_minimum(objective, np.zeros(data.basis.shape[1]))
