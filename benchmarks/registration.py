@@ -29,7 +29,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import core
-from core import registration
+from core import registration, triangles
 
 from . import SCANS_FOLDER, machine
 from .accuracy import table
@@ -132,7 +132,7 @@ class Exhaustive:
         """Poses, the best first, and their residuals."""
         axes, origins = self.places(r.contacts)
         touch = np.array([r.contacts / r.radius, r.patch.normal(*r.contacts[:, :2].T)])
-        mesh = registration._mesh(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
+        mesh = triangles.mesh_of(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
         places = np.concatenate([axes, origins[..., None] / r.radius], axis=2)
         for neighbours in (1, registration.NEAREST):
             places, residuals, _ = registration._descended(places, touch, mesh, neighbours, 10)
