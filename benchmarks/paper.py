@@ -140,7 +140,7 @@ def scan_places(extension):
     from mathutils import Matrix
 
     for scan in SCANS[:4]:
-        extension.tactile_addon.command_line.open_file(SCANS_FOLDER / scan.file)
+        extension.tactile_addon.mesh_file.open_file(SCANS_FOLDER / scan.file)
         (obj,) = bpy.context.scene.objects
         obj.data.transform(Matrix.Scale(scan.scale, 4))
         surface = extension.tactile_addon.surface.MeshSurface(obj, bpy.context.evaluated_depsgraph_get())

@@ -55,7 +55,7 @@ def _touches(extension, path, share, count):
     import bpy
     import numpy as np
 
-    extension.tactile_addon.command_line.open_file(path)
+    extension.tactile_addon.mesh_file.open_file(path)
     obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
     size = extension.tactile_addon.surface.MeshSurface(obj, depsgraph).size
     areas = np.array([face.area for face in obj.data.polygons])

@@ -84,7 +84,7 @@ def _rows(extension, scan, data):
     """A line of the table for each method."""
     import bpy
 
-    extension.tactile_addon.command_line.open_file(data / scan.file)
+    extension.tactile_addon.mesh_file.open_file(data / scan.file)
     touched = (bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get(), scan.location)
     planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
     lengths = {"extent": scan.extent, "step": scan.extent / scan.steps, "noise": scan.noise}
@@ -111,7 +111,7 @@ def _random_row(extension, scan, data, count):
     import bpy
     import numpy as np
 
-    extension.tactile_addon.command_line.open_file(data / scan.file)
+    extension.tactile_addon.mesh_file.open_file(data / scan.file)
     obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
     areas = np.array([face.area for face in obj.data.polygons])
     planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]

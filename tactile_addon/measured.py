@@ -4,6 +4,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -46,24 +47,20 @@ def fit(source, contours, *, point=None, outward=None, flip=False, sensor_std=0.
 
     Raises ValueError with a sentence for the user.
     """
-    clock = [perf_counter()]
+    start = perf_counter()
     if normal_std:
         contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
     distances = None
     if point is None:
         point, distances = core.common_point(contours)
     contours = [core.in_running_order(contour, point) for contour in contours]
-
-    def reconstructed(side):
-        return core.reconstruct(point, contours, outward=side, sensor_std=sensor_std or None, **options)
-
-    result = reconstructed(outward or _mean_normal(contours))
+    reconstruct = partial(core.reconstruct, point, contours, sensor_std=sensor_std or None, **options)
+    result = reconstruct(outward=outward or _mean_normal(contours))
     bulges = (result.patch.k1 + result.patch.k2) * result.radius
     unknown = outward is None and not any(c.normals is not None for c in contours)
     if flip is not (unknown and bulges > FLAT):
-        result = reconstructed(-result.frame.axes[:, 2])
-    clock.append(perf_counter())
-    axes = reference_axes(result.frame.axes[:, 2])
+        result = reconstruct(outward=-result.frame.axes[:, 2])
+    seconds, axes = perf_counter() - start, reference_axes(result.frame.axes[:, 2])
     report = {
         "source": source,
         "method": options["method"],
@@ -73,7 +70,7 @@ def fit(source, contours, *, point=None, outward=None, flip=False, sensor_std=0.
         "axes": axes.tolist(),
         "vertices": 0,
         "suggested_plane": suggestion_report(result, axes),
-        "seconds": {"fit": clock[1] - clock[0]},
+        "seconds": {"fit": seconds},
     }
     if distances is not None:
         report["misses"] = distances.tolist()

@@ -46,7 +46,7 @@ def touch(extension, mesh=""):
     import bpy
 
     if mesh:
-        extension.tactile_addon.command_line.open_file(Path(mesh))
+        extension.tactile_addon.mesh_file.open_file(Path(mesh))
         target = next(o for o in bpy.context.scene.objects if o.type == "MESH" and len(o.data.polygons))
         corners = np.array([target.matrix_world @ type(target.location)(c) for c in target.bound_box])
         location, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
