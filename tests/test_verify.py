@@ -148,13 +148,13 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     settings.system, settings.scale_length, settings.length_unit = "METRIC", 0.001, "MILLIMETERS"
     found = verified(empty, patch)
     unit = addon.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
-    head, *rows, points = addon.verification.table_of(found, unit)
+    head, *rows, points = addon.report.verification_table(found, unit)
     assert head == ("Distance", "Mesh", "Contacts")
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
     assert all(cell.endswith(" mm") for row in rows for cell in row[1:])
     assert rows[0][1] == f"{found['vertex_distance_mean']:.3g} mm"
     assert points == ("Points", str(found["vertices"]), "60")
-    assert dict(addon.verification.rows_of(found, unit))["Overlap"] == "100 %"
+    assert dict(addon.report.verification_rows(found, unit))["Overlap"] == "100 %"
 
 
 def test_what_is_written_on_the_mesh_where_that_is_asked_for(empty, patch):
