@@ -12,15 +12,14 @@ import surfaces
 from test_command_line import PLACE, command, files  # noqa: F401 (fixtures)
 from test_operator import datablocks, values
 
-from core import SamplingPlane, from_dict, track
+from core import from_dict
 
 SURFACE = surfaces.torus(40, 20, 0.6)
 HIDDEN = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})
 
 
 def contours_of(surface, noise=0.02):
-    planes = [SamplingPlane(np.radians(a)) for a in (0, 60, 120)]
-    return track(surface, surface.point, surface.normal, planes, extent=12, step=1, noise=noise, rng=1)
+    return surface.track(surfaces.planes((0, 60, 120)), noise=noise, rng=1)
 
 
 @pytest.fixture
