@@ -28,7 +28,7 @@ from core.domain import closed_spline_domain
 from core.monge import exponents, monomials
 from tests import surfaces
 
-from . import machine
+from . import machine, table
 from .peers import Fit, gaussian_process, jet, radial_basis
 
 # Surfaces and extents of their half curves. The sizes are such that the peers' errors come out like those
@@ -297,14 +297,6 @@ def milliseconds():
 
 
 # Tables ----------------------------------------------------------------------------------------------
-
-
-def table(head, rows):
-    print("|", " | ".join(head), "|")
-    print("|---" + "|--:" * (len(head) - 1) + "|")
-    for row in rows:
-        print("|", " | ".join(row), "|")
-    print()
 
 
 def exact_tables(scores, times):

@@ -19,7 +19,6 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -29,8 +28,7 @@ from core.verification import is_hidden
 from tests import surfaces
 from tools import blender, demo
 
-from . import ROOT, SCANS_FOLDER, accuracy, machine
-from .accuracy import table
+from . import ROOT, SCANS_FOLDER, accuracy, machine, table, timed
 from .scans import AZIMUTHS, SCANS
 
 OUTPUT = ROOT / "build" / "paper"
@@ -179,11 +177,9 @@ class Fit(NamedTuple):
 def fitted(place, method, seed, lean=0.0, **options):
     curves = place.contours(AZIMUTHS, seed, lean)
     weight = {TAGC: place.weight, QV: QV_WEIGHT}.get(method)
-    start = perf_counter()
-    r = core.reconstruct(
-        place.point, curves, outward=place.outward, method=method, **{"weight": weight, **options}
-    )
-    return Fit(r, _in_frame(r, curves), 1e3 * (perf_counter() - start))
+    options = {"outward": place.outward, "method": method, "weight": weight} | options
+    seconds, r = timed(core.reconstruct, place.point, curves, **options)
+    return Fit(r, _in_frame(r, curves), 1e3 * seconds)
 
 
 def _in_frame(r, curves):

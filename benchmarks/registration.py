@@ -31,8 +31,7 @@ from scipy.spatial.transform import Rotation
 import core
 from core import registration, triangles
 
-from . import SCANS_FOLDER, machine
-from .accuracy import table
+from . import SCANS_FOLDER, machine, table
 
 SCANS = ("pear.ply", "bottle_bleach.ply", "asteroid_eros.ply", "bone_femur_proximal.stl")
 SIZE, NOISE = 100.0, 0.1  # mm

@@ -36,6 +36,13 @@ def empty(extension):
     return bpy
 
 
+@pytest.fixture
+def ball(empty):
+    """A finely faceted sphere of radius 2, the active object."""
+    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
+    return empty.context.object
+
+
 @pytest.fixture(scope="session")
 def scans():
     """The folder of real scans."""

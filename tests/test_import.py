@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import surfaces
+from scenes import datablocks, positions, values
 from test_command_line import PLACE, command, files  # noqa: F401 (fixtures)
-from test_operator import datablocks, values
 
 from core import from_dict
 
@@ -61,7 +61,7 @@ def test_contacts_become_a_patch(empty, measured):
     assert list(patch.matrix_world.translation) == pytest.approx(report["frame"]["origin"], abs=1e-5)
     (lines,) = patch.children
     assert len(set(values(lines.data, "contact"))) == 25
-    assert np.isfinite(values(lines.data, "position", "vector", 3)).all()
+    assert np.isfinite(positions(lines.data)).all()
 
 
 @pytest.mark.parametrize("normals", [True, False], ids=["by normals", "by the bulge"])
@@ -118,7 +118,7 @@ def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):
     assert [report["k1"], report["k2"]] == pytest.approx([SURFACE.k1, SURFACE.k2], abs=2e-3)
     mesh = patch.children[0].data
     curve, contact = (values(mesh, name) for name in ("contour", "contact"))
-    points = values(mesh, "position", "vector", 3)
+    points = positions(mesh)
     for number in range(3):
         centres = points[(curve == number) & (contact >= 0)].reshape(-1, 6, 3).mean(axis=1)
         steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
@@ -253,7 +253,7 @@ def test_blenders_own_exporters_keep_vertices_and_colours(empty, measured, tmp_p
     vertices = [line.split() for line in lines if line.startswith("v ")]
     assert len(vertices) == count
     assert all(len(vertex) == 7 for vertex in vertices)
-    world = values(patch.data, "position", "vector", 3) @ np.array(patch.matrix_world)[:3, :3].T
+    world = positions(patch.data) @ np.array(patch.matrix_world)[:3, :3].T
     world += patch.matrix_world.translation
     assert np.array([v[1:4] for v in vertices], dtype=float) == pytest.approx(world, abs=1e-4)
     empty.ops.wm.ply_import(filepath=str(tmp_path / "p.ply"))
