@@ -97,12 +97,17 @@ def _touched(surface, planes, noise, seed, extent, turn):
     contours = track(surface, surface.point, axes[:, 2], sampling, noise=noise, rng=seed, **lengths)
     if any(contour.stops != ("extent", "extent") for contour in contours):
         return None
-    ends = np.vstack([contour.points[[0, -1]] for contour in contours]) - surface.point
-    domain = closed_spline_domain((ends @ axes)[:, :2], extent)
+    domain = domain_of(contours, surface.point, axes, extent)
     hold_out = above(surface, axes, kappas, domain.grid(HOLD_OUT)[0])
     if np.isnan(hold_out).any():
         return None
     return Case(surface.point, axes, kappas, contours, noise, hold_out)
+
+
+def domain_of(contours, point, axes, extent):
+    """What the contours' ends bound, in this frame."""
+    ends = np.vstack([contour.points[[0, -1]] for contour in contours]) - point
+    return closed_spline_domain((ends @ axes)[:, :2], extent)
 
 
 def darboux(surface):
