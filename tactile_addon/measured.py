@@ -5,7 +5,6 @@
 import math
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -82,8 +81,3 @@ def _mean_normal(contours):
     normals = [contour.normals for contour in contours if contour.normals is not None]
     mean = np.sum(np.vstack(normals), axis=0) if normals else np.zeros(3)
     return mean if mean.any() else np.array([0.0, 0.0, 1.0])
-
-
-def name_of(paths):
-    """What the patch is called after."""
-    return Path(paths[0]).name

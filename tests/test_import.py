@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import surfaces
 from scenes import datablocks, positions, values
-from test_command_line import PLACE, command, files  # noqa: F401 (fixtures)
+from test_command_line import PLACE
 
 from core import from_dict
 
@@ -272,7 +272,7 @@ def report_in(out):
     return json.loads(line)
 
 
-def test_fit_from_the_shell(command, empty, measured, tmp_path):  # noqa: F811
+def test_fit_from_the_shell(command, empty, measured, tmp_path):
     path = measured(unit="mm")
     for output in ("out.blend", "out.ply", "out.json"):
         code, out, err = command("fit", path, *FIT, "--output", tmp_path / output)
@@ -290,7 +290,7 @@ def test_fit_from_the_shell(command, empty, measured, tmp_path):  # noqa: F811
     assert empty.data.objects["scan.csv Patch"]["tactile"]["unit"] == "mm"
 
 
-def test_every_option_of_fit_arrives(command, empty, measured):  # noqa: F811
+def test_every_option_of_fit_arrives(command, empty, measured):
     empty.ops.wm.read_homefile(use_empty=True)
     path, point = measured(), [str(x) for x in SURFACE.point]
     options = ["--unit", "cm", "--point", *point, "--outward", *(str(-x) for x in SURFACE.normal)]
@@ -323,7 +323,7 @@ def test_every_option_of_fit_arrives(command, empty, measured):  # noqa: F811
         (["{folder}/scan.csv", "{folder}/no/scan.csv"], 1, "there is no file"),
     ],
 )
-def test_what_cannot_be_fitted(command, empty, measured, tmp_path, words, code, sentence):  # noqa: F811
+def test_what_cannot_be_fitted(command, empty, measured, tmp_path, words, code, sentence):
     measured()
     (tmp_path / "bad.csv").write_text("x,y,z\n1,two,3\n")
     (tmp_path / "ball.obj").write_text("")
@@ -333,7 +333,7 @@ def test_what_cannot_be_fitted(command, empty, measured, tmp_path, words, code, 
     assert "Traceback" not in out + err
 
 
-def test_simulated_contacts_from_the_shell_are_a_data_set(command, files):  # noqa: F811
+def test_simulated_contacts_from_the_shell_are_a_data_set(command, files):
     csv = files / "contacts.csv"
     code, out, _ = command(
         "reconstruct", files / "ball.ply", *PLACE, "--noise", "1e-3", "--contacts", csv, *FIT

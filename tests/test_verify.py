@@ -369,20 +369,17 @@ def test_one_undo_takes_all_of_it_back(empty, patch):
     assert empty.data.objects[name]["tactile"]["verification"]["target"] == "Larger"
 
 
-def test_from_the_shell(empty, extension, tmp_path, capfd):
+def test_from_the_shell(empty, command, tmp_path):
     ball, report, table = (tmp_path / name for name in ("ball.ply", "report.json", "table.csv"))
     add_ball(empty)
     empty.ops.wm.ply_export(filepath=str(ball))
-    main = extension.tactile_addon.command_line.main
     words = ["reconstruct", ball, "--location", *TOP, "--extent", 0.6]
-    assert main([str(word) for word in (*words, "--json", report, "--verify", table)]) == 0
-    out = capfd.readouterr().out
+    code, out, _ = command(*words, "--json", report, "--verify", table)
+    assert code == 0
     assert "(6) on more curves" in out
     assert "100 % of the area" in out
     found = json.loads(report.read_text())["verification"]
-    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
-    assert len(rows) == 1
-    (row,) = rows
+    (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())
     assert [row[key] for key in ("patch", "source", "target", "status")] == [
         "ball Patch",
         "ball",
@@ -394,16 +391,12 @@ def test_from_the_shell(empty, extension, tmp_path, capfd):
             length = "distance" in key or "error" in key
             assert float(row[f"{key} [unit of the file]" if length else key]) == value
     assert math.isclose(found["overlap"], 1.0)
-    assert main([str(word) for word in (*words, "--verify", tmp_path / "no" / "table.csv")]) == 1
-    assert 'to write "table.csv" to' in capfd.readouterr().err
+    code, _, err = command(*words, "--verify", tmp_path / "no" / "table.csv")
+    assert (code, 'to write "table.csv" to' in err) == (1, True)
     # Where no vertex is over the patch the cells are empty.
     empty.ops.wm.read_homefile(use_empty=True)
     empty.ops.mesh.primitive_plane_add(size=10.0)
-    words = ["reconstruct", "--location", 0.5, 0.2, 0, "--verify", table]
-    assert main([str(word) for word in words]) == 0
+    assert command("reconstruct", "--location", 0.5, 0.2, 0, "--verify", table)[0] == 0
     (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())
-    assert (row["vertices"], row["vertex_distance_mean [unit of the file]"], row["contacts"]) == (
-        "0",
-        "",
-        "72",
-    )
+    cells = [row[key] for key in ("vertices", "vertex_distance_mean [unit of the file]", "contacts")]
+    assert cells == ["0", "", "72"]
