@@ -74,15 +74,10 @@ def _touches(extension, path, share, count):
         _check_finite(report)
         if report["status"] != "ok":
             reasons[_kind(f"{report['status']}: {report['message']}")] += 1
-    warned = sum(report["status"] != "ok" for report in reports)
-    silent = [
-        report
-        for report in reports
-        if report["status"] == "ok"
-        and report.get("vertex_distance_mean", 0.0) > SILENT * report["height_std"]
-    ]
+    sure = [report for report in reports if report["status"] == "ok"]
+    silent = sum(report.get("vertex_distance_mean", 0.0) > SILENT * report["height_std"] for report in sure)
     name = f"{path.stem}, 1/{1 / share:.0f}"
-    numbers = len(reports), warned, count - len(reports), len(silent)
+    numbers = len(reports), len(reports) - len(sure), count - len(reports), silent
     return [name, *(f"{number}" for number in numbers), f"{1e3 * slowest:.0f}"], reasons
 
 

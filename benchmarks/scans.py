@@ -13,6 +13,7 @@ A second table does the same at random points (seeded) all over each scan, for t
 import argparse
 import math
 import sys
+from itertools import islice
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
@@ -111,15 +112,14 @@ def _rows(extension, scan, data):
         ]
 
 
-def _random_row(extension, scan, data, count):
-    """A line of the second table: medians over random points, by area, where both methods give a patch."""
+def _random_pairs(extension, scan, data, count):
+    """Reports of both methods at random points, where both give a patch."""
     import bpy
 
     extension.tactile_addon.mesh_file.open_file(data / scan.file)
     obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
     planes = sampling_planes(extension)
-    found = []
-    for index, location in random_places(obj, 4 * count):
+    for index, location in random_places(obj, count):
         touched = (extension, obj, depsgraph, location, planes)
         fit = {"seed": index, "degree": 4, **scan.lengths}
         try:
@@ -127,9 +127,12 @@ def _random_row(extension, scan, data, count):
         except ValueError:  # an edge or a hole: no touch
             continue
         if min(bayes["vertices"], tagc["vertices"]) >= LEAST_VERTICES:
-            found.append((bayes, tagc))
-        if len(found) == count:
-            break
+            yield bayes, tagc
+
+
+def _random_row(extension, scan, data, count):
+    """A line of the second table: medians over that many random points."""
+    found = list(islice(_random_pairs(extension, scan, data, 4 * count), count))
     ours, papers = (
         median(scan.scale * reports[i]["vertex_distance_mean"] for reports in found) for i in (0, 1)
     )
