@@ -110,18 +110,9 @@ class Stage:
         sun.matrix_world = place @ Matrix.Rotation(-0.7, 4, "X") @ Matrix.Rotation(-0.6, 4, "Y")
         for obj in overlays:
             obj.delta_location = 2.0 * width * view
-        self._render(OUTPUT / f"{name}.png")
+        self.scene.render.film_transparent, self.scene.render.image_settings.color_mode = True, "RGBA"
+        demo.photograph(self.scene, OUTPUT / f"{name}.png", SIZE, SIZE)
         bpy.data.objects.remove(sun)
-
-    def _render(self, path):
-        import bpy
-
-        render, cycles = self.scene.render, self.scene.cycles
-        render.engine, cycles.device, cycles.samples, cycles.use_denoising = "CYCLES", "CPU", 32, False
-        render.resolution_x = render.resolution_y = SIZE
-        render.film_transparent, render.filepath = True, str(path)
-        render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGBA"
-        bpy.ops.render.render(write_still=True)
 
 
 def draw_row(extension, place, r, contours):

@@ -1,8 +1,17 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tests see of a scene: the values of attributes, and which datablocks there are."""
+"""What tests see of a scene: what an operator made, the values of attributes, which datablocks there are."""
 
+import bpy
 import numpy as np
+
+
+def made(operator, record="tactile", **arguments):
+    """The object with such a record that an operator makes, and the record."""
+    before = set(bpy.data.objects)
+    assert operator(**arguments) == {"FINISHED"}
+    (obj,) = (obj for obj in set(bpy.data.objects) - before if record in obj)
+    return obj, obj[record].to_dict()
 
 
 def values(mesh, name, key="value", width=1):

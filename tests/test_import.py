@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import surfaces
-from scenes import datablocks, positions, values
+from scenes import datablocks, made, positions, values
 from test_command_line import PLACE
 
 from core import from_dict
@@ -40,10 +40,7 @@ def measured(extension, empty, tmp_path):
 
 
 def imported(bpy, path, **options):
-    before = set(bpy.data.objects)
-    assert bpy.ops.tactile.import_contacts(filepath=path, **options) == {"FINISHED"}
-    (patch,) = [obj for obj in set(bpy.data.objects) - before if "tactile" in obj]
-    return patch, patch["tactile"].to_dict()
+    return made(bpy.ops.tactile.import_contacts, filepath=path, **options)
 
 
 def test_contacts_become_a_patch(empty, measured):

@@ -16,7 +16,7 @@ import pytest
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import bmesh
 from mathutils import Euler, Matrix, Vector
-from scenes import datablocks, positions, values
+from scenes import datablocks, made, positions, values
 
 from tools import blender
 
@@ -27,10 +27,7 @@ TOUCH = {"location": TOP, "extent": 0.6, "step": 0.06}
 
 def reconstruct(bpy, **arguments):
     """Runs the operator and returns the new patch and its report."""
-    before = set(bpy.data.objects)
-    assert bpy.ops.tactile.reconstruct(**arguments) == {"FINISHED"}
-    (patch,) = [obj for obj in set(bpy.data.objects) - before if "tactile" in obj]
-    return patch, patch["tactile"].to_dict()
+    return made(bpy.ops.tactile.reconstruct, **arguments)
 
 
 def test_enabling_the_extension_imports_no_scipy():

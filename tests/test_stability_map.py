@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import bmesh
 from mathutils import Matrix
-from scenes import datablocks, positions, values
+from scenes import datablocks, made, positions, values
 
 import core
 
@@ -22,10 +22,7 @@ QUANTITIES = ("error", "height_std", "condition_number", "blind_share")
 
 def stability_map(bpy, **arguments):
     """Runs the operator; the painted copy and its record."""
-    before = set(bpy.data.objects)
-    assert bpy.ops.tactile.stability_map(**arguments) == {"FINISHED"}
-    (painted,) = set(bpy.data.objects) - before
-    return painted, painted["tactile_map"].to_dict()
+    return made(bpy.ops.tactile.stability_map, "tactile_map", **arguments)
 
 
 def grid(bpy, count, size=2.0):

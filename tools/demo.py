@@ -183,15 +183,22 @@ def render(patch, path, samples=32):
     import bpy
 
     scene = bpy.context.scene
-    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
-    scene.cycles.samples, scene.cycles.use_denoising = samples, False
-    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
-    scene.render.image_settings.file_format, scene.render.filepath = "PNG", str(path)
     towards = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
     (lines,) = patch.children
     patch.delta_location, lines.delta_location = towards, patch.matrix_world.to_3x3().inverted() @ towards
-    bpy.ops.render.render(write_still=True)
+    photograph(scene, path, WIDTH, HEIGHT, samples)
     patch.delta_location = lines.delta_location = (0.0, 0.0, 0.0)
+
+
+def photograph(scene, path, width, height, samples=32):
+    """Draws the scene as it is with Cycles, as .png."""
+    import bpy
+
+    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    scene.render.image_settings.file_format, scene.render.filepath = "PNG", str(path)
+    bpy.ops.render.render(write_still=True)
 
 
 if __name__ == "__main__":
