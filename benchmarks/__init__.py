@@ -9,6 +9,7 @@ import os
 import platform
 from importlib.metadata import version
 from pathlib import Path
+from time import perf_counter
 
 for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
     os.environ[f"{library}_NUM_THREADS"] = "1"  # read once, when numpy is imported
@@ -25,3 +26,19 @@ def machine(*packages):
         cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), cpu)
     versions = (f"{name} {version(name)}" for name in packages)
     return ", ".join([f"one thread, {cpu}; Python {platform.python_version()}", *versions])
+
+
+def timed(run, *args, **kwargs):
+    """Seconds that a call takes, and what it returns."""
+    start = perf_counter()
+    value = run(*args, **kwargs)
+    return perf_counter() - start, value
+
+
+def table(head, rows, left=1):
+    """Prints Markdown; so many columns are aligned to the left."""
+    print("|", " | ".join(head), "|")
+    print("|" + "---|" * left + "--:|" * (len(head) - left))
+    for row in rows:
+        print("|", " | ".join(row), "|")
+    print()

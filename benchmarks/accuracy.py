@@ -28,7 +28,7 @@ from core.domain import closed_spline_domain
 from core.monge import exponents, monomials
 from tests import surfaces
 
-from . import machine
+from . import machine, table
 from .peers import Fit, gaussian_process, jet, radial_basis
 
 # Surfaces and extents of their half curves. The sizes are such that the peers' errors come out like those
@@ -97,12 +97,17 @@ def _touched(surface, planes, noise, seed, extent, turn):
     contours = track(surface, surface.point, axes[:, 2], sampling, noise=noise, rng=seed, **lengths)
     if any(contour.stops != ("extent", "extent") for contour in contours):
         return None
-    ends = np.vstack([contour.points[[0, -1]] for contour in contours]) - surface.point
-    domain = closed_spline_domain((ends @ axes)[:, :2], extent)
+    domain = domain_of(contours, surface.point, axes, extent)
     hold_out = above(surface, axes, kappas, domain.grid(HOLD_OUT)[0])
     if np.isnan(hold_out).any():
         return None
     return Case(surface.point, axes, kappas, contours, noise, hold_out)
+
+
+def domain_of(contours, point, axes, extent):
+    """What the contours' ends bound, in this frame."""
+    ends = np.vstack([contour.points[[0, -1]] for contour in contours]) - point
+    return closed_spline_domain((ends @ axes)[:, :2], extent)
 
 
 def darboux(surface):
@@ -299,35 +304,30 @@ def milliseconds():
 # Tables ----------------------------------------------------------------------------------------------
 
 
-def table(head, rows):
-    print("|", " | ".join(head), "|")
-    print("|---" + "|--:" * (len(head) - 1) + "|")
-    for row in rows:
-        print("|", " | ".join(row), "|")
-    print()
+CELLS = [(planes, noise) for planes in EXACT_PLANES for noise in NOISES]
 
 
-def exact_tables(scores, times):
-    cells = [(p, n) for p in EXACT_PLANES for n in NOISES]
+def median_of(scores, value, planes, noise):
+    """The median over surfaces of the mean over seeds."""
+    of = [[value(s) for k, s in scores.items() if k[:3] == (name, planes, noise)] for name in SURFACES]
+    return float(np.median([np.mean(v) for v in of]))
 
-    def median_of(value, planes, noise):
-        """The median over surfaces of the mean over seeds."""
-        of = [[value(s) for k, s in scores.items() if k[:3] == (name, planes, noise)] for name in SURFACES]
-        return float(np.median([np.mean(v) for v in of]))
 
-    def over(measure, method, planes, noise):
-        return median_of(lambda s: getattr(s[method], measure), planes, noise)
+def median_score(scores, measure, method, planes, noise):
+    return median_of(scores, lambda s: getattr(s[method], measure), planes, noise)
 
+
+def error_table(scores, times):
     def row(method):
         errors = np.array([s[method].error for s in scores.values()])
         alone = np.array([s[QUADRIC].error for s in scores.values()])
         mean = np.mean([
-            np.mean([s[method].error for k, s in scores.items() if k[1:3] == cell]) for cell in cells
+            np.mean([s[method].error for k, s in scores.items() if k[1:3] == cell]) for cell in CELLS
         ])  # fmt: skip
         worst = np.max((errors - 2.0) / np.maximum(alone, 1e-9)) if method != QUADRIC else 1.0
         return [
             method,
-            *(f"{over('error', method, *cell):.0f}" for cell in cells),
+            *(f"{median_score(scores, 'error', method, *cell):.0f}" for cell in CELLS),
             f"{mean:.0f}",
             f"{worst:.2f}" if worst < 10.0 else "> 10",
             *(f"{t:.2f}" for t in times[method]),
@@ -336,10 +336,12 @@ def exact_tables(scores, times):
     print("(a) Exact surfaces: mean |dz| in um, medians over surfaces of the mean over seeds, for noise of")
     print("0, 0.02 and 0.1 mm. `mean`: of all, each plane set and noise counting alike. `worst`: the worst")
     print("case less 2 um, as a multiple of the quadric alone there.\n")
-    head = ["method", *(f"{p}, {n:g}" for p, n in cells), "mean", "worst", "fit, ms", "and hold-out"]
-    limit = [f"{median_of(lambda s: s['limit'], *cell):.0f}" for cell in cells]
+    head = ["method", *(f"{p}, {n:g}" for p, n in CELLS), "mean", "worst", "fit, ms", "and hold-out"]
+    limit = [f"{median_of(scores, lambda s: s['limit'], *cell):.0f}" for cell in CELLS]
     table(head, [*(row(m) for m in METHODS), ["five terms through the noise alone", *limit, "", "", "", ""]])
 
+
+def frame_table(scores):
     print("Curvatures and normal: medians of the larger kappa error in 1e-3 / mm, and of degrees.\n")
     plane = EXACT_PLANES[0]
     head = ["method, 0/60/120", *(f"kappa, {n:g}" for n in NOISES), *(f"normal, {n:g}" for n in NOISES)]
@@ -347,18 +349,27 @@ def exact_tables(scores, times):
         m: m for m in METHODS if "jet" in m
     }
     rows = [
-        [name, *(f"{over(what, m, plane, n):.2f}" for what in ("kappa", "normal") for n in NOISES)]
+        [
+            name,
+            *(
+                f"{median_score(scores, what, m, plane, n):.2f}"
+                for what in ("kappa", "normal")
+                for n in NOISES
+            ),
+        ]
         for m, name in names.items()
     ]
-    bound = [f"{1e3 * median_of(lambda s: s['Cramér-Rao'], plane, n):.2f}" for n in NOISES]
+    bound = [f"{1e3 * median_of(scores, lambda s: s['Cramér-Rao'], plane, n):.2f}" for n in NOISES]
     table(head, [*rows, ["Cramér-Rao bound, degree 4", *bound, "", "", ""]])
 
+
+def interval_table(scores):
     print("90 % intervals of the default's height_std: share of the hold-out within, and median of mean")
     print("height_std over mean |dz|.\n")
     rows = []
-    for planes, noise in cells:
-        of = [s[BAYES] for k, s in scores.items() if k[1:3] == (planes, noise)]
-        rows.append([planes, f"{noise:g}", *_interval(of)])
+    for cell in CELLS:
+        of = [s[BAYES] for k, s in scores.items() if k[1:3] == cell]
+        rows.append([cell[0], f"{cell[1]:g}", *_interval(of)])
     table(["planes", "noise", "covered", "width"], rows)
 
 
@@ -417,7 +428,9 @@ def main():
     with ProcessPoolExecutor() as pool:
         exact = dict(zip(keys, pool.map(exact_scores, keys, chunksize=8), strict=True))
         random = list(pool.map(random_scores, range(options.shapes), chunksize=4))
-    exact_tables(exact, times)
+    error_table(exact, times)
+    frame_table(exact)
+    interval_table(exact)
     surface_table(exact)
     random_table(random)
     print(f"Seeds {options.seeds}, {options.shapes} shapes; {machine('numpy', 'scipy')}.")

@@ -17,18 +17,15 @@ import sys
 from functools import partial
 from importlib.util import find_spec
 from itertools import groupby
-from time import perf_counter
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.colors import to_rgb
-from matplotlib.patheffects import withStroke
 
 from core import SamplingPlane, track
-from core.domain import closed_spline_domain
 from tools import blender
 
-from . import accuracy, machine, peers, plot
+from . import accuracy, machine, peers, plot, timed
 
 QUICK_PLANES = accuracy.EXACT_PLANES[:1]
 SEEDS = 4  # of the noise, in the full run
@@ -37,7 +34,6 @@ REPEATED = 0.02  # seconds; a faster method is run three times more, for a media
 LEAST_COVERED = 0.9  # of the hold-out; a surface with less has failed
 DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}  # of modules that are called otherwise
 KAPPA, NORMAL = "kappa 1/mm", "normal degrees"
-LABEL_SIZE = 7.5
 TIME_LIMITS = (0.3, 300.0)  # of the axes
 OFF_SCALE = 400.0  # um; above are only names and values
 HEIGHT_LIMITS, KAPPA_LIMITS, NORMAL_LIMITS = (2.5, 1500.0), (5e-6, 0.3), (4e-4, 30.0)
@@ -173,8 +169,7 @@ def touch_of(name, planes, noise, seed):
         azimuths = np.pi * np.arange(count) / count + np.radians(accuracy.TURN)
         sampling = [SamplingPlane(azimuth) for azimuth in azimuths]
         contours[count] = track(surface, case.point, case.axes[:, 2], sampling, rng=number, **lengths)
-    ends = np.vstack([contour.points[[0, -1]] for contour in case.contours]) - case.point
-    flat, triangles = closed_spline_domain((ends @ case.axes)[:, :2], extent).triangulation(RINGS)
+    flat, triangles = accuracy.domain_of(case.contours, case.point, case.axes, extent).triangulation(RINGS)
     vertices = accuracy.above(surface, case.axes, case.kappas, flat)
     offsets = np.random.default_rng(number).normal(0.0, noise, len(vertices))
     offsets[0] = 0.0  # the point is exact, as in the contours
@@ -190,31 +185,25 @@ def fit_result(method, touch):
         x, y, z = (case.hold_out @ fit.axes).T
         return fit.height(x, y) - z
 
-    seconds, miss = timed(heights)
+    seconds, miss = typical(heights)
     covered = np.isfinite(miss)
     return seconds, (1e3 * np.abs(miss[covered]).mean() if covered.mean() >= LEAST_COVERED else np.nan,)
 
 
 def frame_result(method, touch):
     """Seconds, the larger error of the kappas (1/mm), the normal's (degrees)."""
-    seconds, (normal, kappas) = timed(lambda: method.run(touch))
+    seconds, (normal, kappas) = typical(lambda: method.run(touch))
     axis = touch.case.axes[:, 2]
     angle = np.arctan2(np.linalg.norm(np.cross(normal, axis)), normal @ axis)
     return seconds, (np.abs(np.subtract(kappas, touch.case.kappas)).max(), np.degrees(angle))
 
 
-def timed(run):
+def typical(run):
     """Seconds of a run, the median of three more where it is quick, and what it returned."""
-    start = perf_counter()
-    found = run()
-    seconds = [perf_counter() - start]
-    if seconds[0] < REPEATED:
-        seconds = []
-        for _ in range(3):
-            start = perf_counter()
-            run()
-            seconds.append(perf_counter() - start)
-    return float(np.median(seconds)), found
+    seconds, found = timed(run)
+    if seconds < REPEATED:
+        seconds = median(timed(run)[0] for _ in range(3))
+    return seconds, found
 
 
 def measure(methods, result, errors, touch):
@@ -295,15 +284,10 @@ def panel(axes, marks, noise, limits, off_scale=np.inf):
         face, edge = ("white", colour) if mark.more else (colour, "white")
         axes.plot(x, y, shape, mfc=face, mec=edge, ms=7.0, mew=0.8, zorder=3)
         places.append((x, y))
-        texts.append((text, dark(colour)))
+        texts.append((text, plot.dark(colour)))
     if beyond:
         axes.axhspan(off_scale, limits[1], color="#f3f3f3", zorder=0)
-    label(axes, texts, np.array(places))
-
-
-def dark(colour):
-    """For text, which is thinner than a mark."""
-    return tuple(0.72 * part for part in to_rgb(colour))
+    plot.label(axes, texts, np.array(places))
 
 
 def pareto(axes, marks):
@@ -315,47 +299,6 @@ def pareto(axes, marks):
             front.append((mark.x[1], best))
     x, y = zip(*front, (axes.get_xlim()[1], best), strict=True)
     axes.plot(x, y, drawstyle="steps-post", color="#999999", lw=1.2, ls="--", zorder=1)
-
-
-def label(axes, texts, places):
-    """Texts beside their places, joined to them by a line where it is seen."""
-    line = {"arrowstyle": "-", "lw": 0.4, "shrinkA": 0, "shrinkB": 2}
-    look = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": LABEL_SIZE}
-    halo = [withStroke(linewidth=1.8, foreground="white")]
-    moves = _moves(axes, [text for text, _ in texts], places)
-    for (text, colour), place, move in zip(texts, places, moves, strict=True):
-        arrow = {**line, "color": colour}
-        axes.annotate(text, place, move, color=colour, arrowprops=arrow, path_effects=halo, zorder=4, **look)
-
-
-def _moves(axes, texts, places):
-    """From the places to the centres of their texts, in points, so that these cover little else.
-
-    Each text in turn, four times over, takes the nearest of 80 positions that overlaps least.
-    """
-    to_points = 72.0 / axes.figure.dpi
-    marks = axes.transData.transform(places) * to_points
-    frame = np.array(axes.get_window_extent().extents) * to_points
-    sizes = LABEL_SIZE * np.array([(0.58 * len(text) + 0.3, 1.15) for text in texts])
-    turns = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
-    rings = np.array([[r, a] for r in (0.0, 5.0, 11.0, 18.0, 26.0) for a in turns])
-    directions = np.column_stack([np.cos(rings[:, 1]), np.sin(rings[:, 1])])
-    centres = marks.copy()
-    for _ in range(4):
-        for i, size in enumerate(sizes):
-            spots = marks[i] + directions * (size / 2.0 + 4.5 + rings[:, :1])
-            others = np.arange(len(sizes)) != i
-            cost = 3.0 * _overlap(spots, size, centres[others], sizes[others])
-            cost += 2.0 * _overlap(spots, size, marks, np.full(marks.shape, 7.0)) + rings[:, 0]
-            outside = np.maximum(frame[:2] - (spots - size / 2.0), spots + size / 2.0 - frame[2:])
-            centres[i] = spots[np.argmin(cost + 50.0 * np.maximum(outside, 0.0).sum(axis=1))]
-    return centres - marks
-
-
-def _overlap(spots, size, centres, sizes):
-    """The area of a box at each spot (m, 2) that other boxes cover."""
-    apart = np.abs(spots[:, None] - centres)
-    return np.prod(np.maximum((size + sizes) / 2.0 - apart, 0.0), axis=2).sum(axis=1)
 
 
 def key(axes, methods, columns=False):
@@ -372,7 +315,7 @@ def key(axes, methods, columns=False):
     for i, line, family, text in lines:
         (colour, shape), heading = LOOKS[family], text == family
         x, y = i / len(families) if columns else 0.0, 1.0 - (line + 0.5) * height
-        look = {"color": dark(colour), "weight": "bold" if heading else "normal", "fontsize": 8}
+        look = {"color": plot.dark(colour), "weight": "bold" if heading else "normal", "fontsize": 8}
         axes.text(x + 0.04, y, text, transform=axes.transAxes, va="center", **look)
         if heading:
             axes.plot(x + 0.01, y, shape, color=colour, ms=7.0, transform=axes.transAxes, clip_on=False)

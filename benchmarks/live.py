@@ -20,7 +20,7 @@ from time import perf_counter
 
 from tools import blender
 
-from . import machine
+from . import machine, table
 
 FACES = (10_000, 1_000_000)
 UPDATES = 101
@@ -81,7 +81,7 @@ def measure(bpy, update, clock, faces):
     once = (first, perf_counter() - start)
     stages = [median(run[stage] for run in runs) for stage in STAGES]
     cells = [f"{1e3 * seconds:.1f}" for seconds in (*stages, *once)]
-    return " | ".join([f"{len(obj.data.polygons)}", f"{len(patch.data.vertices)}", *cells])
+    return [f"{len(obj.data.polygons)}", f"{len(patch.data.vertices)}", *cells]
 
 
 def main():
@@ -100,12 +100,10 @@ def main():
     update = addon.probe.update
     addon.live.update = lambda probe, depsgraph, complete: update(probe, depsgraph, complete=False)
     columns = ("faces", "patch vertices", *STAGES, "first touch", "end of a gesture")
-    print(f"| {' | '.join(columns)} |\n|{'--:|' * len(columns)}")
-    for faces in FACES:
-        with blender.quiet():
-            row = measure(bpy, update, clock, faces)
-        print(f"| {row} |")
-    print(f"\nMilliseconds, medians of {UPDATES} updates; {machine('bpy')}.")
+    with blender.quiet():
+        rows = [measure(bpy, update, clock, faces) for faces in FACES]
+    table(columns, rows, left=0)
+    print(f"Milliseconds, medians of {UPDATES} updates; {machine('bpy')}.")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ from matplotlib.ticker import NullLocator
 
 from tools import blender
 
-from . import live, machine, plot
+from . import live, machine, plot, table, timed
 from .plot import plt
 
 FACES = (10_000, 40_000, 160_000, 490_000, 1_000_000, 4_000_000)  # squares, as the sheet is one
@@ -68,20 +68,14 @@ class Recorder:
         return self.surface.ray_cast(*ray)
 
 
-def seconds(call, *args, **kwargs):
-    start = perf_counter()
-    value = call(*args, **kwargs)
-    return perf_counter() - start, value
-
-
 def touch(core, surface, point, normal, azimuth=0.0):
     """Seconds of tracking three contours, and of that with the fit."""
     planes = [core.SamplingPlane(azimuth + math.pi * i / 3) for i in range(3)]
     lengths = {"extent": EXTENT, "step": EXTENT / STEPS}
-    tracking, contours = seconds(core.track, surface, point, normal, planes, **lengths)
+    tracking, contours = timed(core.track, surface, point, normal, planes, **lengths)
     if any(len(contour.points) != 2 * STEPS + 1 for contour in contours):
         raise RuntimeError("a contour of the sheet ended early")
-    return tracking, tracking + seconds(core.reconstruct, point, contours, outward=normal)[0]
+    return tracking, tracking + timed(core.reconstruct, point, contours, outward=normal)[0]
 
 
 def first_touch(extension, obj, depsgraph):
@@ -109,10 +103,10 @@ def touches(extension, obj, depsgraph, surface, point, normal):
         runs[TRACKING].append(tracking)
         runs[FIT].append(both)
         # The rays of other azimuths: where these ran, the processor's cache is still warm.
-        runs[OURS].append(seconds(cast_all, surface.ray_cast, rays[i - TOUCHES // 3])[0])
-        runs[CASTS].append(seconds(cast_bare, bare, rays[i - 2 * TOUCHES // 3])[0])
+        runs[OURS].append(timed(cast_all, surface.ray_cast, rays[i - TOUCHES // 3])[0])
+        runs[CASTS].append(timed(cast_bare, bare, rays[i - 2 * TOUCHES // 3])[0])
         if i % 10 == 0:
-            runs[READ].append(seconds(extension.tactile_addon.surface.MeshSurface, obj, depsgraph)[0])
+            runs[READ].append(timed(extension.tactile_addon.surface.MeshSurface, obj, depsgraph)[0])
     return {name: median(values) for name, values in runs.items()}, round(median(map(len, rays)))
 
 
@@ -131,7 +125,7 @@ def bisect(mesh, planes):
     import bmesh
 
     whole = bmesh.new()
-    making, _ = seconds(whole.from_mesh, mesh)
+    making, _ = timed(whole.from_mesh, mesh)
     start = perf_counter()
     for point, normal in planes:
         geometry = whole.verts[:] + whole.edges[:] + whole.faces[:]
@@ -145,9 +139,9 @@ def section(mesh, planes):
     """Seconds to make a Trimesh of the whole mesh, and for curves or bare segments in all planes."""
     from trimesh.intersections import mesh_plane
 
-    making, whole = seconds(triangles, mesh)
-    curves = sum(seconds(whole.section, normal, point)[0] for point, normal in planes)
-    segments = sum(seconds(mesh_plane, whole, normal, point)[0] for point, normal in planes)
+    making, whole = timed(triangles, mesh)
+    curves = sum(timed(whole.section, normal, point)[0] for point, normal in planes)
+    segments = sum(timed(mesh_plane, whole, normal, point)[0] for point, normal in planes)
     return {TO_TRIMESH: making, SECTION: curves, SEGMENTS: segments}
 
 
@@ -168,7 +162,7 @@ def measure(bpy, extension, faces):
     """Seconds by stage on a sheet of that many faces; and its true number of faces, and of rays."""
     obj = live.sheet(bpy, faces)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    first, (surface, point, normal) = seconds(first_touch, extension, obj, depsgraph)
+    first, (surface, point, normal) = timed(first_touch, extension, obj, depsgraph)
     stages, rays = touches(extension, obj, depsgraph, surface, point, normal)
     planes = [(point, extension.core.SamplingPlane(math.pi * i / 3).axes(normal)[:, 2]) for i in range(3)]
     for peer in PEERS:
@@ -179,18 +173,20 @@ def measure(bpy, extension, faces):
 
 def print_table(rows):
     columns = [name for name in COLUMNS if name in rows[0]]
-    print(f"Milliseconds.\n\n| faces | rays | {' | '.join(columns)} |\n|--:|--:|{'--:|' * len(columns)}")
-    for row in rows:
-        cells = (f"{1e3 * row[name]:.2f}" for name in columns)
-        print(f"| {row['faces']} | {row['rays']} | {' | '.join(cells)} |")
+    print("Milliseconds.\n")
+    cells = [
+        [f"{row['faces']}", f"{row['rays']}", *(f"{1e3 * row[name]:.2f}" for name in columns)] for row in rows
+    ]
+    table(["faces", "rays", *columns], cells, left=0)
     (row,) = (row for row in rows if row["faces"] == 1_000_000)
-    total, cast = 1e3 * row[FIT], 1e3 * row[CASTS]
-    print(
-        "\n| three contours of 22 steps on a mesh of 1M faces | total, ms | in Blender's ray casts | share |"
+    cast = row[CASTS]
+    table(
+        ["three contours of 22 steps on a mesh of 1M faces", "total, ms", "in Blender's ray casts", "share"],
+        [
+            [n, f"{1e3 * row[n]:.2f}", f"{1e3 * cast:.2f}", f"{100 * cast / row[n]:.0f} %"]
+            for n in (FIT, TRACKING)
+        ],
     )
-    print(f"|---|--:|--:|--:|\n| tracking and fit | {total:.2f} | {cast:.2f} | {100 * cast / total:.0f} % |")
-    total = 1e3 * row[TRACKING]
-    print(f"| tracking | {total:.2f} | {cast:.2f} | {100 * cast / total:.0f} % |\n")
 
 
 def draw(rows):
@@ -225,11 +221,11 @@ def main():
         print("trimesh is not installed and left out.\n")
     print_table(rows)
     header = ["faces", "rays", *(f"{name}, ms" for name in COLUMNS if name in rows[0])]
-    table = [
+    cells = [
         [row["faces"], row["rays"], *(f"{1e3 * row[name]:.4g}" for name in COLUMNS if name in row)]
         for row in rows
     ]
-    plot.save(draw(rows), "mesh_size", CAPTION.format(TOUCHES, machine("bpy")), header, table)
+    plot.save(draw(rows), "mesh_size", CAPTION.format(TOUCHES, machine("bpy")), header, cells)
     sys.stdout.flush()
     os._exit(0)  # Blender as a module may hang at exit
 

@@ -19,21 +19,17 @@ from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 
 import core
-from core.verification import is_hidden
 from tests import surfaces
-from tools import blender, demo
+from tools import blender
 
-from . import ROOT, SCANS_FOLDER, accuracy, machine
-from .accuracy import table
+from . import SCANS_FOLDER, accuracy, machine, paper_pictures, table, timed
 from .scans import AZIMUTHS, SCANS
 
-OUTPUT = ROOT / "build" / "paper"
 NOISE = 0.05  # of a contact; the paper's fits miss theirs by as much
 SEEDS = 9
 TURN = 60.0 / SEEDS  # degrees from seed to seed: no direction of the planes is a favoured one
@@ -41,6 +37,7 @@ NINE = (15.0, 30.0, 45.0, 75.0, 90.0, 105.0, 135.0, 150.0, 165.0)  # azimuths of
 LEAN = np.array([3.0, -2.0, 4.0])  # degrees from the normal to the planes, and multiples of it
 LEANS = (0.0, 1.0, 2.0, 4.0)
 DRAWN = 2.0  # of these, off by about as much as the paper's fit under no constraint
+DRAWN_ROWS = {"shell": "shell", "pear": "pear", "pebble": "lemon"}  # and what our pebble is
 NECK_EXTENT, NECK_STEPS = 11.7, 9
 VERTICES = 1500  # of an exact surface, about
 LEAST_SQUARES, TAGC, QV, BAYES = "least-squares", "tagc", "quadratic-variation", "bayes"
@@ -140,7 +137,7 @@ def scan_places(extension):
     from mathutils import Matrix
 
     for scan in SCANS[:4]:
-        extension.tactile_addon.command_line.open_file(SCANS_FOLDER / scan.file)
+        extension.tactile_addon.mesh_file.open_file(SCANS_FOLDER / scan.file)
         (obj,) = bpy.context.scene.objects
         obj.data.transform(Matrix.Scale(scan.scale, 4))
         surface = extension.tactile_addon.surface.MeshSurface(obj, bpy.context.evaluated_depsgraph_get())
@@ -179,11 +176,9 @@ class Fit(NamedTuple):
 def fitted(place, method, seed, lean=0.0, **options):
     curves = place.contours(AZIMUTHS, seed, lean)
     weight = {TAGC: place.weight, QV: QV_WEIGHT}.get(method)
-    start = perf_counter()
-    r = core.reconstruct(
-        place.point, curves, outward=place.outward, method=method, **{"weight": weight, **options}
-    )
-    return Fit(r, _in_frame(r, curves), 1e3 * (perf_counter() - start))
+    options = {"outward": place.outward, "method": method, "weight": weight} | options
+    seconds, r = timed(core.reconstruct, place.point, curves, **options)
+    return Fit(r, _in_frame(r, curves), 1e3 * seconds)
 
 
 def _in_frame(r, curves):
@@ -402,205 +397,17 @@ def _time(neck):
 
 # Pictures ----------------------------------------------------------------------------------------------
 
-CUT = 1.65  # radii around the reference point that are shown of a mesh
-TALL = 0.7  # extents above and below the point that are shown of the neck's patches
-DRAWN_ROWS = {"shell": "shell", "pear": "pear", "pebble": "lemon"}  # and what our pebble is
-SIZE = 480  # pixels of a picture in a sheet
-INKS = {
-    "black": (0.004, 0.004, 0.004, 1.0),
-    "red": (0.85, 0.01, 0.01, 1.0),
-    "blue": (0.01, 0.08, 0.6, 1.0),
-    "brown": (0.42, 0.18, 0.05, 1.0),
-}
-
-
-class Stage:
-    """A scene to fill and to photograph."""
-
-    def __init__(self, extension, scene):
-        self.patch_object, self.scene = extension.tactile_addon.patch_object, scene
-
-    def ink(self, name):
-        return self.patch_object.emission(name, colour=INKS[name])
-
-    def add(self, name, data, material=None):
-        import bpy
-
-        obj = bpy.data.objects.new(name, data)
-        if material is not None:
-            data.materials.append(material)
-        self.scene.collection.objects.link(obj)
-        return obj
-
-    def mesh(self, name, points, triangles, material=None, attributes=()):
-        import bpy
-
-        data = bpy.data.meshes.new(name)
-        self.patch_object.fill(data, points, triangles, list(attributes))
-        data.shade_smooth()
-        return self.add(name, data, material)
-
-    def line(self, points, thickness, material):
-        import bpy
-
-        data = bpy.data.curves.new("Line", "CURVE")
-        data.dimensions, data.bevel_depth, data.use_fill_caps = "3D", thickness, True
-        spline = data.splines.new("POLY")
-        spline.points.add(len(points) - 1)
-        spline.points.foreach_set("co", np.column_stack([points, np.ones(len(points))]).ravel())
-        return self.add("Line", data, material)
-
-    def dots(self, points, radius, material):
-        """A ball at each of points (n, 3)."""
-        import bmesh
-        import bpy
-
-        ball = bpy.data.meshes.new("Ball")
-        form = bmesh.new()
-        bmesh.ops.create_icosphere(form, subdivisions=2, radius=radius)
-        form.to_mesh(ball)
-        form.free()
-        corners, faces = (
-            np.array([v.co for v in ball.vertices]),
-            np.array([f.vertices for f in ball.polygons]),
-        )
-        balls = (points[:, None] + corners).reshape(-1, 3)
-        faces = (len(corners) * np.arange(len(points))[:, None, None] + faces).reshape(-1, 3)
-        return self.mesh("Dots", balls, faces, material)
-
-    def arrow(self, start, way, thickness, material):
-        import bpy
-        from mathutils import Vector
-
-        line = self.line(np.array([start, start + 0.8 * way]), thickness, material)
-        bpy.ops.mesh.primitive_cone_add(
-            radius1=3.0 * thickness,
-            depth=0.25 * np.linalg.norm(way),
-            location=start + 0.875 * way,
-            rotation=Vector(way).to_track_quat("Z", "Y").to_euler(),
-        )
-        bpy.context.object.data.materials.append(material)
-        return [line, bpy.context.object]
-
-    def photograph(self, name, centre, view, up, width, overlays=()):
-        """Renders to build/paper/NAME.png what is seen from `view`, with `up` upward.
-
-        Overlays come nearer for that, which an orthographic camera does not show.
-        """
-        import bpy
-        from mathutils import Matrix, Vector
-
-        view = Vector(view).normalized()
-        right = Vector(up).cross(view).normalized()
-        axes = Matrix((right, view.cross(right), view)).transposed()
-        place = Matrix.LocRotScale(Vector(centre) + 10.0 * width * view, axes, None)
-        camera = self.add("Camera", bpy.data.cameras.new("Camera"))
-        sun = self.add("Sun", bpy.data.lights.new("Sun", "SUN"))
-        self.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.35
-        camera.data.type, camera.data.ortho_scale, camera.data.clip_end = "ORTHO", width, 20.0 * width
-        camera.matrix_world, self.scene.camera = place, camera
-        sun.data.energy, sun.data.angle = 3.5, 0.3
-        sun.matrix_world = place @ Matrix.Rotation(-0.7, 4, "X") @ Matrix.Rotation(-0.6, 4, "Y")
-        for obj in overlays:
-            obj.delta_location = 2.0 * width * view
-        self._render(OUTPUT / f"{name}.png")
-        bpy.data.objects.remove(sun)
-
-    def _render(self, path):
-        import bpy
-
-        render, cycles = self.scene.render, self.scene.cycles
-        render.engine, cycles.device, cycles.samples, cycles.use_denoising = "CYCLES", "CPU", 32, False
-        render.resolution_x = render.resolution_y = SIZE
-        render.film_transparent, render.filepath = True, str(path)
-        render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGBA"
-        bpy.ops.render.render(write_still=True)
-
-
-def draw_row(extension, place):
-    """A row of Table I: the scan, alone in the scene, and its TAGC patch from outside and from inside."""
-    import bpy
-
-    scene = bpy.context.scene
-    (obj,) = scene.objects
-    stage, fit = Stage(extension, scene), fitted(place, TAGC, 0)
-    r, n = fit.result, fit.result.frame.axes[:, 2]
-    demo.look(scene, obj)
-    box = np.array(obj.bound_box)
-    up = np.array([0.0, 0.0, 1.0]) if abs(n[2]) < 0.8 else np.array([0.0, 1.0, 0.0])
-    size = float(np.linalg.norm(np.ptp(box, axis=0)))
-    spot = stage.dots(place.point[None], 0.022 * size, stage.ink("red"))
-    stage.photograph(f"{place.name}_1", box.mean(axis=0), n + 0.35 * up, up, 0.8 * size, [spot])
-    for gone in (obj, spot):
-        gone.hide_render = True
-    _cut(stage, obj, place, r)
-    plane, triangles = r.domain.triangulation(40)
-    surface = r.frame.to_world(np.column_stack([plane, r.patch.height(*plane.T)]))
-    stage.mesh("Patch", surface, triangles, stage.ink("black"))
-    red, brown, size = stage.ink("red"), stage.ink("brown"), r.radius
-    overlays = [stage.line(curve.points, 0.02 * size, red) for curve in place.contours(AZIMUTHS, 0)]
-    for axis in r.frame.axes.T:
-        overlays += stage.arrow(place.point, 0.75 * size * axis, 0.035 * size, brown)
-    stage.photograph(f"{place.name}_2", place.point, n - 0.6 * up, up, 3.6 * size, overlays)
-    stage.photograph(f"{place.name}_3", place.point, -n + 0.6 * up, up, 3.6 * size, overlays)
-
-
-def _cut(stage, obj, place, r):
-    """The mesh around the patch, each vertex coloured by its unit outward normal as R, G, B."""
-    mesh = obj.data
-    mesh.calc_loop_triangles()
-    points, normals = np.empty((2, len(mesh.vertices), 3), dtype=np.float32)
-    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-    mesh.vertices.foreach_get("co", points.ravel())
-    mesh.vertex_normals.foreach_get("vector", normals.ravel())
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    up, (x, y, z) = r.frame.axes[:, 2].tolist(), r.frame.to_local(points).T
-    near = (np.hypot(x, y) < CUT * r.radius) & (np.abs(z) < CUT * r.radius)
-    for i in np.flatnonzero(near):  # what lies below another layer is in the way of the view from inside
-        near[i] = not is_hidden(place.surface, points[i].tolist(), up, 2.0 * CUT * r.radius)
-    # Emission is in linear light, the colours meant are as seen.
-    colours = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
-    attributes = [("normal_colour", "FLOAT_COLOR", colours.astype(np.float32))]
-    material = stage.patch_object.emission("Normals", attribute="normal_colour")
-    stage.mesh("Mesh", points, triangles[near[triangles].all(axis=1)], material, attributes)
-
 
 def draw_neck(extension, neck):
-    """A patch by each method over the neck, with red contacts and blue verifying points; their errors.
-
-    Of the seeds, the one that puts TAGC in the middle.
-    """
-    import bpy
-
+    """Figures 3 and 4: of the seeds, the one that puts TAGC in the middle."""
     seed = int(np.argsort(figures(neck, TAGC, lean=DRAWN)[TAGC][:, 1])[SEEDS // 2])
     errors = {}
     for method in (LEAST_SQUARES, TAGC):
-        bpy.ops.wm.read_homefile(use_empty=True)
-        stage, fit = Stage(extension, bpy.context.scene), fitted(neck, method, seed, DRAWN)
-        r, nine = fit.result, _in_frame(fit.result, neck.contours(NINE, seed + 1000 * SEEDS))
-        plane, triangles = r.domain.triangulation(100)
-        patch = stage.mesh("Patch", np.column_stack([plane, r.patch.height(*plane.T)]), triangles)
-        _cut_off(patch.data, TALL * neck.extent)
-        demo.look(bpy.context.scene, patch)
-        stage.dots(fit.points, 0.04 * r.radius, stage.ink("red"))
-        stage.dots(nine, 0.022 * r.radius, stage.ink("blue"))
-        stage.photograph(method, (0, 0, -0.1 * r.radius), (-0.55, -0.7, 0.6), (0, 0, 1), 2.45 * r.radius)
+        r, points, _ = fitted(neck, method, seed, DRAWN)
+        nine = _in_frame(r, neck.contours(NINE, seed + 1000 * SEEDS))
+        paper_pictures.draw_neck(extension, method, r, points, nine)
         errors[method] = core.fit_error(r.patch, nine)
     return errors
-
-
-def _cut_off(mesh, height):
-    """What of the mesh is farther than that from z = 0 goes."""
-    import bmesh
-
-    form = bmesh.new()
-    form.from_mesh(mesh)
-    for sign in (1.0, -1.0):
-        geometry = [*form.verts, *form.edges, *form.faces]
-        plane = {"plane_co": (0.0, 0.0, sign * height), "plane_no": (0.0, 0.0, sign)}
-        bmesh.ops.bisect_plane(form, geom=geometry, clear_outer=True, **plane)
-    form.to_mesh(mesh)
-    form.free()
 
 
 def draw_sheets(scanned, errors):
@@ -611,7 +418,7 @@ def draw_sheets(scanned, errors):
             "black: the TAGC patch, where the mesh does not hide it · red lines: data curves\n"
             "brown arrows: the Darboux frame · the mesh: its unit normal as red, green, blue"
         )
-        sheet("table_1", pictures, titles, DRAWN_ROWS.values(), caption)
+        paper_pictures.sheet("table_1", pictures, titles, DRAWN_ROWS.values(), caption)
     titles = (
         f"no constraint (Figure 3b): {errors[LEAST_SQUARES]:.1f} mm off",
         f"TAGC (Figure 4): {errors[TAGC]:.2f} mm off",
@@ -619,28 +426,9 @@ def draw_sheets(scanned, errors):
     caption = (
         "large red balls: 57 contacts · small blue ones: 171 points on nine more curves, their mean miss"
         f" above\nplanes leaning {_degrees(DRAWN)} · the left patch goes on, cut off"
-        f" {TALL * NECK_EXTENT:.0f} mm above and below the point"
+        f" {paper_pictures.TALL:.0f} mm above and below the point"
     )
-    sheet("figures_3_4", [[LEAST_SQUARES, TAGC]], titles, (), caption)
-
-
-def sheet(name, pictures, column_titles, row_titles, caption):
-    """build/paper/NAME.jpg from the pictures of that folder, row by row, under their titles."""
-    from .plot import plt
-
-    rows, columns = len(pictures), len(pictures[0])
-    figure, axes = plt.subplots(rows, columns, figsize=(10, 10 * rows / columns + 0.9), squeeze=False)
-    for i, j in np.ndindex(rows, columns):
-        axes[i, j].imshow(plt.imread(OUTPUT / f"{pictures[i][j]}.png"), interpolation="lanczos")
-        axes[i, j].set(xticks=[], yticks=[], frame_on=False)
-        if i == 0:
-            axes[i, j].set_title(column_titles[j], fontsize=14)
-    for axis, title in zip(axes[:, 0], row_titles, strict=False):
-        axis.set_ylabel(title, fontsize=14)
-    inch = 1.0 / figure.get_figheight()
-    figure.subplots_adjust(0.03, 0.55 * inch, 1.0, 1.0 - 0.4 * inch, wspace=0.02, hspace=0.02)
-    figure.text(0.5, 0.08 * inch, caption, ha="center", va="bottom", fontsize=12)
-    figure.savefig(OUTPUT / f"{name}.jpg", dpi=100, facecolor="white", pil_kwargs={"quality": 88})
+    paper_pictures.sheet("figures_3_4", [[LEAST_SQUARES, TAGC]], titles, (), caption)
 
 
 # -------------------------------------------------------------------------------------------------------
@@ -663,7 +451,8 @@ def main():
             if place.name == NECK:
                 measured[SCANNED_NECK] = figures(place, *METHODS)
             elif draws:
-                draw_row(extension, place)
+                r = fitted(place, TAGC, 0).result
+                paper_pictures.draw_row(extension, place, r, place.contours(AZIMUTHS, 0))
         if draws:
             draw_sheets(scanned, draw_neck(extension, neck))
     print(_caption(), end="\n\n")
@@ -672,7 +461,7 @@ def main():
     print_figures(measured)
     print_table(tested)
     print_differences(neck, measured, tested)
-    print(f"Pictures: {OUTPUT}/*.jpg" if draws else "No pictures: matplotlib is missing.")
+    print(f"Pictures: {paper_pictures.OUTPUT}/*.jpg" if draws else "No pictures: matplotlib is missing.")
 
 
 def _caption():

@@ -18,9 +18,8 @@ from time import perf_counter
 
 from tools import blender
 
-from . import SCANS_FOLDER, machine
-from .accuracy import table
-from .scans import AZIMUTHS
+from . import SCANS_FOLDER, machine, table
+from .scans import random_places, sampling_planes
 
 SILENT = 5.0
 EXTENTS = (1.0 / 8.0, 1.0 / 32.0)  # of the object's size: the default, and one for details
@@ -53,17 +52,14 @@ def main():
 def _touches(extension, path, share, count):
     """A row of the table, and how often what was said."""
     import bpy
-    import numpy as np
 
-    extension.tactile_addon.command_line.open_file(path)
+    extension.tactile_addon.mesh_file.open_file(path)
     obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
     size = extension.tactile_addon.surface.MeshSurface(obj, depsgraph).size
-    areas = np.array([face.area for face in obj.data.polygons])
-    planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
+    planes = sampling_planes(extension)
     fit = {"extent": share * size, "step": 0.0, "noise": 0.0, "seed": 0, "method": "bayes", "degree": 4}
     reports, reasons, slowest = [], Counter(), 0.0
-    for index in np.random.default_rng(0).choice(len(areas), count, p=areas / areas.sum()):
-        location = obj.matrix_world @ obj.data.polygons[index].center
+    for _, location in random_places(obj, count):
         start = perf_counter()
         try:
             touched = extension.tactile_addon.touch.touch(obj, depsgraph, location, planes, **fit)
@@ -78,15 +74,10 @@ def _touches(extension, path, share, count):
         _check_finite(report)
         if report["status"] != "ok":
             reasons[_kind(f"{report['status']}: {report['message']}")] += 1
-    warned = sum(report["status"] != "ok" for report in reports)
-    silent = [
-        report
-        for report in reports
-        if report["status"] == "ok"
-        and report.get("vertex_distance_mean", 0.0) > SILENT * report["height_std"]
-    ]
+    sure = [report for report in reports if report["status"] == "ok"]
+    silent = sum(report.get("vertex_distance_mean", 0.0) > SILENT * report["height_std"] for report in sure)
     name = f"{path.stem}, 1/{1 / share:.0f}"
-    numbers = len(reports), warned, count - len(reports), len(silent)
+    numbers = len(reports), len(reports) - len(sure), count - len(reports), silent
     return [name, *(f"{number}" for number in numbers), f"{1e3 * slowest:.0f}"], reasons
 
 

@@ -19,7 +19,6 @@ import math
 import sys
 from pathlib import Path
 from statistics import median
-from time import perf_counter
 
 import bpy  # noqa: F401  brings mathutils
 import numpy as np
@@ -29,16 +28,16 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import core
-from core import registration
+from core import registration, triangles
+from tests import surfaces
 
-from . import SCANS_FOLDER, machine
-from .accuracy import table
+from . import SCANS_FOLDER, machine, table, timed
 
 SCANS = ("pear.ply", "bottle_bleach.ply", "asteroid_eros.ply", "bone_femur_proximal.stl")
 SIZE, NOISE = 100.0, 0.1  # mm
 SHARE = 0.2  # of the size, a half contour's extent
 STEPS = 12
-PLANES = [core.SamplingPlane(math.radians(azimuth)) for azimuth in (0.0, 60.0, 120.0)]
+PLANES = surfaces.planes((0, 60, 120))
 NEAR, TURN = 1.0, math.radians(2.0)  # mm
 AMBIGUOUS = 1.5
 FINE_TURNS = 36
@@ -132,7 +131,7 @@ class Exhaustive:
         """Poses, the best first, and their residuals."""
         axes, origins = self.places(r.contacts)
         touch = np.array([r.contacts / r.radius, r.patch.normal(*r.contacts[:, :2].T)])
-        mesh = registration._mesh(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
+        mesh = triangles.mesh_of(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
         places = np.concatenate([axes, origins[..., None] / r.radius], axis=2)
         for neighbours in (1, registration.NEAREST):
             places, residuals, _ = registration._descended(places, touch, mesh, neighbours, 10)
@@ -166,24 +165,7 @@ def _row(name, options):
     """A row of the table."""
     scan = Scan(name)
     exhaustive = Exhaustive(scan)
-    found = []
-    for r, *truth in scan.cases(options.cases):
-        start = perf_counter()
-        poses = core.register(r, scan.vertices, scan.faces)
-        middle = perf_counter()
-        others, residuals = exhaustive.search(r)
-        times = middle - start, perf_counter() - middle
-        rights = np.array([is_right(r, truth, other) for other in others])
-        limit = AMBIGUOUS * true_residual(r, *truth, scan)
-        case = (
-            bool((residuals[~rights] < limit).any()),
-            is_right(r, truth, (poses[0].rotation, poses[0].translation)),
-            poses[0].is_ambiguous,
-            bool(rights[0]),
-            bool(residuals[0] < 0.95 * poses[0].residual),
-            *times,
-        )
-        found.append(case)
+    found = [_outcome(scan, exhaustive, r, truth) for r, *truth in scan.cases(options.cases)]
     ambiguous, right, said, exhausted, better, seconds, long = map(np.array, zip(*found, strict=True))
     clear = ~ambiguous
     return [
@@ -201,6 +183,22 @@ def _row(name, options):
         f"{said[ambiguous].sum()}",
         f"{said[clear].sum()}",
     ]
+
+
+def _outcome(scan, exhaustive, r, truth):
+    """What comes of one case: five answers, and the seconds of both searches."""
+    seconds, (pose, *_) = timed(core.register, r, scan.vertices, scan.faces)
+    long, (others, residuals) = timed(exhaustive.search, r)
+    rights = np.array([is_right(r, truth, other) for other in others])
+    return (
+        bool((residuals[~rights] < AMBIGUOUS * true_residual(r, *truth, scan)).any()),
+        is_right(r, truth, (pose.rotation, pose.translation)),
+        pose.is_ambiguous,
+        bool(rights[0]),
+        bool(residuals[0] < 0.95 * pose.residual),
+        seconds,
+        long,
+    )
 
 
 if __name__ == "__main__":

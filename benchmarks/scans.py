@@ -13,13 +13,14 @@ A second table does the same at random points (seeded) all over each scan, for t
 import argparse
 import math
 import sys
+from itertools import islice
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
 from tools import blender
 
-from . import SCANS_FOLDER, machine
+from . import SCANS_FOLDER, machine, table
 
 METHODS = ("bayes", "tagc", "quadratic-variation", "least-squares")
 AZIMUTHS = (0.0, 60.0, 120.0)
@@ -38,6 +39,14 @@ class Scan(NamedTuple):
     noise: float
     unit: str
     scale: float
+
+    @property
+    def title(self):
+        return f"{self.name}, {self.scale * self.extent:g} {self.unit}"
+
+    @property
+    def lengths(self):
+        return {"extent": self.extent, "step": self.extent / self.steps, "noise": self.noise}
 
 
 # Chosen by renders and mesh curvature: the pear's belly, the lemon's side, the hollow shoulder under the
@@ -71,30 +80,28 @@ def main():
         extension = blender.start(options.zip)
         rows = [row for scan in scans for row in _rows(extension, scan, options.data)]
         touches = [_random_row(extension, scan, options.data, options.touches) for scan in scans]
-    print("| object, extent | method | contacts | fit error (6) | vertices | mean distance | max | ms |")
-    print("|---|---|--:|--:|--:|--:|--:|--:|")
-    print(*rows, "", _caption(), "", sep="\n")
+    head = "object, extent|method|contacts|fit error (6)|vertices|mean distance|max|ms"
+    table(head.split("|"), rows, left=2)
+    print(_caption(), end="\n\n")
     print(f"Medians over {options.touches} random touches. Calibration: distance over mean height std.\n")
-    print("| object, extent | bayes | tagc | ratio | height std | calibration | uncertain | ms |")
-    print("|---|--:|--:|--:|--:|--:|--:|--:|")
-    print(*touches, sep="\n")
+    head = "object, extent|bayes|tagc|ratio|height std|calibration|uncertain|ms"
+    table(head.split("|"), touches)
 
 
 def _rows(extension, scan, data):
     """A line of the table for each method."""
     import bpy
 
-    extension.tactile_addon.command_line.open_file(data / scan.file)
+    extension.tactile_addon.mesh_file.open_file(data / scan.file)
     touched = (bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get(), scan.location)
-    planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
-    lengths = {"extent": scan.extent, "step": scan.extent / scan.steps, "noise": scan.noise}
+    planes = sampling_planes(extension)
     for method in METHODS:
         fit = {"seed": 0, "method": method, "degree": 4}
-        reports = [_report(extension, *touched, planes, **lengths, **fit) for _ in range(RUNS + 1)]
+        reports = [_report(extension, *touched, planes, **scan.lengths, **fit) for _ in range(RUNS + 1)]
         seconds = [report["seconds"] for report in reports[1:]]
         report = reports[0]
-        cells = (
-            f"{scan.name}, {scan.scale * scan.extent:g} {scan.unit}",
+        yield [
+            scan.title,
             method,
             f"{report['contacts']}",
             f"{scan.scale * report['fit_error']:.4f}",
@@ -102,44 +109,30 @@ def _rows(extension, scan, data):
             f"{scan.scale * report['vertex_distance_mean']:.4f}",
             f"{scan.scale * report['vertex_distance_max']:.3f}",
             f"{1e3 * median(s['touch'] for s in seconds):.1f}",
-        )
-        yield f"| {' | '.join(cells)} |"
+        ]
 
 
-def _random_row(extension, scan, data, count):
-    """A line of the second table: medians over random points, by area, where both methods give a patch."""
+def _random_pairs(extension, scan, data, count):
+    """Reports of both methods at random points, where both give a patch."""
     import bpy
-    import numpy as np
 
-    extension.tactile_addon.command_line.open_file(data / scan.file)
+    extension.tactile_addon.mesh_file.open_file(data / scan.file)
     obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
-    areas = np.array([face.area for face in obj.data.polygons])
-    planes = [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
-    lengths = {"extent": scan.extent, "step": scan.extent / scan.steps, "noise": scan.noise}
-    found = []
-    for index in np.random.default_rng(0).choice(len(areas), 4 * count, p=areas / areas.sum()):
-        location = obj.matrix_world @ obj.data.polygons[index].center
+    planes = sampling_planes(extension)
+    for index, location in random_places(obj, count):
+        touched = (extension, obj, depsgraph, location, planes)
+        fit = {"seed": index, "degree": 4, **scan.lengths}
         try:
-            bayes, tagc = (
-                _report(
-                    extension,
-                    obj,
-                    depsgraph,
-                    location,
-                    planes,
-                    **lengths,
-                    seed=int(index),
-                    method=method,
-                    degree=4,
-                )
-                for method in ("bayes", "tagc")
-            )
+            bayes, tagc = (_report(*touched, method=method, **fit) for method in ("bayes", "tagc"))
         except ValueError:  # an edge or a hole: no touch
             continue
         if min(bayes["vertices"], tagc["vertices"]) >= LEAST_VERTICES:
-            found.append((bayes, tagc))
-        if len(found) == count:
-            break
+            yield bayes, tagc
+
+
+def _random_row(extension, scan, data, count):
+    """A line of the second table: medians over that many random points."""
+    found = list(islice(_random_pairs(extension, scan, data, 4 * count), count))
     ours, papers = (
         median(scan.scale * reports[i]["vertex_distance_mean"] for reports in found) for i in (0, 1)
     )
@@ -147,8 +140,8 @@ def _random_row(extension, scan, data, count):
     calibration = median(bayes["vertex_distance_mean"] / bayes["height_std"] for bayes, _ in found)
     uncertain = sum(bayes["status"] != "ok" for bayes, _ in found)
     touch = median(bayes["seconds"]["touch"] for bayes, _ in found)
-    cells = (
-        f"{scan.name}, {scan.scale * scan.extent:g} {scan.unit}",
+    return [
+        scan.title,
         f"{ours:.4f}",
         f"{papers:.4f}",
         f"{ours / papers:.2f}",
@@ -156,8 +149,20 @@ def _random_row(extension, scan, data, count):
         f"{calibration:.2f}",
         f"{uncertain} of {len(found)}",
         f"{1e3 * touch:.1f}",
-    )
-    return f"| {' | '.join(cells)} |"
+    ]
+
+
+def sampling_planes(extension):
+    return [extension.core.SamplingPlane(math.radians(azimuth)) for azimuth in AZIMUTHS]
+
+
+def random_places(obj, count):
+    """(face, its centre in the world), random by area but seeded."""
+    import numpy as np
+
+    areas = np.array([face.area for face in obj.data.polygons])
+    for index in np.random.default_rng(0).choice(len(areas), count, p=areas / areas.sum()).tolist():
+        yield index, obj.matrix_world @ obj.data.polygons[index].center
 
 
 def _report(extension, *place, **inputs):

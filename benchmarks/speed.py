@@ -12,7 +12,6 @@ surfaces, three plane sets, three noise levels, 75 contacts) it prints Markdown 
 """
 
 from statistics import median
-from time import perf_counter
 from typing import NamedTuple
 from unittest.mock import patch
 
@@ -21,7 +20,7 @@ from scipy.optimize import minimize
 
 from core import bayes, reconstruct, reconstruct_many, reconstruction, tagc
 
-from . import accuracy, machine
+from . import accuracy, machine, table, timed
 
 WITHIN = 1e-6  # of an objective
 TIGHT = {"maxiter": 1000, "ftol": 1e-12, "gtol": 1e-9}
@@ -46,12 +45,6 @@ def touches():
 
 def fit(case, **options):
     return reconstruct(case.point, case.contours, outward=case.axes[:, 2], **options)
-
-
-def timed(run, *arguments):
-    start = perf_counter()
-    value = run(*arguments)
-    return perf_counter() - start, value
 
 
 # (a) -------------------------------------------------------------------------------------------------
@@ -112,7 +105,7 @@ def solvers(cases):
         seconds = median(run[name].seconds for run in runs)
         mean = np.mean([run[name].value for run in runs])
         rows.append([name, f"{1e3 * seconds:.1f}", f"{slow / seconds:.1f}", f"{mean:.4f}"])
-    accuracy.table(["solver", "ms", "times as fast as the descent", "mean objective"], rows)
+    table(["solver", "ms", "times as fast as the descent", "mean objective"], rows)
     print(
         f"Newton against L-BFGS-B: within {WITHIN:g} of it in {len(same)} of {len(cases)}, lower in "
         f"{len(lower)}, higher, in another minimum, in {len(higher)}. From the paper's start Newton finds a "
@@ -138,7 +131,7 @@ def many(cases):
     at_once, one_by_one = np.median(runs, axis=0)
     print(f"(b) {len(copies)} fits of the default.\n")
     rows = [["reconstruct", f"{one_by_one:.0f}"], ["reconstruct_many", f"{at_once:.0f}"]]
-    accuracy.table(["", "fits a second"], rows)
+    table(["", "fits a second"], rows)
     print(f"The heights of the two differ by {off:.1g} of the radius at most.\n")
 
 
@@ -182,7 +175,7 @@ def parts(cases):
             each.stop()
     print("(c) One fit of the default: medians in ms.\n")
     rows = [[name, f"{1e3 * median(times):.2f}"] for name, times in spent.items()]
-    accuracy.table(["part", "ms"], [*rows, ["all", f"{1e3 * median(totals):.2f}"]])
+    table(["part", "ms"], [*rows, ["all", f"{1e3 * median(totals):.2f}"]])
 
 
 def main():

@@ -19,7 +19,7 @@ from time import perf_counter
 
 from tools import blender
 
-from . import machine
+from . import machine, table
 from .live import Clock, sheet
 
 CASES = [(10_000, 0.0), (100_000, 0.0), (100_000, 0.02), (1_000_000, 0.0)]  # faces, spacing
@@ -58,12 +58,10 @@ def main():
     clock.wrap(addon.stability.StabilityMap, "_note", "noting")
     clock.wrap(addon.stability.StabilityMap, "_error", "error")
     columns = ("faces", "points", "points/s", "tracking", "fit", "error", "thinning, paint", "once, s")
-    print(f"| {' | '.join(columns)} |\n|{'--:|' * len(columns)}")
-    for faces, spacing in CASES:
-        with blender.quiet():
-            row = measure(bpy, clock, faces, spacing)
-        print(f"| {' | '.join(row)} |")
-    print(f"\nMilliseconds a point, median of {RUNS} runs; {machine('bpy')}.")
+    with blender.quiet():
+        rows = [measure(bpy, clock, *case) for case in CASES]
+    table(columns, rows, left=0)
+    print(f"Milliseconds a point, median of {RUNS} runs; {machine('bpy')}.")
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,14 +69,8 @@ class Curves:
 
     def at(self, index: int | list[int]) -> "Curves":
         """Those of one touch, without the leading dimension, or of several."""
-        return Curves(
-            self.points[index],
-            self.present[index],
-            self.along[index],
-            self.tangents[index],
-            self.curvatures[index],
-            None if self.normals is None else self.normals[index],
-        )
+        parts: list[Any] = [part if part is None else part[index] for part in vars(self).values()]
+        return Curves(*parts)
 
 
 def stacked(
@@ -89,21 +84,17 @@ def stacked(
     curves = max([1, *(len(contours) for contours in touches)])
     longest = max([1, *(len(contour.points) for contours in touches for contour in contours)])
     r = np.zeros((len(touches), curves, longest, 3))
-    present = np.zeros(r.shape[:3], dtype=bool)
+    present, measured = np.zeros(r.shape[:3], dtype=bool), np.zeros_like(r)
     for i, contours in enumerate(touches):
         for j, contour in enumerate(contours):
-            r[i, j, : len(contour.points)] = contour.points - points[i]
-            present[i, j, : len(contour.points)] = True
-    if not any(has_measured_normals(contours) for contours in touches):
-        return r, present, None
-    measured = np.zeros_like(r)
-    for i, contours in enumerate(touches):
-        for j, contour in enumerate(contours):
+            count = len(contour.points)
+            r[i, j, :count] = contour.points - points[i]
+            present[i, j, :count] = True
             if contour.normals is not None and contour.normal_std is not None:
                 normals = contour.normals / np.abs(contour.normals).max(axis=1, keepdims=True)
                 normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-                measured[i, j, : len(normals)] = normals / max(contour.normal_std, EXACT)
-    return r, present, measured
+                measured[i, j, :count] = normals / max(contour.normal_std, EXACT)
+    return r, present, measured if any(map(has_measured_normals, touches)) else None
 
 
 def has_measured_normals(contours: Sequence[Contour]) -> bool:
@@ -209,9 +200,7 @@ def principal_curvatures(
     in unit radius) d1 is at angle 0.
     """
     phi, kappa = np.asarray(angles, dtype=float), np.asarray(curvatures, dtype=float)
-    rows = np.stack(
-        [known * np.ones_like(phi), known * np.cos(2.0 * phi), known * np.sin(2.0 * phi)], axis=-2
-    )
+    rows = np.stack([known * f for f in (np.ones_like(phi), np.cos(2.0 * phi), np.sin(2.0 * phi))], axis=-2)
     solution = np.linalg.solve(rows @ np.swapaxes(rows, -1, -2), rows @ kappa[..., None])
     mean, a, b = solution[..., 0, 0], solution[..., 1, 0], solution[..., 2, 0]
     half = np.hypot(a, b)
@@ -231,9 +220,8 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
     e2 = np.array(cross(n.T, e1.T)).T
     plane = np.array([e1.T, e2.T]).transpose(2, 1, 0)
     flat = curves.points @ plane[:, None]
-    radius = np.sqrt(
-        np.max(np.einsum("...i,...i->...", flat, flat), axis=(1, 2), where=curves.present, initial=0.0)
-    )
+    squares = np.einsum("...i,...i->...", flat, flat)
+    radius = np.sqrt(np.max(squares, axis=(1, 2), where=curves.present, initial=0.0))
     # Meusnier with its sign: the normal curvature is the normal part of the curvature vector,
     # kappa' cos(theta) in the paper's words.
     kappas = radius[:, None] * np.einsum("bci,bi->bc", curves.curvatures, n)

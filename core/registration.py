@@ -10,7 +10,6 @@ mesh as columns, and its origin.
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,11 +18,10 @@ from .arguments import LARGEST, Array, finite_array, shown
 from .monge import exponents, monomials
 from .result import Reconstruction
 from .sampling import spaced
+from .triangles import Mesh, corners_of, mesh_distances, mesh_of
 
 # A touch is an array (2, n, 3): contacts, and the patch's unit normals there, in the frame.
 # Lengths are in units of the patch's radius.
-LARGEST_MESH = 40.0
-LONGEST_EDGE = 0.25  # longer ones are halved: a patch covers a hundred triangles
 SPACING = 0.1  # of the points a polynomial is fitted to
 MOST_POINTS = 400
 PLACES = 0.2  # between the places that are tried
@@ -34,12 +32,10 @@ CONTACTS = 60  # of the coarse search, at most
 COARSE, COARSE_STEPS = 400, 8  # places that move to the planes of the nearest triangles
 FINE, FINE_STEPS = 24, 20  # and of them to the triangles themselves
 NEAREST = 16  # triangles that are measured
-FACING = 0.05  # what a right angle between normals counts, about, as a distance to a triangle
 APART, TURN = 0.05, math.radians(2.0)  # poses that differ by less are one
 AMBIGUOUS = 1.5  # times the residual is about as good
 SIGNIFICANT = 3.0  # standard deviations
 LEAST_RESIDUAL = 1e-3  # less is none: the mesh's own facets
-TOUCHING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -60,16 +56,6 @@ class Pose:
     is_ambiguous: bool
 
 
-class _Mesh(NamedTuple):
-    """Triangles (m, 3, 3) of like size, unit normals, centres and smooth normals there (m, 3), a tree."""
-
-    triangles: Array
-    normals: Array
-    centres: Array
-    smooth: Array
-    tree: Any
-
-
 def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: int = 5) -> list[Pose]:
     """The poses that bring a touch's contacts nearest to a mesh, the best first; `best` of them at most.
 
@@ -81,10 +67,10 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     if not isinstance(best, int | np.integer) or best < 1:
         raise ValueError(f"best: wanted a whole number of 1 or more, got {shown(best)}")
     co = finite_array("vertices", vertices, (None, 3), LARGEST)
-    corners = _corners(faces, len(co))
+    corners = corners_of(faces, len(co))
     touch = np.array([r.contacts / r.radius, r.patch.normal(*r.contacts[:, :2].T)])
     centre = 0.5 * (co[corners].min(axis=(0, 1)) + co[corners].max(axis=(0, 1)))
-    mesh = _mesh((co - centre) / r.radius, corners, math.dist(touch[0].min(axis=0), touch[0].max(axis=0)))
+    mesh = mesh_of((co - centre) / r.radius, corners, math.dist(touch[0].min(axis=0), touch[0].max(axis=0)))
     places, residuals, slides = _descended(_coarse(touch, mesh), touch, mesh, NEAREST, FINE_STEPS)
     distinct = _distinct(places, residuals)
     poses = []
@@ -99,60 +85,7 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     return poses
 
 
-def _corners(faces: ArrayLike, count: int) -> NDArray[np.intp]:
-    indices = finite_array("faces", faces if np.size(faces) else np.zeros((0, 3)), (None, 3))
-    if not len(indices):
-        raise ValueError("faces: wanted triangles, got none: make a mesh of a cloud of points first")
-    if (indices % 1.0).any() or indices.min() < 0 or indices.max() >= count:
-        raise ValueError(f"faces: wanted whole numbers from 0 to {count - 1}, got others among them")
-    return indices.astype(np.intp)
-
-
-def _mesh(co: Array, corners: NDArray[np.intp], patch: float) -> _Mesh:
-    """The mesh as it is searched. Raises ValueError where its size cannot be that of what was touched."""
-    from scipy.spatial import cKDTree
-
-    size = np.linalg.norm(np.ptp(co[corners], axis=(0, 1)))
-    if not patch <= size <= LARGEST_MESH:
-        raise ValueError(
-            f"vertices: wanted a mesh from {patch:.2g} (the patch) to {LARGEST_MESH:g} times the radius, "
-            f"got {size:.2g}: bring both to one unit, or take another extent"
-        )
-    normals = np.zeros_like(co)
-    np.add.at(normals, corners, _across(co[corners])[:, None])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    pieces = _halved(np.concatenate([co, normals], axis=1)[corners])
-    across, mean = _across(pieces[..., :3]), pieces.mean(axis=1)
-    lengths, bends = np.linalg.norm(across, axis=1), np.linalg.norm(mean[:, 3:], axis=1)
-    good = (lengths > 1e-12) & (bends > 1e-6)
-    if not good.any():
-        raise ValueError("faces: wanted triangles, got none that has an area")
-    centres, smooth = mean[good, :3], mean[good, 3:] / bends[good, None]
-    tree = cKDTree(np.concatenate([centres, FACING * smooth], axis=1))
-    return _Mesh(pieces[good, :, :3], across[good] / lengths[good, None], centres, smooth, tree)
-
-
-def _across(triangles: Array) -> Array:
-    """Normals (..., 3) of triangles (..., 3, 3), twice the area long."""
-    a, b, c = np.moveaxis(triangles, -2, 0)
-    return np.cross(b - a, c - a)
-
-
-def _halved(pieces: Array) -> Array:
-    """Triangles (m, 3, 6) with normals, cut at their longest edges until none is longer than LONGEST_EDGE."""
-    done = []
-    while len(pieces):
-        edges = np.linalg.norm((np.roll(pieces, -1, axis=1) - pieces)[..., :3], axis=2)
-        long = edges.max(axis=1) > LONGEST_EDGE
-        done.append(pieces[~long])
-        order = (edges[long].argmax(axis=1)[:, None] + np.arange(3)) % 3
-        a, b, c = np.moveaxis(np.take_along_axis(pieces[long], order[..., None], axis=1), 1, 0)
-        middle = 0.5 * (a + b)
-        pieces = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    return np.concatenate(done)
-
-
-def _coarse(touch: Array, mesh: _Mesh) -> Array:
+def _coarse(touch: Array, mesh: Mesh) -> Array:
     """The most promising places, moved to where the contacts are nearest to the planes of triangles."""
     from scipy.spatial.transform import Rotation
 
@@ -170,7 +103,7 @@ def _coarse(touch: Array, mesh: _Mesh) -> Array:
     return places[_distinct(places, residuals)[:FINE]]
 
 
-def _fields(mesh: _Mesh, reach: float) -> tuple[Array, Array]:
+def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
     """Places all over the mesh (m, 3, 4), and the polynomials that stand for it there, (k, m)."""
     from scipy.spatial import cKDTree
 
@@ -214,13 +147,13 @@ def _axes(normals: Array) -> Array:
 
 
 def _descended(
-    places: Array, touch: Array, mesh: _Mesh, neighbours: int, steps: int
+    places: Array, touch: Array, mesh: Mesh, neighbours: int, steps: int
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Places where the contacts are nearest to the mesh (Levenberg-Marquardt), their residuals, and whether
     noise alone may shift them to another."""
     from scipy.spatial.transform import Rotation
 
-    distances, slopes = _distances(places, touch, mesh, neighbours)
+    distances, slopes = mesh_distances(places, touch, mesh, neighbours)
     damping = np.full((len(places), 1, 1), 1e-3)
     for _ in range(steps):
         square = slopes.swapaxes(1, 2) @ slopes
@@ -229,7 +162,7 @@ def _descended(
         moved = places.copy()
         moved[..., :3] = Rotation.from_rotvec(step[:, :3]).as_matrix() @ places[..., :3]
         moved[..., 3] += step[:, 3:]
-        found = _distances(moved, touch, mesh, neighbours)
+        found = mesh_distances(moved, touch, mesh, neighbours)
         better = np.sum(found[0] ** 2 - distances**2, axis=1, keepdims=True) < 0.0
         places, distances = np.where(better, moved, places), np.where(better, found[0], distances)
         slopes = np.where(better, found[1], slopes)
@@ -238,49 +171,6 @@ def _descended(
     growth = np.linalg.eigvalsh(slopes.swapaxes(1, 2) @ slopes)[:, 0]
     residuals = np.sqrt(np.mean(distances[..., 0] ** 2, axis=1))
     return places, residuals, growth < (SIGNIFICANT * np.maximum(residuals, LEAST_RESIDUAL)) ** 2
-
-
-def _distances(places: Array, touch: Array, mesh: _Mesh, neighbours: int) -> tuple[Array, Array]:
-    """Of the contacts to the mesh (m, n, 1), and their derivatives (m, n, 6) by rotation and translation.
-
-    To the plane of the nearest triangle, or of some that are near to the nearest point.
-    """
-    turned = places[..., :3].swapaxes(1, 2)
-    arms, normals = touch[0] @ turned, (touch[1] @ turned).reshape(-1, 3)
-    points = (arms + places[:, None, :, 3]).reshape(-1, 3)
-    near = mesh.tree.query(np.hstack([points, FACING * normals]), range(1, neighbours + 1))[1]
-    nearest = near[:, 0]
-    up, offsets = mesh.normals[nearest], points - mesh.centres[nearest]
-    if neighbours > 1:
-        near %= len(mesh.centres)  # where there are fewer
-        away = points[:, None] - _feet(points[:, None], mesh.triangles[near])
-        # Triangles that face the other way are of the other side of a thin wall, however near.
-        back = np.einsum("nki,ni->nk", mesh.smooth[near], normals) < 0.0
-        row, least = np.arange(len(points)), (np.linalg.norm(away, axis=2) + back).argmin(axis=1)
-        offsets = away[row, least]
-        # On the surface there is no direction to it but the normal.
-        up = offsets + TOUCHING * mesh.normals[near[row, least]]
-        up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
-    distances, up = np.sum(offsets * up, axis=1).reshape(*arms.shape[:2], 1), up.reshape(arms.shape)
-    return distances, np.concatenate([np.cross(arms, up), up], axis=2)
-
-
-def _feet(points: Array, triangles: Array) -> Array:
-    """The point of each triangle (..., 3, 3) nearest to a point (..., 3)."""
-    across, corners = _across(triangles), np.moveaxis(triangles, -2, 0)
-    height = np.sum((points - corners[0]) * across, axis=-1, keepdims=True)
-    feet = points - height / np.sum(across**2, axis=-1, keepdims=True) * across
-    nearest, least = feet, np.full(feet.shape[:-1], np.inf)
-    inside = np.ones(least.shape, dtype=bool)
-    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        edge, arm = end - start, points - start
-        inside &= np.sum(np.cross(edge, arm) * across, axis=-1) >= 0.0
-        share = np.sum(arm * edge, axis=-1) / np.sum(edge**2, axis=-1)
-        foot = start + np.clip(share, 0.0, 1.0)[..., None] * edge
-        square = np.sum((points - foot) ** 2, axis=-1)
-        nearest = np.where((square < least)[..., None], foot, nearest)
-        least = np.minimum(square, least)
-    return np.where(inside[..., None], feet, nearest)
 
 
 def _distinct(places: Array, residuals: Array) -> list[int]:

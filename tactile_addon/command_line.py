@@ -11,12 +11,17 @@ from pathlib import Path
 
 import bpy
 
-from . import contact_file, map_object, measured, patch_object
+from . import contact_file, map_object, measured, mesh_file, patch_object
 from .registration import register_patch
 from .report import map_readable, readable, verification_columns
 from .settings import METHODS, SOLVERS
 from .units import ADAPTIVE, METRES
 from .verification import verify_patch
+
+VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
+# What the operators take as it is given.
+PLAIN = {"location", "normal", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
+PLAIN |= {"tolerance", "unit", "point", "outward", "flip", "sensor_std"}
 
 
 def main(args):
@@ -35,114 +40,93 @@ def main(args):
 def _parser():
     parser = argparse.ArgumentParser(prog="blender -c tactile", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    patch = commands.add_parser("reconstruct", help="touch a mesh and rebuild the patch around a point")
-    vector = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
-    patch.add_argument("--location", **vector, help="where to touch (default: the 3D cursor)")
-    patch.add_argument("--normal", **vector, help="outward direction there (default: the surface's)")
-    help = "add planes until the height is good to this in the mean, or no plane would help (0: that alone)"
-    patch.add_argument("--tolerance", type=float, help=help)
-    patch.add_argument("--contacts", type=Path, metavar="CSV", help="write the simulated contacts")
-    patch.set_defaults(
-        operator=bpy.ops.tactile.reconstruct, record=patch_object.RECORD, words=readable, more={}
-    )
-    fit = commands.add_parser("fit", help="rebuild the patch that measured contacts show")
-    fit.add_argument("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply, curves of one patch")
-    fit.add_argument("--unit", choices=list(contact_file.LENGTHS), help="of the numbers (what the file says)")
-    fit.add_argument("--point", **vector, help="where the curves meet (default: the point nearest to all)")
-    fit.add_argument("--outward", **vector, help="a direction on the outer side (default: by the normals)")
-    fit.add_argument("--flip", action="store_true", default=None, help="the other side is the outer one")
-    fit.add_argument("--sensor-std", type=float, help="standard deviation of a contact, at least")
-    fit.add_argument(
-        "--normal-std", type=float, metavar="DEGREES", help="of measured normals, to fit them too"
-    )
-    help = "put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts"
-    fit.add_argument("--onto", type=Path, metavar="MESH", help=help)
-    _add_fit(fit.add_argument)
-    fit.set_defaults(
-        operator=bpy.ops.tactile.import_contacts, record=patch_object.RECORD, words=readable, more={}
-    )
-    stability = commands.add_parser("map", help="touch a mesh all over and paint a copy by how well it goes")
-    help = "distance between the points that are touched (a quarter of the extent)"
-    stability.add_argument("--spacing", type=float, help=help)
-    stability.set_defaults(
-        operator=bpy.ops.tactile.stability_map,
-        record=map_object.RECORD,
-        words=map_readable,
-        more={"progress": True},
-    )
-    for command in (patch, stability):
-        _add_inputs(command.add_argument)
-    for command in (patch, fit):
-        help = "write the distances to the mesh as .csv"
-        command.add_argument("--verify", type=Path, metavar="OUT", help=help)
-    parser.set_defaults(fail=parser.error, verify=None, contacts=None, onto=None)
+    for name, add_arguments, help in (
+        ("reconstruct", _add_reconstruct, "touch a mesh and rebuild the patch around a point"),
+        ("fit", _add_fit, "rebuild the patch that measured contacts show"),
+        ("map", _add_map, "touch a mesh all over and paint a copy by how well it goes"),
+    ):
+        add_arguments(commands.add_parser(name, help=help))
+    parser.set_defaults(fail=parser.error, record=patch_object.RECORD, words=readable, more={})
+    parser.set_defaults(**dict.fromkeys(("file", "contacts", "onto", "verify", "normal_std")))
     return parser
 
 
+def _add_reconstruct(command):
+    add = command.add_argument
+    add("--location", **VECTOR, help="where to touch (default: the 3D cursor)")
+    add("--normal", **VECTOR, help="outward direction there (default: the surface's)")
+    help = "add planes until the height is good to this in the mean, or no plane would help (0: that alone)"
+    add("--tolerance", type=float, help=help)
+    add("--contacts", type=Path, metavar="CSV", help="write the simulated contacts")
+    _add_inputs(add)
+    _add_verify(add)
+    command.set_defaults(operator=bpy.ops.tactile.reconstruct)
+
+
+def _add_fit(command):
+    add = command.add_argument
+    add("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply, curves of one patch")
+    add("--unit", choices=list(contact_file.LENGTHS), help="of the numbers (what the file says)")
+    add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
+    add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
+    add("--flip", action="store_true", default=None, help="the other side is the outer one")
+    add("--sensor-std", type=float, help="standard deviation of a contact, at least")
+    add("--normal-std", type=float, metavar="DEGREES", help="of measured normals, to fit them too")
+    help = "put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts"
+    add("--onto", type=Path, metavar="MESH", help=help)
+    _add_method(add)
+    _add_verify(add)
+    command.set_defaults(operator=bpy.ops.tactile.import_contacts)
+
+
+def _add_map(command):
+    add = command.add_argument
+    help = "distance between the points that are touched (a quarter of the extent)"
+    add("--spacing", type=float, help=help)
+    _add_inputs(add)
+    command.set_defaults(operator=bpy.ops.tactile.stability_map, more={"progress": True})
+    command.set_defaults(record=map_object.RECORD, words=map_readable)
+
+
+def _add_verify(add):
+    add("--verify", type=Path, metavar="OUT", help="write the distances to the mesh as .csv")
+
+
 def _add_inputs(add):
-    """The arguments that the commands have in common."""
-    add(
-        "file",
-        nargs="?",
-        type=Path,
-        metavar="FILE",
-        help=".blend, .ply, .stl or .obj; without, the open scene",
-    )
-    add(
-        "--target",
-        default="",
-        metavar="NAME",
-        help="object to touch (default: the active one, or the only mesh)",
-    )
-    add(
-        "--azimuths",
-        type=float,
-        nargs="+",
-        metavar="DEGREES",
-        help="three to six plane directions (0 60 120)",
-    )
-    add("--tilts", type=float, nargs="+", metavar="DEGREES", help="as many plane tilts (0)")
-    add(
-        "--extent",
-        type=float,
-        help="length of each half curve (as far as a patch can be trusted; map: size / 8)",
-    )
+    """What to touch, and how."""
+    help = ".blend, .ply, .stl or .obj; without, the open scene"
+    add("file", nargs="?", type=Path, metavar="FILE", help=help)
+    help = "object to touch (default: the active one, or the only mesh)"
+    add("--target", default="", metavar="NAME", help=help)
+    degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
+    add("--azimuths", **degrees, help="three to six plane directions (0 60 120)")
+    add("--tilts", **degrees, help="as many plane tilts (0)")
+    help = "length of each half curve (as far as a patch can be trusted; map: size / 8)"
+    add("--extent", type=float, help=help)
     add("--step", type=float, help="distance between contacts (so many that more would tell little)")
     add("--noise", type=float, help="standard deviation of the simulated sensor (0)")
     add("--seed", type=int, help="of the noise (0)")
-    _add_fit(add)
+    _add_method(add)
 
 
-def _add_fit(add):
+def _add_method(add):
     """How to fit, and what to write."""
     add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (bayes)")
-    add(
-        "--degree",
-        type=str.strip,
-        choices=["auto", *"23456"],
-        help="of the polynomial (auto: the least that says what the contacts show)",
-    )
+    help = "of the polynomial (auto: the least that says what the contacts show)"
+    add("--degree", type=str.strip, choices=["auto", *"23456"], help=help)
     add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000)")
     add("--solver", choices=[name for name, _, _ in SOLVERS], help="of tagc (fast)")
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
-    add(
-        "--output",
-        type=Path,
-        metavar="OUT",
-        help="save the scene with the result, .blend; the result alone as .ply; a patch also as .json",
-    )
+    help = "save the scene with the result, .blend; the result alone as .ply; a patch also as .json"
+    add("--output", type=Path, metavar="OUT", help=help)
 
 
 def _arguments(options):
     """What was given on the command line as the operator's arguments."""
-    names = ["location", "normal", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"]
-    names += ["tolerance"]
-    names += ["unit", "point", "outward", "flip", "sensor_std"]
-    names = [name for name in names if getattr(options, name, None) is not None]
-    given = {name: getattr(options, name) for name in names}
+    given = {name: value for name, value in vars(options).items() if name in PLAIN and value is not None}
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
-    if getattr(options, "normal_std", None) is not None:
+    if options.normal_std is not None:
         given["normal_std"] = math.radians(options.normal_std)
     if "files" in options:
         return given | _open_contacts(options)
@@ -165,8 +149,8 @@ def _run(options):
     for path in (options.json, options.output, options.contacts, options.verify):
         if path not in (None, "-") and not Path(path).absolute().parent.is_dir():
             raise OSError(f'there is no folder "{Path(path).parent}" to write "{Path(path).name}" to')
-    if getattr(options, "file", None) is not None:
-        open_file(options.file)
+    if options.file is not None:
+        mesh_file.open_file(options.file)
     arguments = _arguments(options)
     before = set(bpy.data.objects)
     options.operator(**arguments, **options.more)
@@ -186,9 +170,7 @@ def _compare(patch, options):
     """The patch with the mesh that was touched, or with the one that it is put onto."""
     target = None if "files" in options else bpy.data.objects[patch[patch_object.RECORD]["source"]]
     if options.onto is not None:
-        before = set(bpy.data.objects)
-        _import(options.onto)
-        target = next(obj for obj in set(bpy.data.objects) - before if obj.type == "MESH")
+        target = mesh_file.add(options.onto)
         register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
     if target is not None:
         verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
@@ -201,10 +183,8 @@ def _open_contacts(options):
         _, unit = measured.read(options.files, options.unit or "FILE", 1.0)
         settings = bpy.context.scene.unit_settings
         name = {symbol: name for name, (symbol, _) in METRES.items()}.get(unit)
-        settings.system, settings.scale_length = (
-            "METRIC" if unit else "NONE",
-            contact_file.LENGTHS.get(unit, 1.0),
-        )
+        settings.system = "METRIC" if unit else "NONE"
+        settings.scale_length = contact_file.LENGTHS.get(unit, 1.0)
         if name in ADAPTIVE["METRIC"]:
             settings.length_unit = name
     paths = [path.absolute() for path in options.files]
@@ -219,60 +199,13 @@ def _open_contacts(options):
 
 def _save(path, made):
     """The scene; where the path says so, the map or patch alone: .ply with its attributes, or .json."""
-    if path.suffix.lower() == ".json" and patch_object.RECORD in made:
+    kind = path.suffix.lower()
+    if kind == ".json" and patch_object.RECORD in made:
         path.write_text(patch_object.reconstruction_of(made) + "\n", encoding="utf-8")
-        return
-    if path.suffix.lower() != ".ply":
+    elif kind == ".ply":
+        mesh_file.write(path, made)
+    else:
         bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()))
-        return
-    with bpy.context.temp_override(selected_objects=[made], window=bpy.context.window_manager.windows[0]):
-        bpy.ops.wm.ply_export(
-            filepath=str(path.absolute()),
-            export_selected_objects=True,
-            export_attributes=True,
-            export_uv=False,  # whose seams would split vertices
-        )
-
-
-def open_file(path):
-    """Makes the file the scene: opens a .blend, imports a mesh into an empty one, coordinates as they are."""
-    if path.suffix.lower() == ".blend" and path.is_file():
-        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
-        return
-    _import(path, empty=True)
-
-
-def _import(path, empty=False):
-    """Adds the mesh of a file to the scene, or to an empty one."""
-    if not path.is_file():
-        raise OSError(f'there is no file "{path}"')
-    full = str(path.absolute())
-    imports = {
-        ".ply": lambda: bpy.ops.wm.ply_import(filepath=full),
-        ".stl": lambda: bpy.ops.wm.stl_import(filepath=full),
-        ".obj": lambda: bpy.ops.wm.obj_import(filepath=full, forward_axis="Y", up_axis="Z"),
-    }
-    if path.suffix.lower() not in imports:
-        raise OSError(f'cannot read "{path.name}": wanted a .blend, .ply, .stl or .obj file')
-    if empty:
-        bpy.ops.wm.read_homefile(use_empty=True)
-    unreadable, there = f'no mesh could be read from "{path.name}": is the file whole?', set(bpy.data.meshes)
-    if path.suffix.lower() == ".ply" and not _has_header(path):
-        raise OSError(unreadable)
-    try:
-        # Importers ask for a window, which is not the current one after `blender -b`.
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            imports[path.suffix.lower()]()
-    except RuntimeError as error:
-        raise OSError(unreadable) from error
-    if not any(len(mesh.polygons) for mesh in set(bpy.data.meshes) - there):
-        raise OSError(unreadable)
-
-
-def _has_header(path):
-    """Whether the header of a .ply file comes to its end; where it does not, the importer ends Blender."""
-    with path.open("rb") as file:
-        return b"end_header" in file.read(1 << 16)
 
 
 def _default_target():

@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -70,51 +71,52 @@ def _contours(labels, points, normals, times):
         # A sensor at rest writes one contact many times: it is no more certain for that.
         first = np.sort(np.unique(points[rows], axis=0, return_index=True)[1])
         rows = np.array(rows)[first]
-        some = (
-            None if normals is None or normals[rows[0]] is None else np.array([normals[row] for row in rows])
-        )
-        contours.append(core.Contour(points[rows], normals=some))
+        some = normals is not None and normals[rows[0]] is not None
+        contours.append(core.Contour(points[rows], normals=[normals[row] for row in rows] if some else None))
     return contours
 
 
 def _read_csv(name, data):
-    lines = [line for line in enumerate(_lines(name, data), 1) if not line[1].lstrip().startswith("#")]
-    lines = [(number, line) for number, line in lines if line.strip()]
+    lines = [(f"{name}, line {number}", line) for number, line in enumerate(_lines(name, data), 1)]
+    lines = [(at, line) for at, line in lines if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise ValueError(f"{name}: wanted a header with the columns curve, x, y, z, got an empty file")
-    number, header = lines[0]
+    at, header = lines[0]
     separator = next((s for s in ";\t" if s in header), ",")
-    at = f"{name}, line {number}"
-    columns, unit = _columns(at, _fields(at, header, separator))
+    width, columns, unit = _columns(at, _fields(at, header, separator))
     labels, points, normals, times, last = [], [], [], [], {}
-    for number, line in lines[1:]:
-        at = f"{name}, line {number}"
+    for at, line in lines[1:]:
         fields = _fields(at, line, separator)
         if not any(fields):
             continue
-        if len(fields) > columns["width"] and any(fields[columns["width"] :]):
-            raise ValueError(
-                f"{at}: wanted {columns['width']} fields, got {len(fields)}: decimal commas "
-                "need semicolons or tabs between the fields"
-            )
-        row = {key: fields[i] if i < len(fields) else "" for key, i in columns.items() if key != "width"}
-
-        def value(key, at=at, row=row):
-            return _number(f'{at}, column "{key}"', row[key])
-
+        _require_width(at, fields, width)
+        row = {key: fields[i] if i < len(fields) else "" for key, i in columns.items()}
+        value = partial(_value, at, row)
         labels.append(row.get("curve", "1"))
         if not labels[-1]:
             raise ValueError(f'{at}: wanted a number or a name in the column "curve", got none')
-        points.append([value(key) for key in POINT])
+        points.append([*map(value, POINT)])
         measured = "nx" in row and any(row[key] for key in NORMAL)
         if measured is not last.setdefault(labels[-1], measured):
             raise ValueError(f"{at}: wanted normals all along a curve or nowhere, got some")
-        normals.append([value(key) for key in NORMAL] if measured else None)
+        normals.append([*map(value, NORMAL)] if measured else None)
         if "time" in row:
             times.append(value("time"))
     if not points:
         raise ValueError(f"{name}: wanted contacts below the header, got none")
     return _contours(labels, np.array(points), normals, times or None), unit
+
+
+def _value(at, row, key):
+    return _number(f'{at}, column "{key}"', row[key])
+
+
+def _require_width(at, fields, width):
+    if any(fields[width:]):
+        raise ValueError(
+            f"{at}: wanted {width} fields, got {len(fields)}: decimal commas need semicolons or tabs "
+            "between the fields"
+        )
 
 
 def _lines(name, data):
@@ -139,7 +141,7 @@ def _fields(at, line, separator):
 
 
 def _columns(at, header):
-    """{column: its place}, with their number as "width", and the unit of the coordinates."""
+    """How many there are, {column: its place}, and the unit of the coordinates."""
     columns, found = {}, {}
     for i, title in enumerate(header):
         match = COLUMN.fullmatch(title.lower())
@@ -162,7 +164,7 @@ def _columns(at, header):
     used = {found[key] for key in POINT}
     if len(used) > 1:
         raise ValueError(f"{at}: wanted x, y and z in one unit, got {' and '.join(sorted(used))}")
-    return columns | {"width": len(header)}, used.pop()
+    return len(header), columns, used.pop()
 
 
 def _shown(header):

@@ -92,7 +92,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         try:
             contours, unit = measured.read(paths, self.unit, context.scene.unit_settings.scale_length)
             touched = measured.fit(
-                measured.name_of(paths),
+                Path(paths[0]).name,
                 contours,
                 point=self._given("point"),
                 outward=self._given("outward"),

@@ -4,7 +4,7 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -46,24 +46,20 @@ def fit(source, contours, *, point=None, outward=None, flip=False, sensor_std=0.
 
     Raises ValueError with a sentence for the user.
     """
-    clock = [perf_counter()]
+    start = perf_counter()
     if normal_std:
         contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
     distances = None
     if point is None:
         point, distances = core.common_point(contours)
     contours = [core.in_running_order(contour, point) for contour in contours]
-
-    def reconstructed(side):
-        return core.reconstruct(point, contours, outward=side, sensor_std=sensor_std or None, **options)
-
-    result = reconstructed(outward or _mean_normal(contours))
+    reconstruct = partial(core.reconstruct, point, contours, sensor_std=sensor_std or None, **options)
+    result = reconstruct(outward=outward or _mean_normal(contours))
     bulges = (result.patch.k1 + result.patch.k2) * result.radius
     unknown = outward is None and not any(c.normals is not None for c in contours)
     if flip is not (unknown and bulges > FLAT):
-        result = reconstructed(-result.frame.axes[:, 2])
-    clock.append(perf_counter())
-    axes = reference_axes(result.frame.axes[:, 2])
+        result = reconstruct(outward=-result.frame.axes[:, 2])
+    seconds, axes = perf_counter() - start, reference_axes(result.frame.axes[:, 2])
     report = {
         "source": source,
         "method": options["method"],
@@ -73,7 +69,7 @@ def fit(source, contours, *, point=None, outward=None, flip=False, sensor_std=0.
         "axes": axes.tolist(),
         "vertices": 0,
         "suggested_plane": suggestion_report(result, axes),
-        "seconds": {"fit": clock[1] - clock[0]},
+        "seconds": {"fit": seconds},
     }
     if distances is not None:
         report["misses"] = distances.tolist()
@@ -85,8 +81,3 @@ def _mean_normal(contours):
     normals = [contour.normals for contour in contours if contour.normals is not None]
     mean = np.sum(np.vstack(normals), axis=0) if normals else np.zeros(3)
     return mean if mean.any() else np.array([0.0, 0.0, 1.0])
-
-
-def name_of(paths):
-    """What the patch is called after."""
-    return Path(paths[0]).name

@@ -22,9 +22,9 @@ from .probe_operators import (
     shows_colours,
 )
 from .registration import TACTILE_OT_register
+from .report import map_rows, median_rows, patch_rows, verification_rows, verification_table
 from .settings import draw_chosen, draw_sensor, draw_solver
-from .stability import REASONS
-from .verification import TACTILE_OT_verify, rows_of, table_of
+from .verification import TACTILE_OT_verify
 
 TAB = "Tactile"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
@@ -35,15 +35,17 @@ class _Sidebar:
     bl_region_type = "UI"
     bl_category = TAB
 
+    def draw(self, context):
+        self.layout.use_property_split, self.layout.use_property_decorate = True, False
+        self.draw_active(context, self.layout, context.view_layer.objects.active)
+
 
 class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_probe"
     bl_label = "Tactile Probe"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        found = probe.probe_of(context.view_layer.objects.active)
+    def draw_active(self, context, layout, obj):
+        found = probe.probe_of(obj)
         if found is None:
             layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
             return
@@ -88,22 +90,16 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         obj = context.view_layer.objects.active
         return probe.probe_of(obj) is not None or probe.patch_near(obj) is not None
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        obj = context.view_layer.objects.active
+    def draw_active(self, context, layout, obj):
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         if found is not None and found.tactile_probe.message:
             _draw_sentence(context, layout, found.tactile_probe.message, "ERROR")
         if patch is None:
             return
         record = patch[patch_object.RECORD]
-        layout.prop(patch, "tactile_colours")
-        if not shows_colours(context.space_data):
-            layout.operator(TACTILE_OT_show_colours.bl_idname, icon="SHADING_SOLID")
-        box = layout.box()
-        unit = units.unit_of(context.scene, record["radius"])
-        _draw_rows(box, _rows(record, unit))
+        _draw_colours(context, layout, patch, "tactile_colours")
+        box, unit = layout.box(), units.unit_of(context.scene, record["radius"])
+        _draw_rows(box, patch_rows(record, unit))
         _draw_sentence(context, box, record["message"], ICONS[record["status"]])
         box.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
         if found is None:
@@ -119,40 +115,25 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_map"
     bl_label = "Stability Map"
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
+    def draw_active(self, context, layout, obj):
         layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
-        obj = context.view_layer.objects.active
         if obj is None or map_object.RECORD not in obj:
             return
-        layout.prop(obj, "tactile_map_colours")
-        if not shows_colours(context.space_data):
-            layout.operator(TACTILE_OT_show_colours.bl_idname, icon="SHADING_SOLID")
+        _draw_colours(context, layout, obj, "tactile_map_colours")
         record = obj[map_object.RECORD]
         box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
-        _draw_rows(box, _map_rows(record, unit))
-        medians = _median_rows(record, unit)
+        _draw_rows(box, map_rows(record, unit))
+        medians = median_rows(record, unit)
         if medians:
             box.label(text="Medians of the Patches")
             _draw_rows(box, medians)
 
 
-def _map_rows(record, unit):
-    """(label, value) of how many patches there are, and why not more."""
-    names = {key: f"No Patch: {name}" for key, name, _ in REASONS}
-    return [
-        ("Points", str(record["touched"])),
-        ("Spacing", units.say(record["spacing"], 1, unit)),
-        ("Patches", str(record["patches"])),
-        ("… in Doubt", str(record["in_doubt"])),
-        *((names[key], str(count)) for key, count in record["refused"].items() if count),
-    ]
-
-
-def _median_rows(record, unit):
-    quantities = [(title, f"{name}_median", power) for name, title, _, power in map_object.SHOWN]
-    return [(title, units.say(record[key], power, unit)) for title, key, power in quantities if key in record]
+def _draw_colours(context, layout, obj, name):
+    """What the colours show, and a button where the viewport does not show them."""
+    layout.prop(obj, name)
+    if not shows_colours(context.space_data):
+        layout.operator(TACTILE_OT_show_colours.bl_idname, icon="SHADING_SOLID")
 
 
 def _draw_rows(layout, rows):
@@ -164,41 +145,16 @@ def _draw_rows(layout, rows):
         row.label(text=value)
 
 
-def _rows(record, unit):
-    """(label, value) of what matters."""
-    rows = [
-        ("Curvature κ1", units.say(record["k1"], -1, unit)),
-        ("Curvature κ2", units.say(record["k2"], -1, unit)),
-        ("Gaussian K", units.say(record["gaussian_curvature"], -2, unit)),
-        ("Mean H", units.say(record["mean_curvature"], -1, unit)),
-        ("Fit Error", units.say(record["fit_error"], 1, unit)),
-        ("Standard Deviation", "± " + units.say(record["height_std"], 1, unit)),
-    ]
-    if "vertices" not in record:
-        return [*rows, ("Mesh to Patch", "…")]
-    if record["vertices"] and "verification" not in record:
-        rows += [
-            ("Mesh to Patch", units.say(record["vertex_distance_mean"], 1, unit)),
-            ("… at Most", units.say(record["vertex_distance_max"], 1, unit)),
-        ]
-    plane = record["suggested_plane"]
-    return [
-        *rows,
-        ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
-        ("… Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
-    ]
-
-
 def _draw_verification(layout, found, unit):
     layout.label(text=found["target"], icon="MESH_DATA", translate=False)
     column = layout.column(align=True)
-    for label, *values in table_of(found, unit):
+    for label, *values in verification_table(found, unit):
         row = column.row(align=True).split(factor=0.31, align=True)
         row.label(text=label)
         row = row.row(align=True)
         for value in values:
             row.label(text=value)
-    _draw_rows(layout, rows_of(found, unit))
+    _draw_rows(layout, verification_rows(found, unit))
 
 
 def _draw_sentence(context, layout, sentence, icon):

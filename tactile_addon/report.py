@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report of a reconstruction as a table for people, and errors as sentences."""
+"""The reports of patches and maps as tables and sentences for people; and errors as sentences."""
 
+from . import map_object, units
+from .stability import REASONS
 from .units import say
 
 SPREAD = ("mean", "median", "max", "rms")
@@ -170,6 +172,78 @@ def verification_columns(report):
         ("target", found["target"]),
         *((f"{key} [unit of the file]" if key in lengths else key, found.get(key, "")) for key in VERIFIED),
     ]
+
+
+def patch_rows(record, unit):
+    """(label, value) of what matters of a patch, with lengths in a unit of units.py."""
+
+    def row(label, key, power=1):
+        return label, units.say(record[key], power, unit)
+
+    rows = [
+        row("Curvature κ1", "k1", -1),
+        row("Curvature κ2", "k2", -1),
+        row("Gaussian K", "gaussian_curvature", -2),
+        row("Mean H", "mean_curvature", -1),
+        row("Fit Error", "fit_error"),
+        ("Standard Deviation", "± " + units.say(record["height_std"], 1, unit)),
+    ]
+    if "vertices" not in record:
+        return [*rows, ("Mesh to Patch", "…")]
+    if record["vertices"] and "verification" not in record:
+        rows += [row("Mesh to Patch", "vertex_distance_mean"), row("… at Most", "vertex_distance_max")]
+    plane = record["suggested_plane"]
+    return [
+        *rows,
+        ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
+        ("… Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
+    ]
+
+
+def map_rows(record, unit):
+    """(label, value) of how many patches a stability map has, and why not more."""
+    names = {key: f"No Patch: {name}" for key, name, _ in REASONS}
+    return [
+        ("Points", str(record["touched"])),
+        ("Spacing", units.say(record["spacing"], 1, unit)),
+        ("Patches", str(record["patches"])),
+        ("… in Doubt", str(record["in_doubt"])),
+        *((names[key], str(count)) for key, count in record["refused"].items() if count),
+    ]
+
+
+def median_rows(record, unit):
+    """(label, value) of the medians over the patches of a stability map."""
+    quantities = [(title, f"{name}_median", power) for name, title, _, power in map_object.SHOWN]
+    return [(title, units.say(record[key], power, unit)) for title, key, power in quantities if key in record]
+
+
+def verification_table(found, unit):
+    """Rows of a label and what a verification found for the mesh and for the contacts."""
+
+    def lengths(key):
+        return (_length(found, f"{what}_distance_{key}", unit) for what in ("vertex", "contact"))
+
+    names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
+    return [
+        ("Distance", "Mesh", "Contacts"),
+        *((name, *lengths(key)) for name, key in names),
+        ("Points", str(found["vertices"]), str(found["contacts"])),
+    ]
+
+
+def verification_rows(found, unit):
+    """(label, value) of what else a verification found."""
+    return [
+        ("Fit Error on Curves", _length(found, "fit_error", unit)),
+        (f"… on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
+        ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
+        ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
+    ]
+
+
+def _length(found, key, unit):
+    return units.say(found[key], 1, unit) if key in found else "–"
 
 
 def _suggestion(plane):

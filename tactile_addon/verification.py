@@ -9,10 +9,10 @@ import numpy as np
 from bpy.props import BoolProperty, StringProperty
 
 from .. import core
-from . import patch_object, probe, units
+from . import patch_object, probe
 from .live import is_pending
 from .operators import report_error, target_object
-from .report import SPREAD, verification_summary
+from .report import verification_summary
 from .surface import MeshSurface
 from .touch import judgement, reachable
 
@@ -105,34 +105,6 @@ def _require_writable(target, depsgraph):
         raise ValueError(
             f'The modifiers of "{target.name}" make or take away vertices: apply them to write on it'
         )
-
-
-def table_of(found, unit):
-    """Rows of a label and what it is for the mesh and for the contacts."""
-
-    def lengths(key):
-        return (_length(found, f"{what}_distance_{key}", unit) for what in ("vertex", "contact"))
-
-    names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
-    return [
-        ("Distance", "Mesh", "Contacts"),
-        *((name, *lengths(key)) for name, key in names),
-        ("Points", str(found["vertices"]), str(found["contacts"])),
-    ]
-
-
-def rows_of(found, unit):
-    """(label, value) of what else there is."""
-    return [
-        ("Fit Error on Curves", _length(found, "fit_error", unit)),
-        (f"… on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
-        ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
-        ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
-    ]
-
-
-def _length(found, key, unit):
-    return units.say(found[key], 1, unit) if key in found else "–"
 
 
 class TACTILE_OT_verify(bpy.types.Operator):

@@ -36,6 +36,37 @@ def empty(extension):
     return bpy
 
 
+@pytest.fixture
+def ball(empty):
+    """A finely faceted sphere of radius 2, the active object."""
+    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
+    return empty.context.object
+
+
+@pytest.fixture
+def command(extension, capfd):
+    """Runs the command with these words: exit code, standard output, standard error."""
+
+    def run(*words):
+        try:
+            code = extension.tactile_addon.command_line.main([str(word) for word in words])
+        except SystemExit as ended:
+            code = ended.code
+        return code, *capfd.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def files(empty, ball, tmp_path):
+    """The ball as a .ply, .stl, .obj and .blend."""
+    empty.ops.wm.ply_export(filepath=str(tmp_path / "ball.ply"))
+    empty.ops.wm.stl_export(filepath=str(tmp_path / "ball.stl"))
+    empty.ops.wm.obj_export(filepath=str(tmp_path / "ball.obj"), forward_axis="Y", up_axis="Z")
+    empty.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ball.blend"))
+    return tmp_path
+
+
 @pytest.fixture(scope="session")
 def scans():
     """The folder of real scans."""

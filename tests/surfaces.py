@@ -7,6 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import core
+
+
+def planes(azimuths, tilts=0.0):
+    """Sampling planes at these degrees."""
+    pairs = np.broadcast(np.radians(azimuths), np.radians(tilts))
+    return [core.SamplingPlane(azimuth, tilt) for azimuth, tilt in pairs]
+
+
+UPRIGHT, TILTED = planes((13, 73, 133)), planes((13, 73, 133), (12, -18, 8))
+
 
 @dataclass(frozen=True)
 class Exact:
@@ -27,6 +38,15 @@ class Exact:
     def normal(self):
         g = self.gradient(self.point)
         return g / np.linalg.norm(g)
+
+    def track(self, planes, **options):
+        """Contours through its point, 12 to either side in steps of 1 unless `options` differ."""
+        lengths = {"extent": 12.0, "step": 1.0}
+        return core.track(self, self.point, self.normal, planes, **lengths | options)
+
+    def fit(self, contours, **options):
+        """The reconstruction of contours through its point."""
+        return core.reconstruct(self.point, contours, outward=self.normal, **options)
 
     def ray_cast(self, origin, direction, distance):
         """First crossing along the ray: bracketed on 40 samples, then bisected by regula falsi (Illinois)."""

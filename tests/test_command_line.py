@@ -9,31 +9,6 @@ import pytest
 PLACE = ["--location", "0.3", "-2e-1", "1.9", "--extent", "0.6"]
 
 
-@pytest.fixture
-def command(extension, capfd):
-    """Runs the command with these words: exit code, standard output, standard error."""
-
-    def run(*words):
-        try:
-            code = extension.tactile_addon.command_line.main([str(word) for word in words])
-        except SystemExit as ended:
-            code = ended.code
-        return code, *capfd.readouterr()
-
-    return run
-
-
-@pytest.fixture
-def files(empty, tmp_path):
-    """One ball as a .ply, .stl, .obj and .blend."""
-    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
-    empty.ops.wm.ply_export(filepath=str(tmp_path / "ball.ply"))
-    empty.ops.wm.stl_export(filepath=str(tmp_path / "ball.stl"))
-    empty.ops.wm.obj_export(filepath=str(tmp_path / "ball.obj"), forward_axis="Y", up_axis="Z")
-    empty.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ball.blend"))
-    return tmp_path
-
-
 def test_a_patch_from_every_kind_of_file(command, files):
     reports = []
     for kind in ("ply", "stl", "obj", "blend"):

@@ -7,7 +7,7 @@ import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import Contour, DegenerateCurvesError, SamplingPlane, common_point, reconstruct, track
+from core import Contour, DegenerateCurvesError, SamplingPlane, common_point, reconstruct
 
 SURFACES = [surfaces.pear(), surfaces.torus(40, 20, 0.6), surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)]
 TILTED = [SamplingPlane(np.radians(a), t) for a, t in ((13, 0.1), (73, -0.2), (133, 0.3))]
@@ -16,7 +16,7 @@ ids = ["pear", "torus", "ellipsoid"]
 
 def curves(surface, noise=0.0, seed=0, planes=TILTED):
     """Without the contact at the point, and none of them the same distance away from it."""
-    contours = track(surface, surface.point, surface.normal, planes, extent=12, step=1, noise=noise, rng=seed)
+    contours = surface.track(planes, noise=noise, rng=seed)
     return [np.delete(c.points, [12 + i, *range(12)][: 1 + i], axis=0) for i, c in enumerate(contours)]
 
 
@@ -36,7 +36,7 @@ def test_it_converges_with_the_step():
     s = surfaces.torus(40, 20, 0.6)
     off = []
     for step in (1.0, 0.5):
-        contours = track(s, s.point, s.normal, TILTED, extent=12 * step, step=step)
+        contours = s.track(TILTED, extent=12 * step, step=step)
         point, _ = meet([np.delete(c.points, 12, axis=0) for c in contours])
         off.append(np.linalg.norm(point - s.point))
     assert off[0] / off[1] > 4.0
@@ -93,7 +93,7 @@ def test_a_patch_at_the_common_point_is_like_one_at_the_true_point():
     s = surfaces.pear()
     contours = [Contour(p) for p in curves(s, 0.02)]
     found = reconstruct(common_point(contours)[0], contours, outward=s.normal)
-    true = reconstruct(s.point, contours, outward=s.normal)
+    true = s.fit(contours)
     assert found.status == "ok"
     assert [found.patch.k1, found.patch.k2] == pytest.approx([true.patch.k1, true.patch.k2], abs=1e-3)
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core import Contour, SamplingPlane, track
+from core import Contour
 
 WANTED = np.array([[[0.0, 0, 0], [1, 2, 3], [2, 4, 6.5]], [[0, 0, 0], [-1, 0.5, 1e-3], [0, 1, 0]]])
 PLAIN = "curve,x,y,z\n1,0,0,0\n1,1,2,3\n1,2,4,6.5\n2,0,0,0\n2,-1,0.5,1e-3\n2,0,1,0\n"
@@ -143,8 +143,7 @@ def test_files_that_are_none(contact_file, read, tmp_path):
 
 def test_what_the_tracker_made_comes_back_as_it_was(contact_file, tmp_path):
     s = surfaces.pear()
-    planes = [SamplingPlane(np.radians(a)) for a in (0, 60, 120)]
-    contours = track(s, s.point, s.normal, planes, extent=12, step=1, noise=0.05, rng=1)
+    contours = s.track(surfaces.planes((0, 60, 120)), noise=0.05, rng=1)
     contact_file.write(tmp_path / "out.csv", contours, "mm")
     found, unit = contact_file.read(tmp_path / "out.csv")
     assert unit == "mm"

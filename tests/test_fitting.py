@@ -7,10 +7,9 @@ import pytest
 import surfaces
 from scipy.optimize import approx_fprime, minimize
 
-from core import METHODS, MongePatch, SamplingPlane, fit_error, fitting, reconstruct, tagc, track
+from core import METHODS, MongePatch, fit_error, fitting, tagc
 from core.domain import Domain, closed_spline_domain
 
-PLANES = [SamplingPlane(np.radians(a)) for a in (13, 73, 133)]
 PAPER_SIZE = {
     "sphere": surfaces.sphere(25),
     "ellipsoid": surfaces.ellipsoid(35, 25, 20, 0.6, 0.5),
@@ -19,12 +18,6 @@ PAPER_SIZE = {
     "bottle neck": surfaces.bottle_neck(),
     "quartic": surfaces.quartic(),
 }
-
-
-def touched(surface, noise=0.0, seed=0, extent=12.0, step=1.0, planes=PLANES):
-    return track(
-        surface, surface.point, surface.normal, planes, extent=extent, step=step, noise=noise, rng=seed
-    )
 
 
 @pytest.fixture
@@ -80,8 +73,8 @@ def test_8_is_the_integral_of_the_absolute_gaussian_curvature(data_and_domain):
 def test_total_curvature_of_a_cap_is_the_area_of_its_normals():
     """A cap of a sphere whose rim leans by b, sin b = L / r: 2 pi (1 - cos b). Six curves see all of it."""
     ball = surfaces.sphere(25)
-    planes = [SamplingPlane(a) for a in np.radians([0, 30, 60, 90, 120, 150])]
-    r = reconstruct(ball.point, touched(ball, planes=planes), outward=ball.normal, method="least-squares")
+    planes = surfaces.planes(np.arange(0, 180, 30))
+    r = ball.fit(ball.track(planes), method="least-squares")
     assert r.total_absolute_curvature == pytest.approx(
         2 * np.pi * (1 - np.sqrt(1 - (r.radius / 25) ** 2)), rel=0.02
     )
@@ -114,11 +107,8 @@ def test_least_squares_finds_the_coefficients_that_made_the_data():
 def test_both_solvers_reach_the_same_surface(name, noise):
     """Where (9) has one minimum. On convex surfaces it has several."""
     surface = PAPER_SIZE[name]
-    contours = touched(surface, noise)
-    fast, descent = (
-        reconstruct(surface.point, contours, outward=surface.normal, method="tagc", solver=s)
-        for s in ("fast", "descent")
-    )
+    contours = surface.track(surfaces.UPRIGHT, noise=noise, rng=0)
+    fast, descent = (surface.fit(contours, method="tagc", solver=s) for s in ("fast", "descent"))
     assert fast.status == descent.status == "ok"
     assert objective_of(fast) == pytest.approx(objective_of(descent), rel=0.01)
     x, y = fast.domain.grid(600)[0].T
@@ -130,11 +120,8 @@ def test_both_solvers_reach_the_same_surface(name, noise):
 def test_the_fast_solver_finds_no_higher_minimum_on_convex_surfaces(name, noise):
     surface = PAPER_SIZE[name]
     for seed in range(3):
-        contours = touched(surface, noise, seed)
-        fast, descent = (
-            reconstruct(surface.point, contours, outward=surface.normal, method="tagc", solver=s)
-            for s in ("fast", "descent")
-        )
+        contours = surface.track(surfaces.UPRIGHT, noise=noise, rng=seed)
+        fast, descent = (surface.fit(contours, method="tagc", solver=s) for s in ("fast", "descent"))
         assert objective_of(fast) < 1.001 * objective_of(descent)
 
 
@@ -142,7 +129,7 @@ def test_the_fast_solver_finds_no_higher_minimum_on_convex_surfaces(name, noise)
 @pytest.mark.parametrize("name", PAPER_SIZE)
 def test_newton_ends_no_higher_than_a_general_solver_from_the_same_start(name, noise):
     surface = PAPER_SIZE[name]
-    r = reconstruct(surface.point, touched(surface, noise), outward=surface.normal, method="tagc", degree=4)
+    r = surface.fit(surface.track(surfaces.UPRIGHT, noise=noise, rng=0), method="tagc", degree=4)
     unit = r.patch.scaled(1.0 / r.radius)
     data = fitting.problem(unit.k1, unit.k2, unit.degree, r.contacts / r.radius)
     objective = tagc.Objective(data, Domain(r.domain.ends / r.radius), 1000.0)
@@ -170,14 +157,14 @@ def heights_missed(r):
 def test_on_a_cylinder_the_descent_crawls_and_a_step_cap_is_said(monkeypatch):
     """K = 0 all over: every grid point is a kink of |K| that the descent zigzags across, 15000 steps here."""
     s = surfaces.cylinder(20)
-    contours = touched(s)
-    fast = reconstruct(s.point, contours, outward=s.normal, method="tagc")
-    descent = reconstruct(s.point, contours, outward=s.normal, method="tagc", solver="descent")
+    contours = s.track(surfaces.UPRIGHT)
+    fast = s.fit(contours, method="tagc")
+    descent = s.fit(contours, method="tagc", solver="descent")
     assert fast.status == descent.status == "ok"
     x, y = fast.domain.grid(600)[0].T
     assert np.abs(fast.patch.height(x, y) - descent.patch.height(x, y)).max() < 0.05
     monkeypatch.setattr(tagc, "DESCENT_CAP", 1000)
-    capped = reconstruct(s.point, contours, outward=s.normal, method="tagc", solver="descent")
+    capped = s.fit(contours, method="tagc", solver="descent")
     assert capped.status == "not_converged"
     assert "step limit" in capped.message
     assert capped.fit_error < 0.01 * capped.radius
@@ -199,15 +186,15 @@ def test_figure_3_and_4_of_the_paper():
     """
     neck = surfaces.bottle_neck()
     touch = {"extent": 11.7, "step": 1.3}
-    extra = [SamplingPlane(np.radians(13 + a)) for a in (15, 30, 45, 75, 90, 105, 135, 150, 165)]
-    off = np.vstack([c.points for c in touched(neck, planes=extra, **touch)])
+    extra = surfaces.planes(np.add(13, (15, 30, 45, 75, 90, 105, 135, 150, 165)))
+    off = np.vstack([c.points for c in neck.track(extra, **touch)])
     assert len(off) == 171
     errors, kappas = {method: [] for method in METHODS}, []
     for seed in range(9):
-        contours = touched(neck, 0.05, seed, **touch)
+        contours = neck.track(surfaces.UPRIGHT, noise=0.05, rng=seed, **touch)
         assert sum(len(c.points) for c in contours) == 57
         for method in METHODS:
-            r = reconstruct(neck.point, contours, outward=neck.normal, method=method)
+            r = neck.fit(contours, method=method)
             errors[method].append(
                 (r.fit_error, fit_error(r.patch, r.frame.to_local(off)), r.total_absolute_curvature)
             )

@@ -86,7 +86,7 @@ ODD_CURVES = st.one_of(
 def tracked(shape, planes, noise):
     """Contours, as arrays, of a good touch: 9 to 17 contacts a curve."""
     s = SHAPES[shape]
-    contours = track(s, s.point, s.normal, PLANES[planes], extent=8 + shape, step=2, noise=noise, rng=shape)
+    contours = s.track(PLANES[planes], extent=8 + shape, step=2, noise=noise, rng=shape)
     return s.point, s.normal, [c.points for c in contours]
 
 

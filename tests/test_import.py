@@ -9,18 +9,17 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import surfaces
-from test_command_line import PLACE, command, files  # noqa: F401 (fixtures)
-from test_operator import datablocks, values
+from scenes import datablocks, made, positions, values
+from test_command_line import PLACE
 
-from core import SamplingPlane, from_dict, track
+from core import from_dict
 
 SURFACE = surfaces.torus(40, 20, 0.6)
 HIDDEN = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})
 
 
 def contours_of(surface, noise=0.02):
-    planes = [SamplingPlane(np.radians(a)) for a in (0, 60, 120)]
-    return track(surface, surface.point, surface.normal, planes, extent=12, step=1, noise=noise, rng=1)
+    return surface.track(surfaces.planes((0, 60, 120)), noise=noise, rng=1)
 
 
 @pytest.fixture
@@ -41,10 +40,7 @@ def measured(extension, empty, tmp_path):
 
 
 def imported(bpy, path, **options):
-    before = set(bpy.data.objects)
-    assert bpy.ops.tactile.import_contacts(filepath=path, **options) == {"FINISHED"}
-    (patch,) = [obj for obj in set(bpy.data.objects) - before if "tactile" in obj]
-    return patch, patch["tactile"].to_dict()
+    return made(bpy.ops.tactile.import_contacts, filepath=path, **options)
 
 
 def test_contacts_become_a_patch(empty, measured):
@@ -62,7 +58,7 @@ def test_contacts_become_a_patch(empty, measured):
     assert list(patch.matrix_world.translation) == pytest.approx(report["frame"]["origin"], abs=1e-5)
     (lines,) = patch.children
     assert len(set(values(lines.data, "contact"))) == 25
-    assert np.isfinite(values(lines.data, "position", "vector", 3)).all()
+    assert np.isfinite(positions(lines.data)).all()
 
 
 @pytest.mark.parametrize("normals", [True, False], ids=["by normals", "by the bulge"])
@@ -119,7 +115,7 @@ def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):
     assert [report["k1"], report["k2"]] == pytest.approx([SURFACE.k1, SURFACE.k2], abs=2e-3)
     mesh = patch.children[0].data
     curve, contact = (values(mesh, name) for name in ("contour", "contact"))
-    points = values(mesh, "position", "vector", 3)
+    points = positions(mesh)
     for number in range(3):
         centres = points[(curve == number) & (contact >= 0)].reshape(-1, 6, 3).mean(axis=1)
         steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
@@ -254,7 +250,7 @@ def test_blenders_own_exporters_keep_vertices_and_colours(empty, measured, tmp_p
     vertices = [line.split() for line in lines if line.startswith("v ")]
     assert len(vertices) == count
     assert all(len(vertex) == 7 for vertex in vertices)
-    world = values(patch.data, "position", "vector", 3) @ np.array(patch.matrix_world)[:3, :3].T
+    world = positions(patch.data) @ np.array(patch.matrix_world)[:3, :3].T
     world += patch.matrix_world.translation
     assert np.array([v[1:4] for v in vertices], dtype=float) == pytest.approx(world, abs=1e-4)
     empty.ops.wm.ply_import(filepath=str(tmp_path / "p.ply"))
@@ -273,7 +269,7 @@ def report_in(out):
     return json.loads(line)
 
 
-def test_fit_from_the_shell(command, empty, measured, tmp_path):  # noqa: F811
+def test_fit_from_the_shell(command, empty, measured, tmp_path):
     path = measured(unit="mm")
     for output in ("out.blend", "out.ply", "out.json"):
         code, out, err = command("fit", path, *FIT, "--output", tmp_path / output)
@@ -291,7 +287,7 @@ def test_fit_from_the_shell(command, empty, measured, tmp_path):  # noqa: F811
     assert empty.data.objects["scan.csv Patch"]["tactile"]["unit"] == "mm"
 
 
-def test_every_option_of_fit_arrives(command, empty, measured):  # noqa: F811
+def test_every_option_of_fit_arrives(command, empty, measured):
     empty.ops.wm.read_homefile(use_empty=True)
     path, point = measured(), [str(x) for x in SURFACE.point]
     options = ["--unit", "cm", "--point", *point, "--outward", *(str(-x) for x in SURFACE.normal)]
@@ -324,7 +320,7 @@ def test_every_option_of_fit_arrives(command, empty, measured):  # noqa: F811
         (["{folder}/scan.csv", "{folder}/no/scan.csv"], 1, "there is no file"),
     ],
 )
-def test_what_cannot_be_fitted(command, empty, measured, tmp_path, words, code, sentence):  # noqa: F811
+def test_what_cannot_be_fitted(command, empty, measured, tmp_path, words, code, sentence):
     measured()
     (tmp_path / "bad.csv").write_text("x,y,z\n1,two,3\n")
     (tmp_path / "ball.obj").write_text("")
@@ -334,7 +330,7 @@ def test_what_cannot_be_fitted(command, empty, measured, tmp_path, words, code, 
     assert "Traceback" not in out + err
 
 
-def test_simulated_contacts_from_the_shell_are_a_data_set(command, files):  # noqa: F811
+def test_simulated_contacts_from_the_shell_are_a_data_set(command, files):
     csv = files / "contacts.csv"
     code, out, _ = command(
         "reconstruct", files / "ball.ply", *PLACE, "--noise", "1e-3", "--contacts", csv, *FIT

@@ -5,8 +5,9 @@
 import numpy as np
 import pytest
 import surfaces
+from surfaces import TILTED, UPRIGHT
 
-from core import Contour, DegenerateCurvesError, SamplingPlane, reconstruct, track
+from core import Contour, DegenerateCurvesError, SamplingPlane, reconstruct
 from core.local_geometry import (
     curves_through,
     darboux_frames,
@@ -15,9 +16,6 @@ from core.local_geometry import (
     surface_normals,
 )
 
-AZIMUTHS = np.radians([13.0, 73.0, 133.0])
-UPRIGHT = [SamplingPlane(a) for a in AZIMUTHS]
-TILTED = [SamplingPlane(a, t) for a, t in zip(AZIMUTHS, np.radians([12.0, -18.0, 8.0]), strict=True)]
 EXACT = {
     "plane": surfaces.plane(),
     "sphere": surfaces.sphere(25),
@@ -32,7 +30,7 @@ EXACT = {
 
 
 def frame_at(surface, planes, step, extent=None):
-    contours = track(surface, surface.point, surface.normal, planes, extent=extent or 6 * step, step=step)
+    contours = surface.track(planes, extent=extent or 6 * step, step=step)
     curves = through(contours, surface.point)
     axes, k1, k2, radius = darboux_frames(curves, surface_normals(curves.tangents, surface.normal))
     return axes[0], k1[0] / radius[0], k2[0] / radius[0]
@@ -72,7 +70,7 @@ def test_d1_is_the_direction_of_least_curvature_within_90_degrees_of_the_first_t
 
 
 def test_at_an_umbilic_d1_is_the_first_tangent():
-    k1, k2, theta = principal_curvatures(AZIMUTHS, [0.3, 0.3, 0.3])
+    k1, k2, theta = principal_curvatures(np.radians([13, 73, 133]), [0.3, 0.3, 0.3])
     assert (k1, k2, theta) == pytest.approx((0.3, 0.3, 0.0))
     axes, _, _ = frame_at(surfaces.plane(), UPRIGHT, 0.05)
     assert axes[:, 0] == pytest.approx(UPRIGHT[0].axes((0, 0, 1))[:, 0], abs=1e-9)
@@ -133,7 +131,7 @@ def test_meusnier_for_a_plane_at_any_tilt():
     """A plane tilted by b cuts a sphere of radius r in a circle of curvature 1 / (r cos b)."""
     ball = surfaces.sphere(20.0)
     for tilt in np.radians([0.0, 30.0, -60.0]):
-        (contour,) = track(ball, ball.point, ball.normal, [SamplingPlane(0.3, tilt)], extent=0.2, step=0.02)
+        (contour,) = ball.track([SamplingPlane(0.3, tilt)], extent=0.2, step=0.02)
         curvature = through([contour], ball.point).curvatures[0, 0]
         assert np.linalg.norm(curvature) == pytest.approx(1.0 / (20.0 * np.cos(tilt)), rel=1e-4)
         assert curvature @ ball.normal == pytest.approx(-1.0 / 20.0, rel=1e-4)
@@ -142,7 +140,7 @@ def test_meusnier_for_a_plane_at_any_tilt():
 def test_the_order_of_the_points_and_the_reference_point_among_them_do_not_matter():
     s = EXACT["ellipsoid"]
     rng = np.random.default_rng(3)
-    contours = track(s, s.point, s.normal, UPRIGHT, extent=6, step=0.5)
+    contours = s.track(UPRIGHT, extent=6, step=0.5)
     for contour in contours:
         without = np.delete(contour.points, 12, axis=0)
         both = through([contour, Contour(rng.permutation(without))], s.point)

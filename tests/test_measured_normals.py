@@ -9,11 +9,11 @@ import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import Contour, SamplingPlane, evidence, posterior, reconstruct, reconstruct_many, system, track
+from core import Contour, evidence, posterior, reconstruct, reconstruct_many, system
 from core.monge import monomials
 from core.slopes import slope_equations
 
-PLANES = [SamplingPlane(np.radians(a)) for a in (0, 60, 120)]
+PLANES = surfaces.planes((0, 60, 120))
 HIDDEN = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})  # zero in these planes
 EXACT = [
     surfaces.pear(),
@@ -27,7 +27,7 @@ EXACT = [
 
 
 def touched(surface, noise=0.0, seed=0):
-    return track(surface, surface.point, surface.normal, PLANES, extent=12, step=1, noise=noise, rng=seed)
+    return surface.track(PLANES, noise=noise, rng=seed)
 
 
 def measured(contours, std, seed=0):
@@ -41,10 +41,6 @@ def measured(contours, std, seed=0):
     return found
 
 
-def fit(surface, contours, **options):
-    return reconstruct(surface.point, contours, outward=surface.normal, **options)
-
-
 def same(one, other, rel=1e-9):
     assert other.frame.axes == pytest.approx(one.frame.axes, abs=rel)
     assert other.patch.coefficients == pytest.approx(one.patch.coefficients, rel=rel, abs=1e-12)
@@ -54,7 +50,7 @@ def same(one, other, rel=1e-9):
 @pytest.mark.parametrize(("noise", "std"), [(0.0, 0.0), (0.02, 0.01), (0.05, 0.05)])
 def test_a_monkey_saddle_hidden_from_its_planes_shows_in_normals(noise, std):
     contours = touched(HIDDEN, noise)
-    without, with_normals = fit(HIDDEN, contours), fit(HIDDEN, measured(contours, std))
+    without, with_normals = HIDDEN.fit(contours), HIDDEN.fit(measured(contours, std))
     assert (without.blind, with_normals.blind) == (3, 0)
     assert "invisible" not in with_normals.message
     assert surfaces.off_data(HIDDEN, with_normals) < 0.1 * surfaces.off_data(HIDDEN, without)
@@ -63,7 +59,7 @@ def test_a_monkey_saddle_hidden_from_its_planes_shows_in_normals(noise, std):
 @pytest.mark.parametrize("surface", EXACT[:5], ids=["pear", "torus", "quartic", "neck", "sine"])
 def test_good_normals_make_no_surface_worse(surface):
     contours = touched(surface, 0.05)
-    without, with_normals = fit(surface, contours), fit(surface, measured(contours, 0.01))
+    without, with_normals = surface.fit(contours), surface.fit(measured(contours, 0.01))
     assert surfaces.off_data(surface, with_normals) < 1.1 * surfaces.off_data(surface, without)
     assert with_normals.mean_height_std < without.mean_height_std
 
@@ -74,7 +70,7 @@ def test_noise_in_normals_is_counted():
     for surface in EXACT:
         for noise, std in ((0.05, 0.01), (0.05, 0.05), (0.1, 0.05)):
             for seed in range(4):
-                r = fit(surface, measured(touched(surface, noise, seed), std, seed))
+                r = surface.fit(measured(touched(surface, noise, seed), std, seed))
                 points, heights = surfaces.heights_over(surface, r, 60)
                 miss = np.abs(r.patch.height(*points.T) - heights)
                 covered.append(np.mean(miss <= 1.645 * r.height_std(*points.T)))
@@ -83,11 +79,11 @@ def test_noise_in_normals_is_counted():
 
 def test_the_worse_the_normals_the_less_they_count():
     contours = touched(HIDDEN, 0.02)
-    stds = [fit(HIDDEN, measured(contours, std)).mean_height_std for std in (0.01, 0.05, 0.2)]
+    stds = [HIDDEN.fit(measured(contours, std)).mean_height_std for std in (0.01, 0.05, 0.2)]
     assert stds[0] < stds[1] < stds[2]
-    useless = fit(HIDDEN, [replace(c, normal_std=1e3) for c in contours])
+    useless = HIDDEN.fit([replace(c, normal_std=1e3) for c in contours])
     assert useless.patch.height(5.0, 5.0) == pytest.approx(
-        fit(HIDDEN, contours).patch.height(5.0, 5.0), abs=1e-3
+        HIDDEN.fit(contours).patch.height(5.0, 5.0), abs=1e-3
     )
 
 
@@ -95,7 +91,7 @@ def test_without_a_deviation_normals_change_nothing():
     surface = surfaces.pear()
     contours = touched(surface, 0.05)
     bare = [replace(c, normals=None) for c in contours]
-    one, other = fit(surface, contours), fit(surface, bare)
+    one, other = surface.fit(contours), surface.fit(bare)
     assert np.array_equal(one.posterior.covariance, other.posterior.covariance)
     assert np.array_equal(one.patch.coefficients, other.patch.coefficients)
 
@@ -104,7 +100,7 @@ def test_without_a_deviation_normals_change_nothing():
 def test_the_papers_methods_ignore_them(method):
     surface = surfaces.pear()
     contours = touched(surface, 0.05)
-    one, other = (fit(surface, c, method=method) for c in (contours, measured(contours, 0.01)))
+    one, other = (surface.fit(c, method=method) for c in (contours, measured(contours, 0.01)))
     assert np.array_equal(one.patch.coefficients, other.patch.coefficients)
     assert one.mean_height_std == other.mean_height_std
 
@@ -116,7 +112,7 @@ def test_touches_with_and_without_normals_in_one_call_are_as_alone():
     touches = [contours, measured(contours, 0.02), some, contours]
     results = reconstruct_many([surface.point] * 4, touches, outward=[surface.normal] * 4)
     for r, c in zip(results, touches, strict=True):
-        same(fit(surface, c), r)
+        same(surface.fit(c), r)
     assert results[2].mean_height_std < results[0].mean_height_std
 
 
@@ -128,7 +124,7 @@ def test_they_turn_and_scale_with_the_contacts():
         Contour(1e3 * c.points @ turn.T, normals=7.0 * c.normals @ turn.T, noise=50.0, normal_std=0.03)
         for c in contours
     ]
-    one = fit(surface, contours)
+    one = surface.fit(contours)
     other = reconstruct(1e3 * turn @ surface.point, moved, outward=turn @ surface.normal)
     assert other.frame.axes == pytest.approx(turn @ one.frame.axes, abs=1e-7)
     x, y = one.domain.grid(50)[0].T
@@ -142,7 +138,7 @@ def test_the_order_and_the_side_of_normals_make_no_difference():
     order = np.random.default_rng(1).permutation(25)
     side = np.random.default_rng(2).choice([-1.0, 1.0], (25, 1))
     shuffled = [replace(c, points=c.points[order], normals=(side * c.normals)[order]) for c in contours]
-    one, other = fit(surface, contours), fit(surface, shuffled)
+    one, other = surface.fit(contours), surface.fit(shuffled)
     assert np.abs(np.sum(other.frame.axes * one.frame.axes, axis=0)) == pytest.approx(np.ones(3))
     assert other.mean_height_std == pytest.approx(one.mean_height_std)
 
@@ -217,6 +213,6 @@ def test_normals_of_any_length_and_along_the_tangent_plane_leave_finite_numbers(
         contours[0].points - surface.point + 1e-9,
     ):
         odd = [replace(contours[0], normals=normals, normal_std=0.01), *contours[1:]]
-        r = fit(surface, odd)
+        r = surface.fit(odd)
         assert np.isfinite(r.patch.coefficients).all()
         assert np.isfinite(r.mean_height_std)

@@ -16,6 +16,7 @@ import pytest
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import bmesh
 from mathutils import Euler, Matrix, Vector
+from scenes import datablocks, made, positions, values
 
 from tools import blender
 
@@ -24,31 +25,9 @@ TOP = (0.3, -0.2, 1.9)
 TOUCH = {"location": TOP, "extent": 0.6, "step": 0.06}
 
 
-@pytest.fixture
-def ball(empty):
-    """A finely faceted sphere of radius 2, the active object."""
-    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=RADIUS)
-    return empty.context.object
-
-
 def reconstruct(bpy, **arguments):
     """Runs the operator and returns the new patch and its report."""
-    before = set(bpy.data.objects)
-    assert bpy.ops.tactile.reconstruct(**arguments) == {"FINISHED"}
-    (patch,) = [obj for obj in set(bpy.data.objects) - before if "tactile" in obj]
-    return patch, patch["tactile"].to_dict()
-
-
-def values(mesh, name, key="value", width=1):
-    attribute = mesh.attributes[name]
-    out = np.empty(len(attribute.data) * width)
-    attribute.data.foreach_get(key, out)
-    return out.reshape(-1, width) if width > 1 else out
-
-
-def datablocks(bpy):
-    collections = ("objects", "meshes", "materials", "collections", "node_groups", "images", "curves")
-    return {name: sorted(block.name for block in getattr(bpy.data, name)) for name in collections}
+    return made(bpy.ops.tactile.reconstruct, **arguments)
 
 
 def test_enabling_the_extension_imports_no_scipy():
@@ -70,7 +49,7 @@ def test_the_zip_brought_scipy_for_this_python(extension):
 
 
 def test_the_patch_of_a_ball(empty, ball):
-    source = values(ball.data, "position", "vector", 3)
+    source = positions(ball.data)
     _, report = reconstruct(empty, **TOUCH)
     assert report["status"] == "ok"
     assert [report["k1"], report["k2"]] == pytest.approx([-1 / RADIUS] * 2, rel=0.02)
@@ -84,7 +63,7 @@ def test_the_patch_of_a_ball(empty, ball):
     assert report["frame"]["normal"] == pytest.approx(point / RADIUS, abs=0.02)
     assert report["source"] == "Sphere"
     # The source is as it was.
-    assert np.array_equal(values(ball.data, "position", "vector", 3), source)
+    assert np.array_equal(positions(ball.data), source)
     assert not ball.data.attributes.get("gaussian_curvature")
     assert not ball.data.materials
 
@@ -100,7 +79,7 @@ def test_the_patch_object_holds_what_it_says(empty, ball):
     axes = np.column_stack([frame["d1"], frame["d2"], frame["normal"]])
     assert np.array(patch.matrix_world)[:3, :3] == pytest.approx(axes, abs=1e-6)
     assert list(patch.matrix_world.translation) == pytest.approx(frame["origin"], abs=1e-6)
-    x, y, z = values(mesh, "position", "vector", 3).T
+    x, y, z = positions(mesh).T
     terms = [(i, d - i) for d in (3, 4) for i in range(d, -1, -1)]
     expected = 0.5 * (report["k1"] * x**2 + report["k2"] * y**2)
     expected += sum(c * x**i * y**j for c, (i, j) in zip(report["coefficients"], terms, strict=True))
@@ -161,7 +140,7 @@ def test_the_contours_are_an_object_of_their_own(empty, ball):
     assert np.unique(contour).tolist() == [0, 1, 2]
     assert np.unique(contact).tolist() == list(range(-1, 21))
     # The middle of an octahedron is its contact; the reference point is the eleventh.
-    points = values(lines.data, "position", "vector", 3)
+    points = positions(lines.data)
     centres = points[contact >= 0].reshape(-1, 6, 3).mean(axis=1)
     assert centres[10] == pytest.approx(0.0, abs=1e-6)
     world = np.array([tuple(patch.matrix_world @ Vector(c)) for c in centres])
@@ -557,7 +536,7 @@ def test_a_doubtful_patch_finishes_with_a_warning(empty, capfd):
 def test_a_bump_between_the_curves_is_a_doubt_once_the_mesh_is_compared(empty):
     empty.ops.mesh.primitive_grid_add(x_subdivisions=80, y_subdivisions=80, size=2.0)
     mesh = empty.context.object.data
-    at = values(mesh, "position", "vector", 3)
+    at = positions(mesh)
     touch = {"location": (0.0, 0.0, 0.0), "extent": 0.8}
     assert reconstruct(empty, **touch)[1]["status"] == "ok"
     azimuth = math.radians(30.0)

@@ -13,19 +13,13 @@ from core.monge import monomials
 EXTENT = 12.0
 
 
-def upright(*degrees):
-    return [SamplingPlane(np.radians(a)) for a in degrees]
-
-
-THREE = upright(13, 73, 133)
-FIVE = upright(5, 41, 77, 113, 149)
+THREE = surfaces.UPRIGHT
+FIVE = surfaces.planes((5, 41, 77, 113, 149))
 
 
 def touched(surface, planes=THREE, noise=0.0, seed=0, extent=EXTENT, **options):
-    contours = track(
-        surface, surface.point, surface.normal, planes, extent=extent, step=extent / 12, noise=noise, rng=seed
-    )
-    return reconstruct(surface.point, contours, outward=surface.normal, **options)
+    contours = surface.track(planes, extent=extent, step=extent / 12, noise=noise, rng=seed)
+    return surface.fit(contours, **options)
 
 
 def test_turning_coefficients_about_the_normal_turns_the_surface():
@@ -67,9 +61,8 @@ def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
     ],
     ids=["plane", "sphere", "cylinder", "bottle neck", "pear", "torus", "quartic", "sine", "ellipsoid"],
 )
-@pytest.mark.parametrize("tilts", [(0, 0, 0), (12, -18, 8)], ids=["upright", "tilted"])
-def test_exact_surfaces(surface, bound, curvature, tilts):
-    planes = [SamplingPlane(p.azimuth, np.radians(tilt)) for p, tilt in zip(THREE, tilts, strict=True)]
+@pytest.mark.parametrize("planes", [THREE, surfaces.TILTED], ids=["upright", "tilted"])
+def test_exact_surfaces(surface, bound, curvature, planes):
     r = touched(surface, planes)
     assert surfaces.off_data(surface, r) < bound
     assert [r.patch.k1, r.patch.k2] == pytest.approx([surface.k1, surface.k2], abs=curvature)
@@ -97,7 +90,7 @@ def test_noise_averages_out_and_the_frame_is_better_than_the_papers():
     assert np.median(worst["bayes"]) < 0.4 * np.median(worst["tagc"])
 
 
-@pytest.mark.parametrize("planes", [THREE, upright(13, 48, 93)], ids=["even", "uneven"])
+@pytest.mark.parametrize("planes", [THREE, surfaces.planes((13, 48, 93))], ids=["even", "uneven"])
 def test_intervals_cover_surfaces_drawn_from_the_prior(planes):
     """90 % intervals of height_std, over 60 surfaces with every term to degree 6."""
     rng = np.random.default_rng(3)
@@ -143,7 +136,7 @@ def test_a_lower_degree_is_less_certain_by_what_it_leaves_out():
         (THREE, 6, 10, 27),
         (THREE, 3, 1, 9),
         (THREE, 2, 0, 5),
-        (upright(0, 45, 90, 135), 4, 1, 14),
+        (surfaces.planes((0, 45, 90, 135)), 4, 1, 14),
         (FIVE, 4, 0, 14),
     ],
 )
@@ -176,27 +169,27 @@ def test_following_the_suggested_plane_shows_a_monkey_saddle(noise):
     """(3 x^2 y - y^3) / 900 is zero in the planes at 0, 60 and 120 degrees."""
     s = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})
     lengths = {"extent": 13.0, "step": 13.0 / 12.0, "noise": noise}
-    contours = track(s, s.point, s.normal, upright(0, 60, 120), rng=0, **lengths)
-    before = reconstruct(s.point, contours, outward=s.normal)
+    contours = s.track(surfaces.planes((0, 60, 120)), rng=0, **lengths)
+    before = s.fit(contours)
     plane, _ = suggest_plane(before)
     axes = before.frame.axes
     contours += track(s, s.point, axes[:, 2], [plane], rng=1, tangent=axes[:, 0], **lengths)
-    after = reconstruct(s.point, contours, outward=s.normal)
+    after = s.fit(contours)
     assert surfaces.off_data(s, before) > 0.2
     assert surfaces.off_data(s, after) < 0.02
 
 
 @pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.torus(40, 20, 0.6)], ids=["pear", "torus"])
 def test_the_suggested_plane_brings_what_was_expected_and_no_other_much_more(surface):
-    contours = track(surface, surface.point, surface.normal, THREE, extent=12, step=1, noise=0.03, rng=0)
-    before = reconstruct(surface.point, contours, outward=surface.normal, degree=6)
+    contours = surface.track(THREE, noise=0.03, rng=0)
+    before = surface.fit(contours, degree=6)
     plane, expected = suggest_plane(before)
     axes = before.frame.axes
 
     def after(azimuth):
         lengths = {"extent": 12, "step": 1, "noise": 0.03, "tangent": axes[:, 0]}
         more = track(surface, surface.point, axes[:, 2], [SamplingPlane(azimuth)], rng=1, **lengths)
-        r = reconstruct(surface.point, contours + more, outward=surface.normal, degree=6)
+        r = surface.fit(contours + more, degree=6)
         return r.mean_height_std
 
     assert expected < 0.8 * before.mean_height_std
@@ -219,21 +212,15 @@ def test_one_contact_in_twenty_off_by_a_millimetre_does_not_double_the_error(sur
     rng = np.random.default_rng(5)
     clean, spoilt, unweighted = [], [], []
     for seed in range(10):
-        contours = track(
-            surface, surface.point, surface.normal, THREE, extent=12, step=1, noise=0.02, rng=seed
-        )
-        clean.append(surfaces.off_data(surface, reconstruct(surface.point, contours, outward=surface.normal)))
+        contours = surface.track(THREE, noise=0.02, rng=seed)
+        clean.append(surfaces.off_data(surface, surface.fit(contours)))
         for _ in range(4):
             c, k = rng.integers(3), rng.choice(np.delete(np.arange(25), 12))
             points = contours[c].points.copy()
             points[k] += rng.choice([-1.0, 1.0]) * contours[c].normals[k]
             contours[c] = Contour(points, noise=0.02, normals=contours[c].normals)
-        spoilt.append(
-            surfaces.off_data(surface, reconstruct(surface.point, contours, outward=surface.normal))
-        )
-        quadric = reconstruct(
-            surface.point, contours, outward=surface.normal, method="quadratic-variation", weight=1e5
-        )
+        spoilt.append(surfaces.off_data(surface, surface.fit(contours)))
+        quadric = surface.fit(contours, method="quadratic-variation", weight=1e5)
         unweighted.append(surfaces.off_data(surface, quadric))
     assert np.median(spoilt) < 1.5 * np.median(clean)
     assert np.max(np.divide(spoilt, clean)) < 2.0
@@ -247,9 +234,9 @@ def test_one_contact_in_twenty_off_by_a_millimetre_does_not_double_the_error(sur
     ids=["sphere", "plane", "monkey"],
 )
 def test_umbilics_turn_and_scale_with_the_data(surface, noise):
-    contours = track(surface, surface.point, surface.normal, THREE, extent=9, step=1, noise=noise, rng=2)
+    contours = surface.track(THREE, extent=9, step=1, noise=noise, rng=2)
     turn, scale = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix(), 1e3
-    one = reconstruct(surface.point, contours, outward=surface.normal, sensor_std=noise)
+    one = surface.fit(contours, sensor_std=noise)
     other = reconstruct(
         scale * turn @ surface.point,
         [Contour(scale * c.points @ turn.T) for c in contours],
@@ -266,10 +253,10 @@ def test_umbilics_turn_and_scale_with_the_data(surface, noise):
 
 def test_the_order_of_contacts_and_curves_makes_no_difference_but_for_the_axes_sign():
     s = surfaces.torus(40, 20, 0.6)
-    contours = track(s, s.point, s.normal, THREE, extent=12, step=1, noise=0.02, rng=4)
-    one = reconstruct(s.point, contours, outward=s.normal)
+    contours = s.track(THREE, noise=0.02, rng=4)
+    one = s.fit(contours)
     shuffled = [Contour(np.random.default_rng(0).permutation(c.points), noise=0.02) for c in contours[::-1]]
-    other = reconstruct(s.point, shuffled, outward=s.normal)
+    other = s.fit(shuffled)
     assert [other.patch.k1, other.patch.k2] == pytest.approx([one.patch.k1, one.patch.k2])
     assert np.abs(np.sum(other.frame.axes * one.frame.axes, axis=0)) == pytest.approx(np.ones(3))
 

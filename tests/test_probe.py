@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+import scenes
 from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 
@@ -45,10 +46,7 @@ def report_of(patch):
 
 
 def values(obj, name="position", key="vector", width=3):
-    attribute = obj.data.attributes[name]
-    out = np.empty(len(attribute.data) * width)
-    attribute.data.foreach_get(key, out)
-    return out.reshape(-1, width) if width > 1 else out
+    return scenes.values(obj.data, name, key, width)
 
 
 def state(patch):

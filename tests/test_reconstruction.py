@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
+from surfaces import TILTED, UPRIGHT
 
 from core import (
     METHODS,
@@ -22,10 +23,6 @@ from core import (
     reconstruct_many,
     track,
 )
-
-AZIMUTHS = np.radians([13, 73, 133])
-UPRIGHT = [SamplingPlane(a) for a in AZIMUTHS]
-TILTED = [SamplingPlane(a, t) for a, t in zip(AZIMUTHS, np.radians([12, -18, 8]), strict=True)]
 
 
 @pytest.mark.parametrize("planes", [UPRIGHT, TILTED], ids=["upright", "tilted"])
@@ -47,8 +44,8 @@ TILTED = [SamplingPlane(a, t) for a, t in zip(AZIMUTHS, np.radians([12, -18, 8])
 def test_exact_surfaces_of_paper_size(surface, method, planes):
     """The errors these methods have on 12 mm patches: 2 % of the radius, 2.5 % on the sphere, whose rim least
     |K| flattens, 4 % where the ellipsoid's radius is down to 18 mm; the curvatures to 0.0025 / mm."""
-    contours = track(surface, surface.point, surface.normal, planes, extent=12, step=1)
-    r = reconstruct(surface.point, contours, outward=surface.normal, method=method)
+    contours = surface.track(planes)
+    r = surface.fit(contours, method=method)
     flattened = method == "tagc" and surface.k2 - surface.k1 < 1e-6 and surface.k2 < 0.0
     bound = 0.04 if surface.k1 < -0.05 else 0.025 if flattened else 0.02
     assert surfaces.off_data(surface, r) < bound * r.radius
@@ -63,22 +60,22 @@ def test_exact_surfaces_of_paper_size(surface, method, planes):
 def test_a_quartic_along_its_own_curves_is_seen_by_least_squares_in_the_true_frame():
     """Three curves hide three of the nine directions, whatever the noise: the condition number tells."""
     s = surfaces.quartic()
-    five = [SamplingPlane(a) for a in np.radians([5, 41, 77, 113, 149])]
-    contours = track(s, s.point, s.normal, five, extent=12, step=0.1)
-    r = reconstruct(s.point, contours, outward=s.normal, method="least-squares")
+    five = surfaces.planes((5, 41, 77, 113, 149))
+    contours = s.track(five, extent=12, step=0.1)
+    r = s.fit(contours, method="least-squares")
     assert r.condition_number < 100
     assert r.status == "ok"
     assert surfaces.off_data(s, r) < 0.05
     assert r.patch.coefficients[:4] == pytest.approx([2e-4, -3e-4, 1e-4, 2e-4], abs=2e-4)
-    three = reconstruct(s.point, contours[::2], outward=s.normal, method="least-squares")
+    three = s.fit(contours[::2], method="least-squares")
     assert three.condition_number > 1e3
     assert three.status == "uncertain"
 
 
 def test_degree_2_is_the_quadric_alone():
     s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
-    contours = track(s, s.point, s.normal, UPRIGHT, extent=5, step=0.5)
-    results = [reconstruct(s.point, contours, outward=s.normal, method=m, degree=2) for m in METHODS]
+    contours = s.track(UPRIGHT, extent=5, step=0.5)
+    results = [s.fit(contours, method=m, degree=2) for m in METHODS]
     for r in results:
         assert r.patch.degree == 2
         assert r.patch.height(1.0, 2.0) == pytest.approx(r.patch.k1 / 2 + 2 * r.patch.k2)
@@ -87,8 +84,8 @@ def test_degree_2_is_the_quadric_alone():
 @pytest.mark.parametrize("degree", [3, 5, 6])
 def test_other_degrees(degree):
     s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
-    contours = track(s, s.point, s.normal, UPRIGHT, extent=12, step=1)
-    r = reconstruct(s.point, contours, outward=s.normal, degree=degree)
+    contours = s.track(UPRIGHT)
+    r = s.fit(contours, degree=degree)
     assert r.patch.degree == degree
     assert surfaces.off_data(s, r) < 0.04 * r.radius
 
@@ -97,14 +94,14 @@ def test_other_degrees(degree):
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
 def test_rotating_scaling_and_moving_the_data_moves_the_result(method, scale):
     s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
-    contours = track(s, s.point, s.normal, TILTED, extent=12, step=1, noise=0.02, rng=1)
+    contours = s.track(TILTED, noise=0.02, rng=1)
     turn = Rotation.from_rotvec([0.5, -1.1, 0.8]).as_matrix()
     shift = scale * np.array([30.0, -20.0, 10.0])
 
     def moved(p):
         return scale * np.asarray(p) @ turn.T + shift
 
-    one = reconstruct(s.point, contours, outward=s.normal, method=method)
+    one = s.fit(contours, method=method)
     other = reconstruct(
         moved(s.point), [Contour(moved(c.points)) for c in contours], outward=turn @ s.normal, method=method
     )
@@ -129,9 +126,9 @@ def test_rotating_scaling_and_moving_the_data_moves_the_result(method, scale):
 
 @pytest.mark.parametrize("surface", [surfaces.sphere(25), surfaces.plane()], ids=["sphere", "plane"])
 def test_umbilics_turn_with_the_data_too(surface):
-    contours = track(surface, surface.point, surface.normal, UPRIGHT, extent=12, step=1, noise=0.02, rng=2)
+    contours = surface.track(UPRIGHT, noise=0.02, rng=2)
     turn = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix()
-    one = reconstruct(surface.point, contours, outward=surface.normal, method="quadratic-variation")
+    one = surface.fit(contours, method="quadratic-variation")
     turned = [Contour(c.points @ turn.T) for c in contours]
     other = reconstruct(
         turn @ surface.point, turned, outward=turn @ surface.normal, method="quadratic-variation"
@@ -142,8 +139,8 @@ def test_umbilics_turn_with_the_data_too(surface):
 def test_distances_of_mesh_vertices_over_the_domain():
     """A ball's far side and its inner wall lie over the domain too, but are not the patch's."""
     ball = surfaces.sphere(25)
-    contours = track(ball, ball.point, ball.normal, UPRIGHT, extent=8, step=0.8)
-    r = reconstruct(ball.point, contours, outward=ball.normal, weight=1e5)
+    contours = ball.track(UPRIGHT, extent=8, step=0.8)
+    r = ball.fit(contours, weight=1e5)
     directions = np.random.default_rng(0).normal(size=(20000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     vertices, normals = np.vstack([25 * directions, 22 * directions]), np.vstack([directions, -directions])
@@ -158,13 +155,13 @@ def test_four_to_six_planes_and_curves_that_are_not_planar():
     s = surfaces.torus(40, 20, 0.6)
     for count in (4, 5, 6):
         planes = [SamplingPlane(a) for a in np.pi * np.arange(count) / count]
-        contours = track(s, s.point, s.normal, planes, extent=10, step=1)
-        assert surfaces.off_data(s, reconstruct(s.point, contours, outward=s.normal)) < 0.15
+        contours = s.track(planes, extent=10, step=1)
+        assert surfaces.off_data(s, s.fit(contours)) < 0.15
     # A finger that swerves: the contour of one plane, continued in another one's.
-    one, other = track(s, s.point, s.normal, [SamplingPlane(0.1), SamplingPlane(0.35)], extent=10, step=1)
+    one, other = s.track([SamplingPlane(0.1), SamplingPlane(0.35)], extent=10, step=1)
     swerving = Contour(np.vstack([one.points[:11], other.points[11:]]))
-    rest = track(s, s.point, s.normal, [SamplingPlane(1.2), SamplingPlane(2.3)], extent=10, step=1)
-    r = reconstruct(s.point, [swerving, *rest], outward=s.normal)
+    rest = s.track([SamplingPlane(1.2), SamplingPlane(2.3)], extent=10, step=1)
+    r = s.fit([swerving, *rest])
     assert surfaces.off_data(s, r) < 0.5
 
 
@@ -210,13 +207,13 @@ def test_bad_arguments_are_named(change, message):
 def test_a_touch_without_curves_and_whole_numbers_of_numpy():
     ball = surfaces.sphere(25)
     with pytest.raises(DegenerateCurvesError, match="three curves are needed, got 0"):
-        reconstruct(ball.point, [], outward=ball.normal)
-    assert reconstruct(ball.point, GOOD, outward=ball.normal, degree=np.int64(5)).patch.degree == 5
+        ball.fit([])
+    assert ball.fit(GOOD, degree=np.int64(5)).patch.degree == 5
 
 
 def test_a_sensor_that_knows_nothing_leaves_a_patch_in_doubt():
     ball = surfaces.sphere(25)
-    r = reconstruct(ball.point, GOOD, outward=ball.normal, sensor_std=1e20)
+    r = ball.fit(GOOD, sensor_std=1e20)
     assert r.status == "uncertain"
     assert np.isfinite([r.mean_height_std, r.patch.k1, r.patch.k2]).all()
 
@@ -224,8 +221,7 @@ def test_a_sensor_that_knows_nothing_leaves_a_patch_in_doubt():
 def test_a_weight_beyond_all_measure_leaves_the_contacts_alone():
     ball = surfaces.sphere(25)
     errors = [
-        reconstruct(ball.point, GOOD, outward=ball.normal, method="tagc", degree=6, weight=weight).fit_error
-        for weight in (1e12, 1e20, 1e50)
+        ball.fit(GOOD, method="tagc", degree=6, weight=weight).fit_error for weight in (1e12, 1e20, 1e50)
     ]
     assert errors == pytest.approx(errors[:1] * 3, rel=1e-6)
 
@@ -252,7 +248,7 @@ MANY = [
         surfaces.bottle_neck(),
         surfaces.plane(),
     )
-    for planes in (UPRIGHT, TILTED, [SamplingPlane(a) for a in np.radians([0, 45, 90, 135])])
+    for planes in (UPRIGHT, TILTED, surfaces.planes((0, 45, 90, 135)))
     for noise in (0.0, 0.05)
 ]
 
@@ -263,10 +259,7 @@ def test_many_at_once_are_what_they_are_one_by_one(options):
     rng = np.random.default_rng(7)
     points, outward, touches = [], [], []
     for i, (s, planes, noise) in enumerate(MANY):
-        contours = track(
-            s,
-            s.point,
-            s.normal,
+        contours = s.track(
             planes,
             extent=rng.uniform(6, 12),
             step=rng.uniform(0.7, 1.5),

@@ -10,9 +10,9 @@ import surfaces
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from core import Contour, SamplingPlane, reconstruct, register, track
+from core import Contour, reconstruct, register
 
-PLANES = [SamplingPlane(np.radians(azimuth)) for azimuth in (0, 60, 120)]
+PLANES = surfaces.planes((0, 60, 120))
 TURN, SHIFT = Rotation.from_euler("xyz", (0.7, -1.1, 2.3)).as_matrix(), np.array([310.0, -40.0, 75.0])
 WAVES = ((1.0, (0.27, 0.08, -0.14), 0.4), (0.8, (-0.1, 0.3, 0.19), 1.9), (0.9, (0.16, -0.19, 0.24), 3.0))
 
@@ -60,7 +60,7 @@ def bumpy():
 def touch(surface, *, side=1.0, factor=1.0, noise=0.0):
     """Of `surface`, scaled by `factor`, moved to where TURN and SHIFT bring it back; reconstructed."""
     lengths = {"extent": 10.0, "step": 0.8, "noise": noise, "rng": 3}
-    contours = track(surface, surface.point, surface.normal, PLANES, **lengths)
+    contours = surface.track(PLANES, **lengths)
     moved = [Contour((factor * c.points - SHIFT) @ TURN, noise=factor * noise) for c in contours]
     return reconstruct((factor * surface.point - SHIFT) @ TURN, moved, outward=side * surface.normal @ TURN)
 

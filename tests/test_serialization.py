@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 import surfaces
 
-from core import METHODS, SamplingPlane, from_dict, reconstruct, suggest_plane, to_dict, track
+from core import METHODS, from_dict, suggest_plane, to_dict
 
 SURFACE = surfaces.torus(40, 20, 0.6)
 
 
 def touched(noise=0.05, **options):
-    planes = [SamplingPlane(np.radians(a)) for a in (0, 60, 120)]
-    contours = track(SURFACE, SURFACE.point, SURFACE.normal, planes, extent=12, step=1, noise=noise, rng=1)
-    return reconstruct(SURFACE.point, contours, outward=SURFACE.normal, **options)
+    return SURFACE.fit(SURFACE.track(surfaces.planes((0, 60, 120)), noise=noise, rng=1), **options)
 
 
 RESULTS = [touched(method=method) for method in METHODS]

@@ -12,48 +12,17 @@ from scipy.spatial import cKDTree
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import bmesh
 from mathutils import Matrix
+from scenes import datablocks, made, positions, values
 
 import core
 
-PATCH, DOUBT, CREASE, EDGE, _, NOTHING = range(6)
+PATCH, _, CREASE, EDGE, _, NOTHING = range(6)
 QUANTITIES = ("error", "height_std", "condition_number", "blind_share")
-
-
-def values(mesh, name):
-    out = np.empty(len(mesh.attributes[name].data))
-    mesh.attributes[name].data.foreach_get("value", out)
-    return out
-
-
-def coordinates(mesh):
-    co = np.empty((len(mesh.vertices), 3))
-    mesh.vertices.foreach_get("co", co.ravel())
-    return co
-
-
-def colour(mesh):
-    out = np.empty((len(mesh.vertices), 4))
-    mesh.attributes["stability_colour"].data.foreach_get("color", out.ravel())
-    return out
-
-
-def datablocks(bpy):
-    kinds = ("objects", "meshes", "materials", "collections", "node_groups")
-    return {kind: sorted(getattr(bpy.data, kind).keys()) for kind in kinds}
 
 
 def stability_map(bpy, **arguments):
     """Runs the operator; the painted copy and its record."""
-    before = set(bpy.data.objects)
-    assert bpy.ops.tactile.stability_map(**arguments) == {"FINISHED"}
-    (painted,) = set(bpy.data.objects) - before
-    return painted, painted["tactile_map"].to_dict()
-
-
-@pytest.fixture
-def ball(empty):
-    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
-    return empty.context.object
+    return made(bpy.ops.tactile.stability_map, "tactile_map", **arguments)
 
 
 def grid(bpy, count, size=2.0):
@@ -104,7 +73,7 @@ def test_a_cube_has_patches_on_its_faces_and_none_on_its_edges(empty):
     painted, record = stability_map(empty, spacing=0.01)
     mesh = painted.data
     assert record["points"] == len(mesh.vertices)
-    on_edge = np.count_nonzero(np.abs(coordinates(mesh)) > 0.999, axis=1) > 1
+    on_edge = np.count_nonzero(np.abs(positions(mesh)) > 0.999, axis=1) > 1
     assert np.all(values(mesh, "reason")[on_edge] == CREASE)
     assert np.all(values(mesh, "reason")[~on_edge] == PATCH)
     assert values(mesh, "error")[~on_edge].max() < 1e-5
@@ -120,7 +89,7 @@ def test_what_is_refused_has_no_value_and_a_colour_of_its_own(empty, name):
     refused = values(painted.data, "reason") == CREASE
     assert np.all(values(painted.data, name)[refused] == -1.0)
     assert values(painted.data, name)[~refused].min() >= 0.0
-    shades = colour(painted.data)
+    shades = values(painted.data, "stability_colour", "color", 4)
     assert np.ptp(shades[refused], axis=0).max() == 0.0
     assert shades[refused].max(axis=0)[:3].max() < 0.1
     assert shades[~refused].min(axis=0)[0] > 0.4
@@ -135,7 +104,7 @@ def test_a_sheet_is_refused_at_its_border_and_around_a_hole(empty):
     mesh.to_mesh(obj.data)
     mesh.free()
     painted, record = stability_map(empty, spacing=0.01, extent=0.25, step=0.05)
-    co, reason = coordinates(painted.data), values(painted.data, "reason")
+    co, reason = positions(painted.data), values(painted.data, "reason")
     border = 1.0 - np.abs(co[:, :2]).max(axis=1)
     to_hole = np.linalg.norm(co, axis=1) - 0.3
     assert np.all(reason[border < 1e-6] == EDGE)
@@ -151,7 +120,7 @@ def test_each_of_nested_walls_is_compared_with_itself(empty, ball):
     empty.ops.object.join()
     painted, record = stability_map(empty, spacing=0.3, extent=0.5)
     assert record["patches"] == record["points"]
-    radii = np.linalg.norm(coordinates(painted.data), axis=1)
+    radii = np.linalg.norm(positions(painted.data), axis=1)
     error = values(painted.data, "error")
     for wall in (radii > 1.95, radii < 1.95):
         assert error[wall].max() < 0.004
@@ -160,7 +129,7 @@ def test_each_of_nested_walls_is_compared_with_itself(empty, ball):
 def test_a_bump_between_the_curves_shows_as_error(empty):
     """What no curve has felt makes no doubt, but it is an error."""
     obj = grid(empty, 120)
-    co = coordinates(obj.data)
+    co = positions(obj.data)
     away = np.hypot(co[:, 0] - 0.26, co[:, 1] - 0.15)
     co[:, 2] = 0.1 * np.exp(-((away / 0.05) ** 2))
     obj.data.vertices.foreach_set("co", co.astype(np.float32).ravel())
@@ -174,7 +143,7 @@ def test_a_bump_between_the_curves_shows_as_error(empty):
 def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
     ball.data.attributes.new("error", "BOOLEAN", "FACE")  # in the way, and of another type
     ball.data.materials.append(empty.data.materials.new("Own"))
-    before = (ball.data.attributes.keys(), ball.data.materials.keys(), coordinates(ball.data).tolist())
+    before = (ball.data.attributes.keys(), ball.data.materials.keys(), positions(ball.data).tolist())
     faces = [tuple(face.vertices) for face in ball.data.polygons]
     ball.modifiers.new("Wave", "SUBSURF").levels = 1
     ball.location, ball.rotation_euler, ball.scale = (3.0, 1.0, -2.0), (0.3, 1.0, 2.0), (1.0, 2.0, -0.5)
@@ -182,7 +151,7 @@ def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
     assert before == (
         ball.data.attributes.keys(),
         ball.data.materials.keys(),
-        coordinates(ball.data).tolist(),
+        positions(ball.data).tolist(),
     )
     assert faces == [tuple(face.vertices) for face in ball.data.polygons]
     assert [c.name for c in painted.users_collection] == ["Tactile Patches"]
@@ -217,7 +186,7 @@ def test_the_copy_lies_in_its_target_even_where_that_is_sheared(empty, ball):
     empty.context.view_layer.update()
     painted, _ = stability_map(empty, spacing=1.0)
     matrices = [np.array(obj.matrix_world) for obj in (ball, painted)]
-    places = [coordinates(obj.data) @ m[:3, :3].T for obj, m in zip((ball, painted), matrices, strict=True)]
+    places = [positions(obj.data) @ m[:3, :3].T for obj, m in zip((ball, painted), matrices, strict=True)]
     assert places[1] == pytest.approx(places[0], abs=1e-5)
 
 
@@ -269,7 +238,7 @@ def test_a_vertex_without_a_face_is_not_touched(empty, ball):
 
 def test_faces_of_no_area_are_nothing_to_feel(empty):
     obj = grid(empty, 4)
-    co = coordinates(obj.data)
+    co = positions(obj.data)
     co[:, 1] = 0.0
     obj.data.vertices.foreach_set("co", co.astype(np.float32).ravel())
     obj.data.update()

@@ -8,20 +8,15 @@ import numpy as np
 import pytest
 import surfaces
 
-from core import METHODS, Contour, SamplingPlane, reconstruct, track
+from core import METHODS, Contour, reconstruct
 from core.local_geometry import curves_through, misses, stacked
 
 EXTENT = 12.0
 
 
 def contours_of(surface, degrees=(13, 73, 133), noise=0.05, seed=0, extent=EXTENT, count=12):
-    planes = [SamplingPlane(np.radians(a)) for a in degrees]
     lengths = {"extent": extent, "step": extent / count}
-    return track(surface, surface.point, surface.normal, planes, noise=noise, rng=seed, **lengths)
-
-
-def fitted(surface, contours, **options):
-    return reconstruct(surface.point, contours, outward=surface.normal, **options)
+    return surface.track(surfaces.planes(degrees), noise=noise, rng=seed, **lengths)
 
 
 def moved(contour, shift):
@@ -34,7 +29,7 @@ def moved(contour, shift):
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_where_all_is_well_no_warning(surface, noise):
     for seed in range(5):
-        r = fitted(surface, contours_of(surface, noise=noise, seed=seed))
+        r = surface.fit(contours_of(surface, noise=noise, seed=seed))
         assert r.status == "ok", r.message
         assert r.message.startswith("The patch describes its contacts.")
         assert "3 of 14 coefficients are invisible" in r.message
@@ -42,7 +37,7 @@ def test_where_all_is_well_no_warning(surface, noise):
 
 def test_heights_that_are_good_to_little():
     s = surfaces.pear()
-    r = fitted(s, contours_of(s, noise=1.5))
+    r = s.fit(contours_of(s, noise=1.5))
     assert r.status == "uncertain"
     assert f"Heights are good to {100 * r.mean_height_std / r.radius:.1f} % of the radius" in r.message
     assert "shorter extent, or add sampling planes" in r.message
@@ -50,14 +45,14 @@ def test_heights_that_are_good_to_little():
 
 def test_least_squares_with_upright_planes():
     s = surfaces.pear()
-    r = fitted(s, contours_of(s), method="least-squares")
+    r = s.fit(contours_of(s), method="least-squares")
     assert (r.status, r.condition_number > 1e3) == ("uncertain", True)
     assert "do not determine the surface between the curves" in r.message
 
 
 def test_a_descent_that_has_not_come_to_an_end():
     s = surfaces.pear()
-    r = replace(fitted(s, contours_of(s), method="tagc"), converged=False)
+    r = replace(s.fit(contours_of(s), method="tagc"), converged=False)
     assert r.status == "not_converged"
     assert "use the fast solver, or a smaller weight" in r.message
 
@@ -68,7 +63,7 @@ def test_a_curve_that_misses_the_point_is_named_with_its_distance():
     across = np.cross(contours[1].points[-1] - contours[1].points[0], s.normal)
     across *= 0.4 / np.linalg.norm(across)
     contours[1] = moved(contours[1], across)
-    r = fitted(s, contours)
+    r = s.fit(contours)
     assert r.status == "uncertain"
     assert r.message.startswith("Curve 2 passes the reference point at 0.4")
     assert "set the point where the curves meet" in r.message
@@ -94,7 +89,7 @@ def test_principal_directions_that_may_be_far_off():
     s = surfaces.ellipsoid(30, 28, 27, 0.4, 0.5)  # curvatures that hardly differ
     turned = []
     for seed in range(20):
-        r = fitted(s, contours_of(s, degrees=(13, 33, 53), noise=0.1, seed=seed))
+        r = s.fit(contours_of(s, degrees=(13, 33, 53), noise=0.1, seed=seed))
         if "principal directions" in r.message:
             assert r.status == "uncertain"
             assert "take a longer extent, or add sampling planes" in r.message
@@ -104,10 +99,10 @@ def test_principal_directions_that_may_be_far_off():
 
 def test_the_angle_that_the_frame_may_be_off_is_twice_its_standard_deviation():
     s = surfaces.pear()
-    exact = fitted(s, contours_of(s, noise=0.0)).frame.axes
+    exact = s.fit(contours_of(s, noise=0.0)).frame.axes
     angles, told = [], []
     for seed in range(60):
-        r = fitted(s, contours_of(s, noise=0.1, seed=seed))
+        r = s.fit(contours_of(s, noise=0.1, seed=seed))
         angles.append(np.arccos(min(1.0, abs(exact[:, 0] @ r.frame.axes[:, 0]))))
         told.append(r.posterior.turn())
     assert np.sqrt(np.mean(np.square(angles))) < np.mean(told) < 4.0 * np.sqrt(np.mean(np.square(angles)))
@@ -115,13 +110,13 @@ def test_the_angle_that_the_frame_may_be_off_is_twice_its_standard_deviation():
 
 def test_an_umbilic_has_no_directions_to_be_wrong():
     s = surfaces.sphere(30)
-    assert fitted(s, contours_of(s, noise=0.01)).posterior.turn() == 0.0
+    assert s.fit(contours_of(s, noise=0.01)).posterior.turn() == 0.0
 
 
 @pytest.mark.parametrize("method", METHODS[1:])
 @pytest.mark.parametrize("surface", [surfaces.sphere(35), surfaces.pear(), surfaces.cylinder(20)])
 def test_height_std_of_the_papers_methods_counts_what_they_are_off_the_likeliest_surface(method, surface):
-    r = fitted(surface, contours_of(surface, noise=0.02), method=method)
+    r = surface.fit(contours_of(surface, noise=0.02), method=method)
     points, heights = surfaces.heights_over(surface, r, 100)
     x, y = points.T
     off = r.radius * r.posterior.height(x / r.radius, y / r.radius) - r.patch.height(x, y)

@@ -8,7 +8,7 @@ import surfaces
 
 from core import Contour, SamplingPlane, azimuth_of, track
 
-PLANES = [SamplingPlane(np.radians(a), np.radians(b)) for a, b in ((10, 0), (70, 20), (130, -35))]
+PLANES = surfaces.planes((10, 70, 130), (0, 20, -35))
 
 
 @pytest.mark.parametrize(
@@ -17,9 +17,7 @@ PLANES = [SamplingPlane(np.radians(a), np.radians(b)) for a, b in ((10, 0), (70,
     ids=["sphere", "torus inner", "bottle neck", "quartic"],
 )
 def test_contacts_are_on_the_surface_in_the_plane_and_a_step_apart(surface):
-    for contour, plane in zip(
-        track(surface, surface.point, surface.normal, PLANES, extent=10, step=0.5), PLANES, strict=True
-    ):
+    for contour, plane in zip(surface.track(PLANES, extent=10, step=0.5), PLANES, strict=True):
         assert contour.stops == ("extent", "extent")
         assert len(contour.points) == 41
         assert np.array_equal(contour.points[20], surface.point)
@@ -38,7 +36,7 @@ def test_contacts_are_on_the_surface_in_the_plane_and_a_step_apart(surface):
 def test_a_tilted_plane_cuts_a_smaller_circle_of_a_sphere():
     """A plane tilted by b through a point of a sphere of radius r is r sin b from its centre."""
     ball, tilt = surfaces.sphere(20.0), np.radians(30)
-    (contour,) = track(ball, ball.point, ball.normal, [SamplingPlane(0.4, tilt)], extent=10, step=1)
+    (contour,) = ball.track([SamplingPlane(0.4, tilt)], extent=10, step=1)
     centre = 20.0 * np.sin(tilt) * np.sign(contour.plane_normal @ ball.point) * contour.plane_normal
     assert np.allclose(np.linalg.norm(contour.points - centre, axis=1), 20.0 * np.cos(tilt), atol=1e-9)
 
@@ -126,7 +124,7 @@ def test_a_sheet_is_touched_from_either_side():
 
 def test_a_ball_ends_where_one_height_no_longer_describes_it():
     ball = surfaces.sphere(10.0)
-    (contour,) = track(ball, ball.point, ball.normal, [SamplingPlane(0.0)], extent=30, step=0.5)
+    (contour,) = ball.track([SamplingPlane(0.0)], extent=30, step=0.5)
     assert contour.stops == ("Monge assumption lost",) * 2
     assert (contour.normals @ ball.normal).min() > np.cos(np.radians(75.0))
 

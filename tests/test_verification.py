@@ -10,7 +10,7 @@ import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import Domain, Frame, MongePatch, SamplingPlane, reachable, reconstruct, track, verify
+from core import Domain, Frame, MongePatch, reachable, verify
 from core.verification import _azimuths_between
 
 EXTENT = 10.0
@@ -33,11 +33,8 @@ class Placed(NamedTuple):
 
 
 def touched(surface, degrees=(0, 60, 120), noise=0.0, degree=6):
-    planes = [SamplingPlane(np.radians(a)) for a in degrees]
-    contours = track(
-        surface, surface.point, surface.normal, planes, extent=EXTENT, step=1.0, noise=noise, rng=0
-    )
-    return reconstruct(surface.point, contours, outward=surface.normal, degree=degree)
+    contours = surface.track(surfaces.planes(degrees), extent=EXTENT, noise=noise, rng=0)
+    return surface.fit(contours, degree=degree)
 
 
 def shifted(r, length):

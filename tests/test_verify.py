@@ -11,6 +11,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 from mathutils import Matrix
+from scenes import positions, values
 
 RADIUS = 2.0
 TOP = (0.3, -0.2, 1.9)
@@ -36,13 +37,6 @@ def verified(bpy, patch, **arguments):
     return patch["tactile"]["verification"].to_dict()
 
 
-def values(obj, name, key="value", width=1, kind=float):
-    attribute = obj.data.attributes[name]
-    out = np.empty(len(attribute.data) * width, dtype=kind)
-    attribute.data.foreach_get(key, out)
-    return out.reshape(-1, width) if width > 1 else out
-
-
 def state(obj):
     """All of a mesh object that a verification might change by mistake."""
     names = sorted(obj.data.attributes.keys())
@@ -66,7 +60,7 @@ def activate(bpy, obj, *others):
 def test_by_default_the_mesh_that_was_touched(empty, patch):
     ball = empty.data.objects["Sphere"]
     before, report = state(ball), patch["tactile"].to_dict()
-    names, deviation = set(empty.data.objects.keys()), values(patch, "deviation")
+    names, deviation = set(empty.data.objects.keys()), values(patch.data, "deviation")
     found = verified(empty, patch)
     assert found["target"] == "Sphere"
     assert found["vertices"] == report["vertices"] > 200
@@ -87,7 +81,7 @@ def test_by_default_the_mesh_that_was_touched(empty, patch):
     assert after == report
     assert state(ball) == before
     assert set(empty.data.objects.keys()) == names
-    assert values(patch, "deviation") == pytest.approx(deviation, abs=1e-6)
+    assert values(patch.data, "deviation") == pytest.approx(deviation, abs=1e-6)
 
 
 def test_another_mesh_of_known_distance_by_name_and_by_selection(empty, patch):
@@ -98,7 +92,7 @@ def test_another_mesh_of_known_distance_by_name_and_by_selection(empty, patch):
     assert named["target"] == "Larger"
     assert named["vertex_distance_mean"] == pytest.approx(0.01, rel=0.05)
     assert named["extra_fit_error"] == pytest.approx(0.01, rel=0.1)
-    assert values(patch, "deviation").mean() == pytest.approx(-0.01, rel=0.1)
+    assert values(patch.data, "deviation").mean() == pytest.approx(-0.01, rel=0.1)
     assert patch["tactile"]["status"] == "uncertain"
     activate(empty, patch, other)
     selected = verified(empty, patch)
@@ -139,7 +133,7 @@ def test_a_patch_moved_off_its_mesh(empty, patch):
     found = verified(empty, patch)
     assert found["vertex_distance_max"] == pytest.approx(0.05, rel=0.05)
     assert found["contact_distance_max"] < 1e-3
-    assert values(patch, "deviation").mean() == pytest.approx(0.05, rel=0.05)
+    assert values(patch.data, "deviation").mean() == pytest.approx(0.05, rel=0.05)
 
 
 def test_the_scenes_unit_is_the_panels(empty, patch, extension):
@@ -148,13 +142,13 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     settings.system, settings.scale_length, settings.length_unit = "METRIC", 0.001, "MILLIMETERS"
     found = verified(empty, patch)
     unit = addon.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
-    head, *rows, points = addon.verification.table_of(found, unit)
+    head, *rows, points = addon.report.verification_table(found, unit)
     assert head == ("Distance", "Mesh", "Contacts")
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
     assert all(cell.endswith(" mm") for row in rows for cell in row[1:])
     assert rows[0][1] == f"{found['vertex_distance_mean']:.3g} mm"
     assert points == ("Points", str(found["vertices"]), "60")
-    assert dict(addon.verification.rows_of(found, unit))["Overlap"] == "100 %"
+    assert dict(addon.report.verification_rows(found, unit))["Overlap"] == "100 %"
 
 
 def test_what_is_written_on_the_mesh_where_that_is_asked_for(empty, patch):
@@ -165,12 +159,12 @@ def test_what_is_written_on_the_mesh_where_that_is_asked_for(empty, patch):
     after = state(ball)
     assert set(after[3]) - set(before[3]) == {"patch_distance"}
     assert after[:3] == before[:3]
-    distance, overlap = values(ball, "patch_distance"), values(ball, "patch_overlap", kind=bool)
+    distance, overlap = values(ball.data, "patch_distance"), values(ball.data, "patch_overlap") == 1
     assert overlap.sum() == found["vertices"]
     assert distance[overlap].mean() == pytest.approx(found["vertex_distance_mean"], rel=1e-5)
     assert distance[overlap].max() == pytest.approx(found["vertex_distance_max"], rel=1e-5)
     assert (distance[~overlap] == -1.0).all()
-    at = values(ball, "position", "vector", 3)[overlap]
+    at = positions(ball.data)[overlap]
     assert np.linalg.norm(at - patch["tactile"]["frame"]["origin"], axis=1).max() < 0.7
 
 
@@ -187,7 +181,7 @@ def test_half_covered_and_nothing_below(empty, patch, capfd):
     activate(empty, patch)
     found = verified(empty, patch, target="Half", write=True)
     assert found["overlap"] == pytest.approx(0.5, abs=0.03)
-    overlap = values(empty.data.objects["Half"], "patch_overlap", kind=bool)
+    overlap = values(empty.data.objects["Half"].data, "patch_overlap") == 1
     assert found["vertices"] == overlap.sum() < patch["tactile"]["vertices"]
     assert "it covers 5" in capfd.readouterr().out.replace("covers 4", "covers 5")
     add_ball(empty, 0.1, "Far")
@@ -222,7 +216,7 @@ def test_a_coarse_mesh_has_no_vertices_over_the_patch(empty, capfd):
 
 def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patch, capfd):
     ball = empty.data.objects["Sphere"]
-    at = values(ball, "position", "vector", 3)
+    at = positions(ball.data)
     away = np.linalg.norm(at - np.array(patch["tactile"]["frame"]["origin"]), axis=1)
     at *= 1.0 + 0.05 * np.clip(1.0 - away / 0.5, 0.0, 1.0)[:, None]
     ball.data.vertices.foreach_set("co", at.ravel())  # by the attribute, Blender would keep its old tree
@@ -256,10 +250,10 @@ def test_a_linked_copy_keeps_its_own_deviation(empty, patch):
     empty.context.collection.objects.link(copy)
     add_ball(empty, RADIUS + 0.01, "Larger")
     activate(empty, patch)
-    deviation = values(copy, "deviation")
+    deviation = values(copy.data, "deviation")
     verified(empty, patch, target="Larger")
     assert patch.data != copy.data
-    assert (values(copy, "deviation") == deviation).all()
+    assert (values(copy.data, "deviation") == deviation).all()
 
 
 def several(bpy, patch):
@@ -358,7 +352,7 @@ def test_without_a_patch_and_in_edit_mode_the_button_is_grey(empty, patch):
 def test_one_undo_takes_all_of_it_back(empty, patch):
     add_ball(empty, RADIUS + 0.01, "Larger")
     activate(empty, patch)
-    name, deviation, status = patch.name, values(patch, "deviation"), patch["tactile"]["status"]
+    name, deviation, status = patch.name, values(patch.data, "deviation"), patch["tactile"]["status"]
     empty.ops.ed.undo_push(message="before")
     empty.ops.tactile.verify("EXEC_DEFAULT", True, target="Larger", write=True)
     assert "patch_distance" in empty.data.objects["Larger"].data.attributes
@@ -369,26 +363,23 @@ def test_one_undo_takes_all_of_it_back(empty, patch):
     patch = empty.data.objects[name]
     assert "verification" not in patch["tactile"]
     assert patch["tactile"]["status"] == status
-    assert (values(patch, "deviation") == deviation).all()
+    assert (values(patch.data, "deviation") == deviation).all()
     assert "patch_distance" not in empty.data.objects["Larger"].data.attributes
     empty.ops.ed.redo()
     assert empty.data.objects[name]["tactile"]["verification"]["target"] == "Larger"
 
 
-def test_from_the_shell(empty, extension, tmp_path, capfd):
+def test_from_the_shell(empty, command, tmp_path):
     ball, report, table = (tmp_path / name for name in ("ball.ply", "report.json", "table.csv"))
     add_ball(empty)
     empty.ops.wm.ply_export(filepath=str(ball))
-    main = extension.tactile_addon.command_line.main
     words = ["reconstruct", ball, "--location", *TOP, "--extent", 0.6]
-    assert main([str(word) for word in (*words, "--json", report, "--verify", table)]) == 0
-    out = capfd.readouterr().out
+    code, out, _ = command(*words, "--json", report, "--verify", table)
+    assert code == 0
     assert "(6) on more curves" in out
     assert "100 % of the area" in out
     found = json.loads(report.read_text())["verification"]
-    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
-    assert len(rows) == 1
-    (row,) = rows
+    (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())
     assert [row[key] for key in ("patch", "source", "target", "status")] == [
         "ball Patch",
         "ball",
@@ -400,16 +391,12 @@ def test_from_the_shell(empty, extension, tmp_path, capfd):
             length = "distance" in key or "error" in key
             assert float(row[f"{key} [unit of the file]" if length else key]) == value
     assert math.isclose(found["overlap"], 1.0)
-    assert main([str(word) for word in (*words, "--verify", tmp_path / "no" / "table.csv")]) == 1
-    assert 'to write "table.csv" to' in capfd.readouterr().err
+    code, _, err = command(*words, "--verify", tmp_path / "no" / "table.csv")
+    assert (code, 'to write "table.csv" to' in err) == (1, True)
     # Where no vertex is over the patch the cells are empty.
     empty.ops.wm.read_homefile(use_empty=True)
     empty.ops.mesh.primitive_plane_add(size=10.0)
-    words = ["reconstruct", "--location", 0.5, 0.2, 0, "--verify", table]
-    assert main([str(word) for word in words]) == 0
+    assert command("reconstruct", "--location", 0.5, 0.2, 0, "--verify", table)[0] == 0
     (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())
-    assert (row["vertices"], row["vertex_distance_mean [unit of the file]"], row["contacts"]) == (
-        "0",
-        "",
-        "72",
-    )
+    cells = [row[key] for key in ("vertices", "vertex_distance_mean [unit of the file]", "contacts")]
+    assert cells == ["0", "", "72"]

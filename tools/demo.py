@@ -46,7 +46,7 @@ def touch(extension, mesh=""):
     import bpy
 
     if mesh:
-        extension.tactile_addon.command_line.open_file(Path(mesh))
+        extension.tactile_addon.mesh_file.open_file(Path(mesh))
         target = next(o for o in bpy.context.scene.objects if o.type == "MESH" and len(o.data.polygons))
         corners = np.array([target.matrix_world @ type(target.location)(c) for c in target.bound_box])
         location, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
@@ -183,15 +183,22 @@ def render(patch, path, samples=32):
     import bpy
 
     scene = bpy.context.scene
-    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
-    scene.cycles.samples, scene.cycles.use_denoising = samples, False
-    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
-    scene.render.image_settings.file_format, scene.render.filepath = "PNG", str(path)
     towards = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
     (lines,) = patch.children
     patch.delta_location, lines.delta_location = towards, patch.matrix_world.to_3x3().inverted() @ towards
-    bpy.ops.render.render(write_still=True)
+    photograph(scene, path, WIDTH, HEIGHT, samples)
     patch.delta_location = lines.delta_location = (0.0, 0.0, 0.0)
+
+
+def photograph(scene, path, width, height, samples=32):
+    """Draws the scene as it is with Cycles, as .png."""
+    import bpy
+
+    scene.render.engine, scene.cycles.device = "CYCLES", "CPU"
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    scene.render.image_settings.file_format, scene.render.filepath = "PNG", str(path)
+    bpy.ops.render.render(write_still=True)
 
 
 if __name__ == "__main__":

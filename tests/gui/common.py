@@ -30,6 +30,14 @@ def look(point, direction, distance, perspective="PERSP"):
     area.spaces.active.shading.color_type = "VERTEX"
 
 
+def open_tab():
+    """The sidebar, and in it the extension's tab."""
+    gui.sidebar()
+    yield 1
+    gui.sidebar("Tactile")
+    yield 1
+
+
 def until(reached, seconds=40):
     """Waits until something is so: a window without a graphics card may take its time."""
     for _ in range(10 * seconds):

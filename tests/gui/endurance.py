@@ -16,7 +16,7 @@ import gui
 from bpy.app.handlers import persistent
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks
+from common import check, data_blocks, open_tab
 
 MODULE = "bl_ext.user_default.tactile_patch"
 CYCLES, RELOAD, WARM_UP, TIMES = 200, 10, 100, 50
@@ -136,10 +136,7 @@ def enabling():
 
 
 def steps():
-    gui.sidebar()
-    yield 1
-    gui.sidebar("Tactile")
-    yield 1
+    yield from open_tab()
     bpy.data.objects["Suzanne"].modifiers["Subdivision"].levels = 1  # undo evaluates it again, each time
     bpy.ops.wm.save_as_mainfile(filepath=SCENE)
     bpy.ops.wm.open_mainfile(filepath=SCENE)  # without what nobody uses

@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, last_report, look, until
+from common import check, data_blocks, last_report, look, open_tab, until
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
@@ -260,11 +260,8 @@ def scan():
 
 
 def steps():
-    gui.sidebar()
-    yield 1
-    gui.sidebar("Tactile")
+    yield from open_tab()
     measure_slices()
-    yield 1
     yield from by_button()
     yield from by_escape()
     yield from meanwhile()

@@ -15,7 +15,7 @@ import gui
 from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, last_report, look
+from common import check, last_report, look, open_tab
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
@@ -121,10 +121,7 @@ def scan():
 
 
 def steps():
-    gui.sidebar()
-    yield 1
-    gui.sidebar("Tactile")
-    yield 1
+    yield from open_tab()
     yield from by_button()
     yield from another_mesh()
     yield from scan()

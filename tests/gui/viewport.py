@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 from mathutils import Quaternion, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, look, until
+from common import check, data_blocks, look, open_tab, until
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
@@ -496,10 +496,7 @@ def looks():
 
 
 def steps():
-    gui.sidebar()
-    yield 1
-    gui.sidebar("Tactile")
-    yield 1
+    yield from open_tab()
     yield from pick("Suzanne")
     yield from drag_handles()
     yield from move_probe()

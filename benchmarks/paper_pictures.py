@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pictures of benchmarks.paper: scans and patches as the paper shows them, and sheets of them."""
+
+import numpy as np
+
+from core.verification import is_hidden
+from tools import demo
+
+from . import ROOT
+
+OUTPUT = ROOT / "build" / "paper"
+CUT = 1.65  # radii around the reference point that are shown of a mesh
+TALL = 8.19  # mm above and below the point that are shown of the neck's patches
+SIZE = 480  # pixels of a picture in a sheet
+INKS = {
+    "black": (0.004, 0.004, 0.004, 1.0),
+    "red": (0.85, 0.01, 0.01, 1.0),
+    "blue": (0.01, 0.08, 0.6, 1.0),
+    "brown": (0.42, 0.18, 0.05, 1.0),
+}
+
+
+class Stage:
+    """A scene to fill and to photograph."""
+
+    def __init__(self, extension, scene):
+        self.patch_object, self.scene = extension.tactile_addon.patch_object, scene
+
+    def ink(self, name):
+        return self.patch_object.emission(name, colour=INKS[name])
+
+    def add(self, name, data, material=None):
+        import bpy
+
+        obj = bpy.data.objects.new(name, data)
+        if material is not None:
+            data.materials.append(material)
+        self.scene.collection.objects.link(obj)
+        return obj
+
+    def mesh(self, name, points, triangles, material=None, attributes=()):
+        import bpy
+
+        data = bpy.data.meshes.new(name)
+        self.patch_object.fill(data, points, triangles, list(attributes))
+        data.shade_smooth()
+        return self.add(name, data, material)
+
+    def line(self, points, thickness, material):
+        import bpy
+
+        data = bpy.data.curves.new("Line", "CURVE")
+        data.dimensions, data.bevel_depth, data.use_fill_caps = "3D", thickness, True
+        spline = data.splines.new("POLY")
+        spline.points.add(len(points) - 1)
+        spline.points.foreach_set("co", np.column_stack([points, np.ones(len(points))]).ravel())
+        return self.add("Line", data, material)
+
+    def dots(self, points, radius, material):
+        """A ball at each of points (n, 3)."""
+        import bmesh
+        import bpy
+
+        ball = bpy.data.meshes.new("Ball")
+        form = bmesh.new()
+        bmesh.ops.create_icosphere(form, subdivisions=2, radius=radius)
+        form.to_mesh(ball)
+        form.free()
+        corners, faces = (
+            np.array([v.co for v in ball.vertices]),
+            np.array([f.vertices for f in ball.polygons]),
+        )
+        balls = (points[:, None] + corners).reshape(-1, 3)
+        faces = (len(corners) * np.arange(len(points))[:, None, None] + faces).reshape(-1, 3)
+        return self.mesh("Dots", balls, faces, material)
+
+    def arrow(self, start, way, thickness, material):
+        import bpy
+        from mathutils import Vector
+
+        line = self.line(np.array([start, start + 0.8 * way]), thickness, material)
+        bpy.ops.mesh.primitive_cone_add(
+            radius1=3.0 * thickness,
+            depth=0.25 * np.linalg.norm(way),
+            location=start + 0.875 * way,
+            rotation=Vector(way).to_track_quat("Z", "Y").to_euler(),
+        )
+        bpy.context.object.data.materials.append(material)
+        return [line, bpy.context.object]
+
+    def photograph(self, name, centre, view, up, width, overlays=()):
+        """Renders to build/paper/NAME.png what is seen from `view`, with `up` upward.
+
+        Overlays come nearer for that, which an orthographic camera does not show.
+        """
+        import bpy
+        from mathutils import Matrix, Vector
+
+        view = Vector(view).normalized()
+        right = Vector(up).cross(view).normalized()
+        axes = Matrix((right, view.cross(right), view)).transposed()
+        place = Matrix.LocRotScale(Vector(centre) + 10.0 * width * view, axes, None)
+        camera = self.add("Camera", bpy.data.cameras.new("Camera"))
+        sun = self.add("Sun", bpy.data.lights.new("Sun", "SUN"))
+        self.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.35
+        camera.data.type, camera.data.ortho_scale, camera.data.clip_end = "ORTHO", width, 20.0 * width
+        camera.matrix_world, self.scene.camera = place, camera
+        sun.data.energy, sun.data.angle = 3.5, 0.3
+        sun.matrix_world = place @ Matrix.Rotation(-0.7, 4, "X") @ Matrix.Rotation(-0.6, 4, "Y")
+        for obj in overlays:
+            obj.delta_location = 2.0 * width * view
+        self.scene.render.film_transparent, self.scene.render.image_settings.color_mode = True, "RGBA"
+        demo.photograph(self.scene, OUTPUT / f"{name}.png", SIZE, SIZE)
+        bpy.data.objects.remove(sun)
+
+
+def draw_row(extension, place, r, contours):
+    """A row of Table I: the scan, alone in the scene, and its patch from outside and from inside."""
+    import bpy
+
+    scene = bpy.context.scene
+    (obj,) = scene.objects
+    stage, n = Stage(extension, scene), r.frame.axes[:, 2]
+    demo.look(scene, obj)
+    box = np.array(obj.bound_box)
+    up = np.array([0.0, 0.0, 1.0]) if abs(n[2]) < 0.8 else np.array([0.0, 1.0, 0.0])
+    size = float(np.linalg.norm(np.ptp(box, axis=0)))
+    spot = stage.dots(place.point[None], 0.022 * size, stage.ink("red"))
+    stage.photograph(f"{place.name}_1", box.mean(axis=0), n + 0.35 * up, up, 0.8 * size, [spot])
+    for gone in (obj, spot):
+        gone.hide_render = True
+    _cut(stage, obj, place, r)
+    plane, triangles = r.domain.triangulation(40)
+    surface = r.frame.to_world(np.column_stack([plane, r.patch.height(*plane.T)]))
+    stage.mesh("Patch", surface, triangles, stage.ink("black"))
+    red, brown, size = stage.ink("red"), stage.ink("brown"), r.radius
+    overlays = [stage.line(curve.points, 0.02 * size, red) for curve in contours]
+    for axis in r.frame.axes.T:
+        overlays += stage.arrow(place.point, 0.75 * size * axis, 0.035 * size, brown)
+    stage.photograph(f"{place.name}_2", place.point, n - 0.6 * up, up, 3.6 * size, overlays)
+    stage.photograph(f"{place.name}_3", place.point, -n + 0.6 * up, up, 3.6 * size, overlays)
+
+
+def _cut(stage, obj, place, r):
+    """The mesh around the patch, each vertex coloured by its unit outward normal as R, G, B."""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    points, normals = np.empty((2, len(mesh.vertices), 3), dtype=np.float32)
+    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    mesh.vertex_normals.foreach_get("vector", normals.ravel())
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    up, (x, y, z) = r.frame.axes[:, 2].tolist(), r.frame.to_local(points).T
+    near = (np.hypot(x, y) < CUT * r.radius) & (np.abs(z) < CUT * r.radius)
+    for i in np.flatnonzero(near):  # what lies below another layer is in the way of the view from inside
+        near[i] = not is_hidden(place.surface, points[i].tolist(), up, 2.0 * CUT * r.radius)
+    # Emission is in linear light, the colours meant are as seen.
+    colours = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
+    attributes = [("normal_colour", "FLOAT_COLOR", colours.astype(np.float32))]
+    material = stage.patch_object.emission("Normals", attribute="normal_colour")
+    stage.mesh("Mesh", points, triangles[near[triangles].all(axis=1)], material, attributes)
+
+
+def draw_neck(extension, name, r, contacts, verifying):
+    """A patch, with red contacts and blue verifying points, both in its frame."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_empty=True)
+    stage = Stage(extension, bpy.context.scene)
+    plane, triangles = r.domain.triangulation(100)
+    patch = stage.mesh("Patch", np.column_stack([plane, r.patch.height(*plane.T)]), triangles)
+    _cut_off(patch.data, TALL)
+    demo.look(bpy.context.scene, patch)
+    stage.dots(contacts, 0.04 * r.radius, stage.ink("red"))
+    stage.dots(verifying, 0.022 * r.radius, stage.ink("blue"))
+    stage.photograph(name, (0, 0, -0.1 * r.radius), (-0.55, -0.7, 0.6), (0, 0, 1), 2.45 * r.radius)
+
+
+def _cut_off(mesh, height):
+    """What of the mesh is farther than that from z = 0 goes."""
+    import bmesh
+
+    form = bmesh.new()
+    form.from_mesh(mesh)
+    for sign in (1.0, -1.0):
+        geometry = [*form.verts, *form.edges, *form.faces]
+        plane = {"plane_co": (0.0, 0.0, sign * height), "plane_no": (0.0, 0.0, sign)}
+        bmesh.ops.bisect_plane(form, geom=geometry, clear_outer=True, **plane)
+    form.to_mesh(mesh)
+    form.free()
+
+
+def sheet(name, pictures, column_titles, row_titles, caption):
+    """build/paper/NAME.jpg from the pictures of that folder, row by row, under their titles."""
+    from .plot import plt
+
+    rows, columns = len(pictures), len(pictures[0])
+    figure, axes = plt.subplots(rows, columns, figsize=(10, 10 * rows / columns + 0.9), squeeze=False)
+    for i, j in np.ndindex(rows, columns):
+        axes[i, j].imshow(plt.imread(OUTPUT / f"{pictures[i][j]}.png"), interpolation="lanczos")
+        axes[i, j].set(xticks=[], yticks=[], frame_on=False)
+        if i == 0:
+            axes[i, j].set_title(column_titles[j], fontsize=14)
+    for axis, title in zip(axes[:, 0], row_titles, strict=False):
+        axis.set_ylabel(title, fontsize=14)
+    inch = 1.0 / figure.get_figheight()
+    figure.subplots_adjust(0.03, 0.55 * inch, 1.0, 1.0 - 0.4 * inch, wspace=0.02, hspace=0.02)
+    figure.text(0.5, 0.08 * inch, caption, ha="center", va="bottom", fontsize=12)
+    figure.savefig(OUTPUT / f"{name}.jpg", dpi=100, facecolor="white", pil_kwargs={"quality": 88})

@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What tests see of a scene: what an operator made, the values of attributes, which datablocks there are."""
+
+import bpy
+import numpy as np
+
+
+def made(operator, record="tactile", **arguments):
+    """The object with such a record that an operator makes, and the record."""
+    before = set(bpy.data.objects)
+    assert operator(**arguments) == {"FINISHED"}
+    (obj,) = (obj for obj in set(bpy.data.objects) - before if record in obj)
+    return obj, obj[record].to_dict()
+
+
+def values(mesh, name, key="value", width=1):
+    """Those of an attribute, (n,) or (n, width)."""
+    attribute = mesh.attributes[name]
+    out = np.empty(len(attribute.data) * width)
+    attribute.data.foreach_get(key, out)
+    return out.reshape(-1, width) if width > 1 else out
+
+
+def positions(mesh):
+    return values(mesh, "position", "vector", 3)
+
+
+def datablocks(bpy):
+    """Their names, by kind."""
+    kinds = ("objects", "meshes", "materials", "collections", "node_groups", "images", "curves")
+    return {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
