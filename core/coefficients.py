@@ -6,8 +6,8 @@ import numpy as np
 
 from . import fitting, tagc
 from .arguments import Array
+from .curves import Curves
 from .domain import Domain
-from .local_geometry import Curves
 
 PAPER_METHODS = ("tagc", "quadratic-variation", "least-squares")
 SOLVERS = ("fast", "descent")

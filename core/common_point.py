@@ -11,14 +11,8 @@ from numpy.typing import ArrayLike
 
 from .arguments import LARGEST, Array, finite_array, list_of
 from .contour import Contour
-from .local_geometry import (
-    LEAST_ANGLE,
-    LEAST_CONTACTS,
-    DegenerateCurvesError,
-    curves_through,
-    local_curves,
-    stacked,
-)
+from .curves import LEAST_CONTACTS, curves_through, local_curves, stacked
+from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 
 APART = 0.1  # of a curve's size, that it may miss the point by
 GAP = 0.25  # of a curve's size, that it may have no contacts in around the point

@@ -12,18 +12,9 @@ from .arguments import LARGEST, Array, finite_array, list_of, number, shown, uni
 from .bayes import joint_fit
 from .coefficients import PAPER_METHODS, SOLVERS, coefficients
 from .contour import Contour
+from .curves import Curves, curves_through, has_measured_normals, stacked
 from .domain import Domain, closed_spline_domain
-from .local_geometry import (
-    Curves,
-    DegenerateCurvesError,
-    Frame,
-    curves_through,
-    darboux_frames,
-    degeneracy,
-    has_measured_normals,
-    stacked,
-    surface_normals,
-)
+from .local_geometry import DegenerateCurvesError, Frame, darboux_frames, degeneracy, surface_normals
 from .monge import MongePatch
 from .posterior import Posterior
 from .result import Reconstruction

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from . import fitting
 from .arguments import Array
 from .bayes import posterior_of
+from .curves import Curves, misses
 from .domain import Domain
-from .local_geometry import Curves, Frame, misses
+from .local_geometry import Frame
 from .monge import MongePatch, exponents, monomials
 from .posterior import TERMS, Posterior, coefficients_of, terms_to
 from .verification import fit_error, total_absolute_curvature

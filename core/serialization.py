@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from .arguments import LARGEST, finite_array, number, shown
+from .curves import Curves
 from .domain import closed_spline_domain
-from .local_geometry import Curves, Frame
+from .local_geometry import Frame
 from .monge import MongePatch
 from .posterior import FREE, TERMS, Posterior, terms_to
 from .reconstruction import METHODS

@@ -8,13 +8,8 @@ import surfaces
 from surfaces import TILTED, UPRIGHT
 
 from core import Contour, DegenerateCurvesError, SamplingPlane, reconstruct
-from core.local_geometry import (
-    curves_through,
-    darboux_frames,
-    principal_curvatures,
-    stacked,
-    surface_normals,
-)
+from core.curves import curves_through, stacked
+from core.local_geometry import darboux_frames, principal_curvatures, surface_normals
 
 EXACT = {
     "plane": surfaces.plane(),

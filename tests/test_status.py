@@ -9,7 +9,7 @@ import pytest
 import surfaces
 
 from core import METHODS, Contour, reconstruct
-from core.local_geometry import curves_through, misses, stacked
+from core.curves import curves_through, misses, stacked
 
 EXTENT = 12.0
 
