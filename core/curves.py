@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contours as seen from the reference point: in running order, with tangents and curvature vectors (III-C)."""
+"""Contours as seen from the reference point: sorted, with tangents and curvature vectors (paper, III-C)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
