@@ -214,7 +214,7 @@ def draw_menu(self, context):
         self.layout.operator(operator.bl_idname)
     for operator in (TACTILE_OT_verify, TACTILE_OT_register):
         self.layout.operator(operator.bl_idname)
-    for operator in (TACTILE_OT_add_plane, TACTILE_OT_delete):
+    for operator in (TACTILE_OT_add_plane, TACTILE_OT_update, TACTILE_OT_delete):
         self.layout.operator(operator.bl_idname)
 
 

@@ -11,11 +11,17 @@ from .report import sentence
 from .settings import NAMES, TouchSettings, draw_all, touch_arguments
 from .surface import MeshSurface
 from .touch import touch
-from .viewport import mouse_ray, viewport_below
+from .viewport import draw_hints, mouse_ray, viewport_below
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
 LAYERS = 64  # patches and hidden objects that the mouse sees through at most
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
+HINTS = (
+    ("MOUSE_LMB", "Touch Here"),
+    ("MOUSE_RMB", "Cancel"),
+    ("EVENT_ESC", "Cancel"),
+    ("MOUSE_MMB", "Navigate"),
+)
 
 
 class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
@@ -69,7 +75,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         )
         self._area = context.area
         context.window.cursor_modal_set("EYEDROPPER")
-        context.workspace.status_text_set(_draw_hints)
+        context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         context.window_manager.modal_handler_add(self)
         self._hover(context, event)
         return {"RUNNING_MODAL"}
@@ -171,18 +177,6 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             words = sentence(error)
         self._area.header_text_set(f"Pick Reference Point     {words}")
         _redraw(context)
-
-
-def _draw_hints(header, context):
-    layout = header.layout
-    for icon, text in (
-        ("MOUSE_LMB", "Touch Here"),
-        ("MOUSE_RMB", "Cancel"),
-        ("EVENT_ESC", "Cancel"),
-        ("MOUSE_MMB", "Navigate"),
-    ):
-        layout.label(text=text, icon=icon)
-    layout.separator_spacer()
 
 
 def _redraw(context):

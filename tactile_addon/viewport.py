@@ -1,8 +1,19 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is below the mouse: the 3D viewport, and the line into the scene."""
+"""What is below the mouse: the 3D viewport, and the line into the scene; and what its buttons do."""
 
 from mathutils import Vector
+
+WIDE = 1.0  # of the icon of a key beyond that of a mouse button, in separators
+
+
+def draw_hints(layout, hints):
+    """The (icon, text) of mouse and keys in the status bar."""
+    for icon, text in hints:
+        layout.label(text="", icon=icon)
+        if icon.startswith("EVENT_"):
+            layout.separator(factor=WIDE)
+        layout.label(text=text)
 
 
 def viewport_below(context, event):

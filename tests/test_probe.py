@@ -502,6 +502,10 @@ def test_deleting_takes_all_of_the_probe_and_nothing_else(empty, ball, active):
     select(empty, empty.data.objects[f"{active}.001"])
     assert empty.ops.tactile.delete() == {"FINISHED"}
     assert datablocks(empty) == others
+    select(empty, empty.data.objects[active])
+    assert empty.ops.tactile.delete() == {"FINISHED"}
+    assert names(empty) == SET[:1]
+    assert all(block.users for blocks in (empty.data.meshes, empty.data.materials) for block in blocks)
 
 
 def test_without_a_probe_there_is_nothing_to_change(empty, ball):
@@ -542,7 +546,9 @@ def test_a_probe_comes_to_another_file(empty, ball, tmp_path, capfd, append):
     empty.ops.wm.read_homefile(use_empty=True)
     if append:  # with its target, in the scene; the patch is made here
         empty.ops.wm.append(directory=f"{path}/Object/", filename="Sphere Probe")
+        update(empty)
         probe = empty.data.objects["Sphere Probe"]
+        assert_touches(probe, *probe.children)
         probe.tactile_probe.extent = 0.5
         assert_touches(probe, *probe.children)
     else:  # linked, with its target: kept up to date in its own file
@@ -695,15 +701,16 @@ def test_disabling_takes_handler_and_properties_away_and_enabling_brings_them_ba
     import addon_utils
 
     def seen():
-        modules = [handler.__module__ for handler in empty.app.handlers.depsgraph_update_post]
+        handlers = (empty.app.handlers.depsgraph_update_post, empty.app.handlers.blend_import_post)
+        modules = [handler.__module__ for each in handlers for handler in each]
         there = [hasattr(empty.types.Object, name) for name in ("tactile_probe", "tactile_colours")]
         return [sum(module.startswith(extension.__name__) for module in modules), *there]
 
-    assert seen() == [1, True, True]
+    assert seen() == [2, True, True]
     addon_utils.disable(extension.__name__)
     assert seen() == [0, False, False]
     addon_utils.enable(extension.__name__)
-    assert seen() == [1, True, True]
+    assert seen() == [2, True, True]
     assert_touches(*pick(empty))
 
 
