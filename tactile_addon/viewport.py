@@ -4,16 +4,18 @@
 
 from mathutils import Vector
 
-WIDE = 1.0  # of the icon of a key beyond that of a mouse button, in separators
+WIDE = ("EVENT_ESC", "EVENT_CTRL")  # icons that reach into the text beside them
 
 
 def draw_hints(layout, hints):
     """The (icon, text) of mouse and keys in the status bar."""
     for icon, text in hints:
-        layout.label(text="", icon=icon)
-        if icon.startswith("EVENT_"):
-            layout.separator(factor=WIDE)
-        layout.label(text=text)
+        if icon in WIDE:
+            layout.label(icon=icon)
+            layout.separator()
+            layout.label(text=text)
+        else:
+            layout.label(text=text, icon=icon)
 
 
 def viewport_below(context, event):
