@@ -198,8 +198,9 @@ def _point_below(context, event):
     # An orthographic view shows what is behind its origin too.
     start = eye if view.is_perspective else eye - space.clip_end * direction
     depsgraph = context.evaluated_depsgraph_get()
+    cast = context.scene.ray_cast
     for _ in range(LAYERS):
-        hit, point, _, _, found, matrix = context.scene.ray_cast(depsgraph, start, direction)
+        hit, point, _, _, found, matrix = cast(depsgraph, start, direction)
         if not hit:
             return None
         obj = found.original
@@ -211,7 +212,10 @@ def _point_below(context, event):
             start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
             hit = surface.ray_cast(start, direction, 2.0 * surface.size)
             return obj, list(point) if hit is None else hit[0], -direction
-        start = point + 1e-5 * (point - start).length * direction
+        # Behind it, by more than rounding: from close by, for from far away that is more than a small object.
+        back = 1e-3 * (point - start).length
+        hit, near, *_ = cast(depsgraph, point - back * direction, direction)
+        start = (near if hit else point) + 1e-5 * max(back, point.length) * direction
     return None
 
 

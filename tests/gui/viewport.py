@@ -35,7 +35,7 @@ from common import (
 )
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
-EXTENT_FIELD, DELETE_BUTTON, COLOURS_BUTTON = (943, 180), (1001, 128), (893, 430)
+EXTENT_FIELD, MOVE_BUTTON, DELETE_BUTTON, COLOURS_BUTTON = (943, 180), (837, 128), (1001, 128), (893, 430)
 
 
 def pick(target):
@@ -385,6 +385,19 @@ def orthographic_and_tiny():
         patch()["tactile"]["vertex_distance_mean"] < 0.03 * patch()["tactile"]["radius"],
     )
     picture("tiny")
+    for perspective in ("ORTHO", "PERSP"):
+        look(centre, (0.2, -1, 0.3), 0.003, perspective)
+        yield 0.5
+        at = [round(v) for v in gui.view_point(found.location)]  # where a contact is in front
+        digest, count = found.tactile_probe.digest, len(bpy.data.objects)
+        gui.click(*MOVE_BUTTON)
+        yield 0.5
+        gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.3, "mousemove", *at, "sleep", 0.5, "click", 1)
+        yield 1
+        moved = found.tactile_probe.digest != digest and len(bpy.data.objects) == count
+        check(
+            f"a click on its contacts is one on the mesh, {perspective}", moved, found.tactile_probe.message
+        )
 
 
 def rendering():
