@@ -681,6 +681,35 @@ def test_lengths_are_said_in_the_unit_of_the_scene(empty, extension, system, len
     assert ", ".join(units.say(*given, unit) for given in ((0.0123, 1), (-4.2, -1), (17.64, -2))) == said
 
 
+@pytest.mark.parametrize(
+    ("shown", "title", "low", "power"),
+    [
+        ("gaussian_curvature", "Gaussian Curvature (1/mm²)", -1.0, -2),
+        ("mean_curvature", "Mean Curvature (1/mm)", -1.0, -1),
+        ("deviation", "Deviation (mm)", -1.0, 1),
+        ("height_std", "Standard Deviation (mm)", 0.0, 1),
+    ],
+)
+def test_the_legend_has_the_range_of_the_colours_in_the_unit_of_the_scene(
+    empty, extension, ball, shown, title, low, power
+):
+    addon, settings = extension.tactile_addon, empty.context.scene.unit_settings
+    settings.system, settings.length_unit = "METRIC", "MILLIMETERS"
+    _, patch = pick(empty)
+    patch.tactile_colours = shown
+    record, label = report_of(patch), patch.bl_rna.properties["tactile_colours"].enum_items[shown].name
+    lowest = 0.0 if shown in addon.patch_object.POSITIVE else -1.0
+    said, begin, labels = addon.overlay._scale(
+        empty.context, label, record, record["radius"], addon.patch_object.POWERS[shown], lowest
+    )
+    assert (said, begin) == (title, low)
+    top = record["colour_limit"] * 1000.0**power
+    assert [at for at, _ in labels] == [low, 0.5 * (low + 1.0), 1.0]
+    assert [float(text) for _, text in labels] == pytest.approx(
+        [low * top, 0.5 * (low + 1.0) * top, top], rel=5e-3
+    )
+
+
 def test_rendering_touches_nothing(empty, ball, tmp_path):
     ball.modifiers.new("Subdivision", "SUBSURF").levels = 0  # the render sees a finer mesh, of level 2
     probe, patch = pick(empty)
