@@ -32,8 +32,10 @@ CLASSES = (
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,
     *panel.PANELS,
+    panel.VIEW3D_MT_tactile,
     panel.TactilePreferences,
 )
+MENUS = (*panel.MENUS, *contact_operators.MENUS)
 _commands, _drawings = [], []
 
 
@@ -43,8 +45,7 @@ def register():
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     panel.restore_tab()
-    bpy.types.VIEW3D_MT_object.append(panel.draw_menu)
-    for menu, draw in contact_operators.MENUS:
+    for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
     bpy.utils.register_manual_map(panel.manual_map)
     live.register()
@@ -58,9 +59,8 @@ def unregister():
     live.unregister()
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.utils.unregister_manual_map(panel.manual_map)
-    for menu, draw in contact_operators.MENUS:
+    for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
-    bpy.types.VIEW3D_MT_object.remove(panel.draw_menu)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     map_object.unregister()

@@ -14,7 +14,7 @@ from . import probe
 from .overlay import PLANE_COLOURS
 from .settings import MOST_PLANES, STEEPEST
 from .touch import plane_axes
-from .viewport import mouse_ray
+from .viewport import draw_hints, mouse_ray
 
 TURN, TILT, EXTENT = "TURN", "TILT", "EXTENT"
 REACH = 1.15  # of the extent: where the handles are
@@ -61,7 +61,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if self._below(context, event) is None:
             self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
             return {"CANCELLED"}
-        context.workspace.status_text_set(_draw_hints)
+        context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         context.window_manager.modal_handler_add(self)
         self._say(context)
         return {"RUNNING_MODAL"}
@@ -148,11 +148,6 @@ class TACTILE_OT_drag(bpy.types.Operator):
         context.workspace.status_text_set(None)
         if context.object.tactile_probe.live:
             probe.refresh(context.object, context)
-
-
-def _draw_hints(header, context):
-    for icon, text in HINTS:
-        header.layout.label(text=text, icon=icon)
 
 
 class TACTILE_GGT_handles(bpy.types.GizmoGroup):

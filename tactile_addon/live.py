@@ -36,6 +36,14 @@ def on_depsgraph_update(scene, depsgraph):
             _settle_soon()
 
 
+@persistent
+def on_blend_import(imported):
+    """Has a probe that was appended without its patch touch again; a linked one is its own file's."""
+    for item in imported.import_items:
+        if isinstance(item.id, bpy.types.Object) and is_probe(item.id) and item.id.library is None:
+            item.id.tactile_probe.digest = ""
+
+
 def _concerned(depsgraph):
     """The probes that something has happened to: to them, their patch or target, or to what is there."""
     updated = {u.id.original for u in depsgraph.updates}
@@ -89,9 +97,11 @@ def _settle():
 
 def register():
     bpy.app.handlers.depsgraph_update_post.append(on_depsgraph_update)
+    bpy.app.handlers.blend_import_post.append(on_blend_import)
 
 
 def unregister():
     if bpy.app.timers.is_registered(_settle):
         bpy.app.timers.unregister(_settle)
+    bpy.app.handlers.blend_import_post.remove(on_blend_import)
     bpy.app.handlers.depsgraph_update_post.remove(on_depsgraph_update)

@@ -166,14 +166,32 @@ def _draw_sentence(context, layout, sentence, icon):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
-def draw_menu(self, context):
+class VIEW3D_MT_tactile(bpy.types.Menu):
+    bl_idname = "VIEW3D_MT_tactile"
+    bl_label = "Tactile Patch"
+
+    def draw(self, context):
+        for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
+            self.layout.operator(operator.bl_idname)
+        self.layout.separator()
+        for operator in (TACTILE_OT_verify, TACTILE_OT_register):
+            self.layout.operator(operator.bl_idname)
+        self.layout.separator()
+        for operator in (TACTILE_OT_add_plane, TACTILE_OT_update, TACTILE_OT_delete):
+            self.layout.operator(operator.bl_idname)
+
+
+def _draw_in_object(self, context):
     self.layout.separator()
-    for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
-        self.layout.operator(operator.bl_idname)
-    for operator in (TACTILE_OT_verify, TACTILE_OT_register):
-        self.layout.operator(operator.bl_idname)
-    for operator in (TACTILE_OT_add_plane, TACTILE_OT_delete):
-        self.layout.operator(operator.bl_idname)
+    self.layout.menu(VIEW3D_MT_tactile.bl_idname)
+
+
+def _draw_in_add(self, context):
+    self.layout.separator()
+    self.layout.operator(TACTILE_OT_reconstruct.bl_idname, icon="SURFACE_DATA")
+
+
+MENUS = (("VIEW3D_MT_object", _draw_in_object), ("VIEW3D_MT_mesh_add", _draw_in_add))
 
 
 def manual_map():

@@ -11,11 +11,17 @@ from .report import sentence
 from .settings import NAMES, TouchSettings, draw_all, touch_arguments
 from .surface import MeshSurface
 from .touch import touch
-from .viewport import mouse_ray, viewport_below
+from .viewport import draw_hints, mouse_ray, viewport_below
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
 LAYERS = 64  # patches and hidden objects that the mouse sees through at most
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
+HINTS = (
+    ("MOUSE_LMB", "Touch Here"),
+    ("MOUSE_RMB", "Cancel"),
+    ("EVENT_ESC", "Cancel"),
+    ("MOUSE_MMB", "Navigate"),
+)
 
 
 class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
@@ -69,7 +75,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         )
         self._area = context.area
         context.window.cursor_modal_set("EYEDROPPER")
-        context.workspace.status_text_set(_draw_hints)
+        context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         context.window_manager.modal_handler_add(self)
         self._hover(context, event)
         return {"RUNNING_MODAL"}
@@ -172,18 +178,6 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         _redraw(context)
 
 
-def _draw_hints(header, context):
-    layout = header.layout
-    for icon, text in (
-        ("MOUSE_LMB", "Touch Here"),
-        ("MOUSE_RMB", "Cancel"),
-        ("EVENT_ESC", "Cancel"),
-        ("MOUSE_MMB", "Navigate"),
-    ):
-        layout.label(text=text, icon=icon)
-    layout.separator_spacer()
-
-
 def _redraw(context):
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
@@ -203,8 +197,9 @@ def _point_below(context, event):
     # An orthographic view shows what is behind its origin too.
     start = eye if view.is_perspective else eye - space.clip_end * direction
     depsgraph = context.evaluated_depsgraph_get()
+    cast = context.scene.ray_cast
     for _ in range(LAYERS):
-        hit, point, _, _, found, matrix = context.scene.ray_cast(depsgraph, start, direction)
+        hit, point, _, _, found, matrix = cast(depsgraph, start, direction)
         if not hit:
             return None
         obj = found.original
@@ -216,7 +211,10 @@ def _point_below(context, event):
             start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
             hit = surface.ray_cast(start, direction, 2.0 * surface.size)
             return obj, list(point) if hit is None else hit[0], -direction
-        start = point + 1e-5 * (point - start).length * direction
+        # Behind it, by more than rounding: from close by, for from far away that is more than a small object.
+        back = 1e-3 * (point - start).length
+        hit, near, *_ = cast(depsgraph, point - back * direction, direction)
+        start = (near if hit else point) + 1e-5 * max(back, point.length) * direction
     return None
 
 

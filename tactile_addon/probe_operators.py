@@ -154,7 +154,9 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
             mesh = obj.data
             bpy.data.objects.remove(obj)
             if mesh is not None and not mesh.users:
+                materials = list(filter(None, mesh.materials))
                 bpy.data.meshes.remove(mesh)
+                bpy.data.batch_remove([material for material in materials if not material.users])
         return {"FINISHED"}
 
 

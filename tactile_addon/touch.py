@@ -251,13 +251,14 @@ def judgement(report, mean, scale=1.0):
 
     mean : distance of the mesh; scale : of a patch that was scaled since its report
     """
-    std = scale * report["height_std"]
+    std, percent = scale * report["height_std"], 100.0 / (scale * report["radius"])
     if report["fit"]["status"] != "ok" or mean <= BEYOND * std:
         return report["fit"]
     return {
         "status": "uncertain",
-        "message": f"The mesh is {mean:.3g} off the patch in the mean, which expects {std:.3g}, for between "
-        "the curves there is what they do not show: take a shorter extent, or add sampling planes.",
+        "message": f"The mesh is {percent * mean:.3g} % of the radius off the patch in the mean, which "
+        f"expects {percent * std:.3g} %, for between the curves there is what they do not show: take a "
+        "shorter extent, or add sampling planes.",
     }
 
 

@@ -1,8 +1,21 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is below the mouse: the 3D viewport, and the line into the scene."""
+"""What is below the mouse: the 3D viewport, and the line into the scene; and what its buttons do."""
 
 from mathutils import Vector
+
+WIDE = ("EVENT_ESC", "EVENT_CTRL")  # icons that reach into the text beside them
+
+
+def draw_hints(layout, hints):
+    """The (icon, text) of mouse and keys in the status bar."""
+    for icon, text in hints:
+        if icon in WIDE:
+            layout.label(icon=icon)
+            layout.separator()
+            layout.label(text=text)
+        else:
+            layout.label(text=text, icon=icon)
 
 
 def viewport_below(context, event):

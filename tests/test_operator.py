@@ -546,7 +546,8 @@ def test_a_bump_between_the_curves_is_a_doubt_once_the_mesh_is_compared(empty):
     mesh.update()
     _, report = reconstruct(empty, target="Grid", **touch)
     assert report["status"] == "uncertain"
-    assert report["message"].startswith(f"The mesh is {report['vertex_distance_mean']:.3g} off the patch")
+    share = 100.0 * report["vertex_distance_mean"] / report["radius"]
+    assert report["message"].startswith(f"The mesh is {share:.3g} % of the radius off the patch")
 
 
 def test_half_a_contour_has_all_contacts_that_the_extent_has_room_for(empty):

@@ -500,6 +500,10 @@ def test_deleting_takes_all_of_the_probe_and_nothing_else(empty, ball, active):
     select(empty, empty.data.objects[f"{active}.001"])
     assert empty.ops.tactile.delete() == {"FINISHED"}
     assert datablocks(empty) == others
+    select(empty, empty.data.objects[active])
+    assert empty.ops.tactile.delete() == {"FINISHED"}
+    assert names(empty) == SET[:1]
+    assert all(block.users for blocks in (empty.data.meshes, empty.data.materials) for block in blocks)
 
 
 def test_without_a_probe_there_is_nothing_to_change(empty, ball):
@@ -540,7 +544,9 @@ def test_a_probe_comes_to_another_file(empty, ball, tmp_path, capfd, append):
     empty.ops.wm.read_homefile(use_empty=True)
     if append:  # with its target, in the scene; the patch is made here
         empty.ops.wm.append(directory=f"{path}/Object/", filename="Sphere Probe")
+        update(empty)
         probe = empty.data.objects["Sphere Probe"]
+        assert_touches(probe, *probe.children)
         probe.tactile_probe.extent = 0.5
         assert_touches(probe, *probe.children)
     else:  # linked, with its target: kept up to date in its own file
@@ -673,6 +679,35 @@ def test_lengths_are_said_in_the_unit_of_the_scene(empty, extension, system, len
     assert ", ".join(units.say(*given, unit) for given in ((0.0123, 1), (-4.2, -1), (17.64, -2))) == said
 
 
+@pytest.mark.parametrize(
+    ("shown", "title", "low", "power"),
+    [
+        ("gaussian_curvature", "Gaussian Curvature (1/mm²)", -1.0, -2),
+        ("mean_curvature", "Mean Curvature (1/mm)", -1.0, -1),
+        ("deviation", "Deviation (mm)", -1.0, 1),
+        ("height_std", "Standard Deviation (mm)", 0.0, 1),
+    ],
+)
+def test_the_legend_has_the_range_of_the_colours_in_the_unit_of_the_scene(
+    empty, extension, ball, shown, title, low, power
+):
+    addon, settings = extension.tactile_addon, empty.context.scene.unit_settings
+    settings.system, settings.length_unit = "METRIC", "MILLIMETERS"
+    _, patch = pick(empty)
+    patch.tactile_colours = shown
+    record, label = report_of(patch), patch.bl_rna.properties["tactile_colours"].enum_items[shown].name
+    lowest = 0.0 if shown in addon.patch_object.POSITIVE else -1.0
+    said, begin, labels = addon.overlay._scale(
+        empty.context, label, record, record["radius"], addon.patch_object.POWERS[shown], lowest
+    )
+    assert (said, begin) == (title, low)
+    top = record["colour_limit"] * 1000.0**power
+    assert [at for at, _ in labels] == [low, 0.5 * (low + 1.0), 1.0]
+    assert [float(text) for _, text in labels] == pytest.approx(
+        [low * top, 0.5 * (low + 1.0) * top, top], rel=5e-3
+    )
+
+
 def test_rendering_touches_nothing(empty, ball, tmp_path):
     ball.modifiers.new("Subdivision", "SUBSURF").levels = 0  # the render sees a finer mesh, of level 2
     probe, patch = pick(empty)
@@ -693,15 +728,16 @@ def test_disabling_takes_handler_and_properties_away_and_enabling_brings_them_ba
     import addon_utils
 
     def seen():
-        modules = [handler.__module__ for handler in empty.app.handlers.depsgraph_update_post]
+        handlers = (empty.app.handlers.depsgraph_update_post, empty.app.handlers.blend_import_post)
+        modules = [handler.__module__ for each in handlers for handler in each]
         there = [hasattr(empty.types.Object, name) for name in ("tactile_probe", "tactile_colours")]
         return [sum(module.startswith(extension.__name__) for module in modules), *there]
 
-    assert seen() == [1, True, True]
+    assert seen() == [2, True, True]
     addon_utils.disable(extension.__name__)
     assert seen() == [0, False, False]
     addon_utils.enable(extension.__name__)
-    assert seen() == [1, True, True]
+    assert seen() == [2, True, True]
     assert_touches(*pick(empty))
 
 

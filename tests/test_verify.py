@@ -224,7 +224,8 @@ def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patc
     found = verified(empty, patch)
     assert patch["tactile"]["status"] == "uncertain"
     message = patch["tactile"]["message"]
-    assert message.startswith(f"The mesh is {found['vertex_distance_mean']:.3g} off the patch in the mean")
+    share = 100.0 * found["vertex_distance_mean"] / patch["tactile"]["radius"]
+    assert message.startswith(f"The mesh is {share:.3g} % of the radius off the patch in the mean")
     assert f"Warning: {message}" in capfd.readouterr().out
 
 

@@ -1,10 +1,19 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the window's scripts share: lines for run.sh, what there is in the file, and where the view looks."""
+"""What the window's scripts share: lines for run.sh, pictures, what is in the file, where the view looks."""
+
+import math
+import os
+from pathlib import Path
 
 import bpy
 import gui
 from mathutils import Vector
+
+FOLDER = Path(os.environ["GUI_SHOT"]).parent
+# Where they are in a window of 1280 by 800 with the sidebar open.
+PICK_BUTTON, ASIDE = (893, 128), (300, 640)
+ARROW = 1.15  # of the extent: where the handles are
 
 
 def check(what, good, detail=""):
@@ -58,3 +67,86 @@ def last_report():
     area.type = kind
     lines = bpy.context.window_manager.clipboard.splitlines()
     return lines[-1] if lines else ""
+
+
+def picture(name):
+    gui.shot(str(FOLDER / f"{name}.png"))
+
+
+def probe():
+    return next((o for o in bpy.data.objects if o.type == "EMPTY" and o.tactile_probe.is_probe), None)
+
+
+def patch(owner=None):
+    return next((o for o in bpy.data.objects if "tactile" in o and o.parent == (owner or probe())), None)
+
+
+def state(owner=None):
+    """What must come back with undo: inputs, report and mesh of a probe."""
+    owner = owner or probe()
+    if owner is None:
+        return None
+    settings, shown = owner.tactile_probe, patch(owner)
+    record = shown["tactile"].to_dict()
+    corner = tuple(shown.data.vertices[-1].co)
+    numbers = [
+        settings.plane_count,
+        *settings.azimuths,
+        *settings.tilts,
+        settings.extent,
+        *corner,
+        record["k1"],
+        record["k2"],
+    ]
+    numbers += [*shown.matrix_world.translation]
+    return numbers
+
+
+def same(a, b):
+    """Whether two states are one; None is that of no probe."""
+    if a is None or b is None:
+        return a is b
+    return all(abs(v - w) < 1e-5 for v, w in zip(a, b, strict=True))
+
+
+def is_complete():
+    """Whether no gesture goes on, and the patch has what is filled in after one."""
+    return not any(window.modal_operators for window in bpy.context.window_manager.windows) and (
+        patch() is not None and "vertices" in patch()["tactile"]
+    )
+
+
+def extent(owner):
+    """How far a probe feels: as it says, or as the surface allows."""
+    return owner.tactile_probe.extent or patch(owner)["tactile"]["extent"]
+
+
+def handle(azimuth, reach=ARROW):
+    """Where the handle of a plane at that azimuth is in the window."""
+    obj = probe()
+    e1, e2 = obj.matrix_world.col[0].xyz, obj.matrix_world.col[1].xyz
+    at = math.cos(azimuth) * e1 + math.sin(azimuth) * e2
+    return gui.view_point(obj.matrix_world.translation + reach * extent(obj) * at)
+
+
+def consistent(when, owner=None):
+    """The report's planes are the probe's, and the patch lies where the probe is."""
+    owner = owner or probe()
+    record = patch(owner)["tactile"].to_dict()
+    count = owner.tactile_probe.plane_count
+    planes = [math.degrees(a) for a in owner.tactile_probe.azimuths[:count]]
+    good = all(abs(a - b[0]) < 1e-3 for a, b in zip(planes, record["planes"], strict=True))
+    good = good and abs(record["extent"] - extent(owner)) < 1e-6
+    check(f"{when}: the patch is that of the probe's numbers", good, (planes, record["planes"]))
+    off = (patch(owner).matrix_world.translation - owner.matrix_world.translation).length
+    check(f"{when}: and lies at the probe", off < 1e-4 * record["radius"], off)
+
+
+def undo_redo(what, before, after):
+    """One step back and one forth, by keyboard."""
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+    yield 1
+    check(f"{what}: one Ctrl Z takes it back", same(state(), before), (state(), before))
+    gui.xdo("key", "ctrl+shift+z")
+    yield 1
+    check(f"{what}: Ctrl Shift Z brings it again", same(state(), after), (state(), after))

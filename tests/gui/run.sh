@@ -45,6 +45,10 @@ GUI_ARGS="$out/scene.blend" step "the window's checks" \
   $gui shot tests/gui/window.py "$out/window.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the viewport's checks" \
   $gui shot tests/gui/viewport.py "$out/viewport.png"
+GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the conventions' checks" \
+  $gui shot tests/gui/conventions.py "$out/conventions.png"
+GUI_ARGS="$out/scene.blend" step "the pictures of the docs" \
+  $gui shot tests/gui/pictures.py "$out/pictures.png"
 GUI_ARGS="$out/scene.blend" step "the verification's checks" \
   $gui shot tests/gui/verify.py "$out/verify.png"
 GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the stability map's checks" \

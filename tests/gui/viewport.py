@@ -6,7 +6,6 @@ Every step asserts on Blender's data and leaves a picture, to be looked at, besi
 """
 
 import math
-import os
 import sys
 from pathlib import Path
 
@@ -16,87 +15,29 @@ from bpy.app.handlers import persistent
 from mathutils import Quaternion, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, look, open_tab, until
+from common import (
+    ASIDE,
+    FOLDER,
+    PICK_BUTTON,
+    check,
+    consistent,
+    data_blocks,
+    extent,
+    handle,
+    is_complete,
+    look,
+    open_tab,
+    patch,
+    picture,
+    probe,
+    same,
+    state,
+    undo_redo,
+    until,
+)
 
-FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
-PICK_BUTTON, EXTENT_FIELD, DELETE_BUTTON = (893, 128), (943, 180), (1001, 128)
-COLOURS_BUTTON, ASIDE = (893, 430), (300, 640)
-ARROW = 1.15  # of the extent: where the handles are
-
-
-def probe():
-    return next((o for o in bpy.data.objects if o.type == "EMPTY" and o.tactile_probe.is_probe), None)
-
-
-def patch(owner=None):
-    return next((o for o in bpy.data.objects if "tactile" in o and o.parent == (owner or probe())), None)
-
-
-def state(owner=None):
-    """What must come back with undo: inputs, report and mesh of a probe."""
-    owner = owner or probe()
-    if owner is None:
-        return None
-    settings, shown = owner.tactile_probe, patch(owner)
-    record = shown["tactile"].to_dict()
-    corner = tuple(shown.data.vertices[-1].co)
-    numbers = [
-        settings.plane_count,
-        *settings.azimuths,
-        *settings.tilts,
-        settings.extent,
-        *corner,
-        record["k1"],
-        record["k2"],
-    ]
-    numbers += [*shown.matrix_world.translation]
-    return numbers
-
-
-def same(a, b):
-    return a is not None and b is not None and all(abs(v - w) < 1e-5 for v, w in zip(a, b, strict=True))
-
-
-def handle(azimuth, reach=ARROW):
-    """Where the handle of a plane at that azimuth is in the window."""
-    obj = probe()
-    e1, e2 = obj.matrix_world.col[0].xyz, obj.matrix_world.col[1].xyz
-    at = math.cos(azimuth) * e1 + math.sin(azimuth) * e2
-    return gui.view_point(obj.matrix_world.translation + reach * obj.tactile_probe.extent * at)
-
-
-def consistent(when, owner=None):
-    """The report's planes are the probe's, and the patch lies where the probe is."""
-    owner = owner or probe()
-    record = patch(owner)["tactile"].to_dict()
-    count = owner.tactile_probe.plane_count
-    planes = [math.degrees(a) for a in owner.tactile_probe.azimuths[:count]]
-    good = all(abs(a - b[0]) < 1e-3 for a, b in zip(planes, record["planes"], strict=True))
-    good = good and abs(record["extent"] - owner.tactile_probe.extent) < 1e-6
-    check(f"{when}: the patch is that of the probe's numbers", good, (planes, record["planes"]))
-    off = (patch(owner).matrix_world.translation - owner.matrix_world.translation).length
-    check(f"{when}: and lies at the probe", off < 1e-4 * record["radius"], off)
-
-
-def undo_redo(what, before, after):
-    """One step back and one forth, by keyboard."""
-    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
-    yield 1
-    check(f"{what}: one Ctrl Z takes it back", same(state(), before), (state(), before))
-    gui.xdo("key", "ctrl+shift+z")
-    yield 1
-    check(f"{what}: Ctrl Shift Z brings it again", same(state(), after), (state(), after))
-
-
-def is_complete():
-    return not any(window.modal_operators for window in bpy.context.window_manager.windows) and (
-        patch() is not None and "vertices" in patch()["tactile"]
-    )
-
-
-def picture(name):
-    gui.shot(str(FOLDER / f"{name}.png"))
+EXTENT_FIELD, MOVE_BUTTON, DELETE_BUTTON, COLOURS_BUTTON = (943, 180), (837, 128), (1001, 128), (893, 430)
 
 
 def pick(target):
@@ -199,7 +140,7 @@ def drag_handles():
     yield 0.5
 
     axes = probe().matrix_world
-    reach = probe().tactile_probe.extent
+    reach = extent(probe())
     number = probe().tactile_probe.active_plane
     top = axes.translation + 0.75 * reach * axes.col[2].xyz
     gui.drag(gui.view_point(top), [v + 35 for v in gui.view_point(top)])
@@ -310,6 +251,8 @@ def two_probes():
     check("... with a patch of its own", patch(second) is not None and patch(second) != patch(first), "")
     check("... and the first keeps its own", same(state(first), was), state(first))
     consistent("the copy", second)
+    yield from until(lambda: "vertices" in patch(second)["tactile"], 10)
+    check("... and is completed", "vertices" in patch(second)["tactile"], "")
     picture("two")
     gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
     yield 1
@@ -444,6 +387,19 @@ def orthographic_and_tiny():
         patch()["tactile"]["vertex_distance_mean"] < 0.03 * patch()["tactile"]["radius"],
     )
     picture("tiny")
+    for perspective in ("ORTHO", "PERSP"):
+        look(centre, (0.2, -1, 0.3), 0.003, perspective)
+        yield 0.5
+        at = [round(v) for v in gui.view_point(found.location)]  # where a contact is in front
+        digest, count = found.tactile_probe.digest, len(bpy.data.objects)
+        gui.click(*MOVE_BUTTON)
+        yield 0.5
+        gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.3, "mousemove", *at, "sleep", 0.5, "click", 1)
+        yield 1
+        moved = found.tactile_probe.digest != digest and len(bpy.data.objects) == count
+        check(
+            f"a click on its contacts is one on the mesh, {perspective}", moved, found.tactile_probe.message
+        )
 
 
 def rendering():

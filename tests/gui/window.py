@@ -74,8 +74,10 @@ def suzanne():
     look(place, (0.3, -1, 0.3), 5)
     yield 0.5
     at = [round(v) for v in gui.view_point(place)]
-    gui.xdo("mousemove", *at, "keydown", "shift", "sleep", 0.1, "click", 3, "sleep", 0.1, "keyup", "shift")
-    yield from until(lambda: cursor.location.length > 0.0)
+    gui.xdo("mousemove", *at, "sleep", 0.5, "keydown", "shift", "sleep", 0.5, "click", 3)
+    yield from until(lambda: cursor.location.length > 0.0, 10)
+    gui.xdo("keyup", "shift")
+    yield 0.5
     distance = (cursor.location - place).length
     check("Shift and the right mouse button set the 3D cursor on the surface", distance < 0.02, distance)
 
