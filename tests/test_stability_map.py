@@ -309,6 +309,12 @@ def make_faceless(bpy, obj):
     obj.data.vertices.add(3)
 
 
+def make_curve(bpy, obj):
+    obj.name = "Ball"
+    bpy.ops.curve.primitive_bezier_circle_add()
+    bpy.context.object.name = "Sphere"
+
+
 def make_infinite(bpy, obj):
     obj.data.vertices[5].co.x = np.nan
 
@@ -335,6 +341,7 @@ def make_distant(bpy, obj):
     ("spoil", "sentence"),
     [
         (make_faceless, "no faces to touch"),
+        (make_curve, '"Sphere" is no mesh: select a mesh object, or convert this one'),
         (make_infinite, "no finite place"),
         (make_flat, "scaled to nothing"),
         (make_disabled, "disabled in viewports"),
