@@ -169,6 +169,7 @@ def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
     covariance = np.array([r.posterior.covariance for r in results]).reshape(-1, len(TERMS), len(TERMS))
     # A patch of lower degree than the posterior departs from its mean as well.
     off = np.array([r.posterior.mean - coefficients_of(r.patch.scaled(1.0 / r.radius)) for r in results])
+    off = off.reshape(-1, len(TERMS))
     x, y = points.reshape(-1, 2).T
     basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
     variance = np.einsum("bni,bni->bn", basis @ covariance, basis) + (basis @ off[..., None])[..., 0] ** 2
