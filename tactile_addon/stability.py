@@ -49,7 +49,7 @@ class StabilityMap:
         import scipy.spatial  # noqa: F401  # takes half a second once: not between two redraws
 
         self.surface = MeshSnapshot(obj, depsgraph)
-        if spacing < 0.0:
+        if not spacing >= 0.0:  # NaN is none
             raise ValueError(f"The spacing is a length of 0 or more, got {spacing:g}")
         self.extent, self.step = lengths(obj.name, self.surface.size, extent, step, noise)
         self.spacing = spacing or SPACING_SHARE * self.extent

@@ -201,7 +201,8 @@ def evaluated_mesh(obj, depsgraph):
     largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
     if not math.isfinite(largest):
         raise ValueError(f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers')
-    if max(largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()) > FARTHEST:
+    reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
+    if not reach <= FARTHEST:  # NaN is nowhere
         raise ValueError(f'"{obj.name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
     return evaluated, co, matrix[:3, :3], matrix[:3, 3]
 

@@ -286,6 +286,7 @@ def test_faces_of_no_area_are_nothing_to_feel(empty):
     ("arguments", "sentence"),
     [
         ({"spacing": -0.1}, "The spacing is a length"),
+        ({"spacing": np.nan}, "The spacing is a length"),
         ({"extent": 50.0}, "longer than"),
         ({"extent": 0.1, "step": 0.2}, "The step 0.2 is longer"),
         ({"extent": 0.1, "step": 0.09}, "of the 3 contacts it needs"),
@@ -319,6 +320,10 @@ def make_infinite(bpy, obj):
     obj.data.vertices[5].co.x = np.nan
 
 
+def make_nowhere(bpy, obj):
+    obj.location.y = np.nan
+
+
 def make_flat(bpy, obj):
     obj.scale.z = 0.0
 
@@ -343,6 +348,7 @@ def make_distant(bpy, obj):
         (make_faceless, "no faces to touch"),
         (make_curve, '"Sphere" is no mesh: select a mesh object, or convert this one'),
         (make_infinite, "no finite place"),
+        (make_nowhere, "reaches farther than"),
         (make_flat, "scaled to nothing"),
         (make_disabled, "disabled in viewports"),
         (make_disabled_with_a_probe, "disabled in viewports"),
