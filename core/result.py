@@ -21,7 +21,8 @@ from .verification import fit_error, total_absolute_curvature
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
-DOUBTFUL_TURN = math.radians(8.5)  # of the frame
+DOUBTFUL_TURN = math.radians(10.0)  # of the frame
+DOUBTFUL_CURVATURE = 0.1  # standard deviation of a normal curvature, over the radius: a curve is short
 DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
@@ -154,6 +155,12 @@ class Reconstruction:
         if turn > DOUBTFUL_TURN:
             return "uncertain", (
                 f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
+                "extent, or add sampling planes."
+            )
+        std = self.posterior.curvature_std()
+        if std > DOUBTFUL_CURVATURE:
+            return "uncertain", (
+                f"Curvatures are good to {std / self.radius:.2g} in the direction known least: take a longer "
                 "extent, or add sampling planes."
             )
         return None
