@@ -9,8 +9,8 @@ build/charts/stability.png, the sheet of all sweeps, and stability.csv. A warnin
 - the mean |dz| over the domain is more than three times the patch's own mean height_std, or
 - the frame is turned by more than 10 degrees, where |kappa1 - kappa2| L > 0.05;
 
-where all is harmless, of the other cases none is to be warned of but for 5 %; and the uncertainty stated is
-not to be blown up: the median of mean height_std over mean |dz| is to be 2 at most. Lengths are in mm.
+of the cases where all is harmless and none is due, 5 % at most are to be warned of; and the uncertainty
+stated is not to be blown up: the median of mean height_std over mean |dz| is to be 2 at most. In mm.
 """
 
 import argparse
