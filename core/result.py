@@ -22,7 +22,7 @@ from .verification import fit_error, total_absolute_curvature
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
 DOUBTFUL_TURN = math.radians(10.0)  # of the frame
-DOUBTFUL_CURVATURE = 0.1  # standard deviation of a normal curvature, over the radius: a curve is short
+DOUBTFUL_CURVATURE = 0.1  # of 1 / radius; as well is it known along a curve that ends at a quarter of it
 DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
