@@ -17,7 +17,8 @@ TERMS = exponents(1, DEGREE)
 ORDERS = TERMS.sum(axis=1).astype(float)
 FREE = 5  # x, y, x^2, xy, y^2 have no prior
 DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L
-ALIKE = 0.045  # curvatures, that say nothing of directions
+ALIKE = 0.05  # a difference of curvatures that makes no directions
+CONFIDENCE = 0.95
 INVISIBLE = 0.9  # of the prior's variance, left over
 
 
@@ -80,17 +81,28 @@ class Posterior(NamedTuple):
         return DEGREE
 
     def turn(self) -> float:
-        """The angle (radians) that the Darboux frame may be off: two standard deviations, and the mean's.
+        """The angle (radians) that the Darboux frame is off by at most, with a probability of CONFIDENCE.
 
-        0 where the curvatures differ by less than ALIKE, within a standard deviation.
+        0 where with that probability the curvatures are ALIKE: then there are no directions.
         """
-        x, y, xx, xy, yy = self.mean[:FREE]
+        x, y, xx, xy, yy = self.mean[:FREE].tolist()
         c = self.covariance
-        difference = 2.0 * math.hypot(yy - xx, xy)
-        if difference + 2.0 * math.sqrt(max(c[2, 2] + c[4, 4] - 2.0 * c[2, 4], 0.0)) <= ALIKE:
-            return 0.0
-        std = math.sqrt(c[0, 0] + c[1, 1] + c[3, 3] / max(difference, 1e-9) ** 2)
-        return min(math.hypot(x, y, 0.5 * math.atan2(-xy, yy - xx), 2.0 * std), math.pi / 2.0)
+        # Of yy - xx and xy, whose ratio turns the frame: a Cholesky factor of their covariance.
+        std = math.sqrt(max(c[2, 2] + c[4, 4] - 2.0 * c[2, 4], 1e-300))
+        shared = (c[3, 4] - c[2, 3]) / std
+        own = math.sqrt(max(c[3, 3] - shared**2, 0.0))
+        u, v = _normal_points()
+        difference, mixed = yy - xx + std * u, xy + shared * u + own * v
+        angles = 0.5 * np.abs(np.arctan2(mixed, difference))
+        angles[2.0 * np.hypot(difference, mixed) <= ALIKE] = 0.0
+        angle = float(np.sort(angles)[int(CONFIDENCE * len(angles))])
+        return math.hypot(angle, x, y, math.sqrt(c[0, 0] + c[1, 1])) if angle > 0.0 else 0.0
+
+    def curvature_std(self) -> float:
+        """Of the normal curvature at the origin, in the direction where it is known least."""
+        bent = _bent()
+        variances = np.einsum("ni,ni->n", bent @ self.covariance[2:FREE, 2:FREE], bent)
+        return math.sqrt(max(float(variances.max()), 0.0))
 
     def blind(self, degree: int) -> int:
         """How many directions among the terms of degree 1 to `degree` keep 90 % of their prior variance."""
@@ -139,6 +151,21 @@ def _truncation(degree: int) -> Array:
     x, y, weights = _nodes()
     basis = np.sqrt(weights)[:, None] * monomials(x, y, TERMS[FREE:])
     return np.linalg.lstsq(basis[:, : terms_to(degree) - FREE], basis, rcond=None)[0]
+
+
+@cache
+def _bent() -> Array:
+    """(18, 3): the second derivatives of x^2, xy and y^2 in as many directions."""
+    azimuths = np.pi / 18.0 * np.arange(18)
+    return 2.0 * monomials(np.cos(azimuths), np.sin(azimuths), TERMS[2:FREE])
+
+
+@cache
+def _normal_points() -> Array:
+    """(2, 256), spread as a normal distribution's: the spiral of a sunflower."""
+    rank = np.arange(256) + 0.5
+    azimuths, radii = math.pi * (3.0 - math.sqrt(5.0)) * rank, np.sqrt(-2.0 * np.log(1.0 - rank / 256.0))
+    return np.array([radii * np.cos(azimuths), radii * np.sin(azimuths)])
 
 
 @cache

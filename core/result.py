@@ -22,7 +22,8 @@ from .verification import fit_error, total_absolute_curvature
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
-DOUBTFUL_TURN = math.radians(8.5)  # of the frame
+DOUBTFUL_TURN = math.radians(10.0)  # of the frame
+DOUBTFUL_CURVATURE = 0.1  # of 1 / radius; as well is it known along a curve that ends at a quarter of it
 DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
@@ -157,6 +158,12 @@ class Reconstruction:
                 f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
                 "extent, or add sampling planes."
             )
+        std = self.posterior.curvature_std()
+        if std > DOUBTFUL_CURVATURE:
+            return "uncertain", (
+                f"Curvatures are good to {std / self.radius:.2g} in the direction known least: take a longer "
+                "extent, or add sampling planes."
+            )
         return None
 
 
@@ -170,6 +177,7 @@ def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
     covariance = np.array([r.posterior.covariance for r in results]).reshape(-1, len(TERMS), len(TERMS))
     # A patch of lower degree than the posterior departs from its mean as well.
     off = np.array([r.posterior.mean - coefficients_of(r.patch.scaled(1.0 / r.radius)) for r in results])
+    off = off.reshape(-1, len(TERMS))
     x, y = points.reshape(-1, 2).T
     basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
     variance = np.einsum("bni,bni->bn", basis @ covariance, basis) + (basis @ off[..., None])[..., 0] ** 2

@@ -50,7 +50,7 @@ class StabilityMap:
         import scipy.spatial  # noqa: F401  # takes half a second once: not between two redraws
 
         self.surface = MeshSnapshot(obj, depsgraph)
-        if spacing < 0.0:
+        if not spacing >= 0.0:  # NaN is none
             raise ValueError(f"The spacing is a length of 0 or more, got {spacing:g}")
         self.extent = extent or EXTENT_SHARE * self.surface.size
         self.step = step or self.extent / STEPS

@@ -22,8 +22,6 @@ class MeshSurface:
 
     def __init__(self, obj, depsgraph):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
-        if obj.type != "MESH":
-            raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
         try:
             evaluated, self._co, self._linear, self._origin = evaluated_mesh(obj, depsgraph)
             evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
@@ -188,6 +186,8 @@ def evaluated_mesh(obj, depsgraph):
 
     Raises ValueError, with a sentence, where it cannot be touched; but for disabled objects.
     """
+    if obj.type != "MESH":
+        raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
     evaluated = obj.evaluated_get(depsgraph)
     if obj.data.is_editmode:
         # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
@@ -201,7 +201,8 @@ def evaluated_mesh(obj, depsgraph):
     largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
     if not math.isfinite(largest):
         raise ValueError(f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers')
-    if max(largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()) > FARTHEST:
+    reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
+    if not reach <= FARTHEST:  # NaN is nowhere
         raise ValueError(f'"{obj.name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
     return evaluated, co, matrix[:3, :3], matrix[:3, 3]
 

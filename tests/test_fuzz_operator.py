@@ -308,11 +308,15 @@ INPUTS = {
 }
 
 
-def inputs(draw):
-    """Arguments of a touch: a good place on the balls, but for some."""
-    given = {"location": (0.3, -0.2, 1.9), "extent": 0.6}
-    names = draw(st.lists(st.sampled_from(sorted(INPUTS)), max_size=2, unique=True))
-    return given | {name: draw(INPUTS[name]) for name in names}
+TOUCH = {"location": (0.3, -0.2, 1.9), "extent": 0.6}
+MAP = {"extent": 0.6, "spacing": 1.5}
+MAP_INPUTS = {n: v for n, v in INPUTS.items() if n not in ("location", "normal")} | {"spacing": FLOATS}
+
+
+def inputs(draw, good=TOUCH, odd=INPUTS):
+    """Arguments of a touch: a good place on the balls, but for some; or of a map."""
+    names = draw(st.lists(st.sampled_from(sorted(odd)), max_size=2, unique=True))
+    return good | {name: draw(odd[name]) for name in names}
 
 
 def assert_sentence(words):
@@ -330,6 +334,22 @@ def assert_sentence(words):
     ), said
 
 
+def is_finite(mesh):
+    """Whether all numbers of a mesh are, its attributes' too."""
+    for attribute in mesh.attributes:
+        if attribute.data_type in ("FLOAT", "FLOAT_VECTOR", "FLOAT_COLOR"):
+            key, width = {
+                "FLOAT": ("value", 1),
+                "FLOAT_VECTOR": ("vector", 3),
+                "FLOAT_COLOR": ("color", 4),
+            }[attribute.data_type]
+            out = np.empty(len(attribute.data) * width)
+            attribute.data.foreach_get(key, out)
+            if not np.isfinite(out).all():
+                return False
+    return True
+
+
 def examine(patch):
     """The status of a patch; it is of finite numbers."""
     report = patch["tactile"].to_dict()
@@ -343,16 +363,7 @@ def examine(patch):
     assert lost or np.isfinite(np.array(patch.matrix_world)).all()
     for obj in (patch, *patch.children):
         assert len(obj.data.vertices) > 100
-        for attribute in obj.data.attributes:
-            if attribute.data_type in ("FLOAT", "FLOAT_VECTOR", "FLOAT_COLOR"):
-                key, width = {
-                    "FLOAT": ("value", 1),
-                    "FLOAT_VECTOR": ("vector", 3),
-                    "FLOAT_COLOR": ("color", 4),
-                }[attribute.data_type]
-                out = np.empty(len(attribute.data) * width)
-                attribute.data.foreach_get(key, out)
-                assert np.isfinite(out).all(), (obj.name, attribute.name)
+        assert is_finite(obj.data), obj.name
     return report["status"]
 
 
@@ -394,6 +405,51 @@ def test_a_touch_in_any_scene(empty, data):
     assert {kind for kind, *_ in new} <= {"Object", "Mesh", "Material", "Collection", "ShaderNodeTree"}
     (patch,) = [obj for obj in bpy.data.objects if obj.session_uid not in before and "tactile" in obj]
     event(f"patch, {examine(patch)}")
+
+
+def examine_map(painted):
+    """Its record adds up, and its mesh is of finite numbers."""
+    record, mesh = painted["tactile_map"].to_dict(), painted.data
+    assert record["touched"] == record["points"] == record["patches"] + sum(record["refused"].values()) > 0
+    assert 0 <= record["in_doubt"] <= record["patches"]
+    numbers = [v for v in record.values() if isinstance(v, float)]
+    assert np.isfinite([*numbers, *np.ravel(record["planes"])]).all(), record
+    assert is_finite(mesh)
+    for name in ("error", "height_std", "condition_number", "blind_share"):
+        assert (f"{name}_median" in record) == (record["patches"] > 0) or name == "error"
+        values = np.empty(len(mesh.vertices), dtype=np.float32)
+        mesh.attributes[name].data.foreach_get("value", values)
+        assert ((values >= 0.0) | (values == -1.0)).all(), name
+    event("map, in doubt" if record["in_doubt"] else "map, patches" if record["patches"] else "map, none")
+
+
+@given(st.data())
+@in_time
+def test_a_stability_map_in_any_scene(empty, data):
+    bpy = empty
+    target = make(bpy, data)
+    arguments = inputs(data.draw, MAP, MAP_INPUTS)
+    if "step" in arguments:  # thousands of touches of thousands of contacts are no hang, but take as long
+        arguments |= MAP
+    before, chosen = digest(bpy), selection(bpy)
+    try:
+        result = bpy.ops.tactile.stability_map(target=target, **arguments)
+    except RuntimeError as error:
+        if "poll() " not in str(error):  # in another mode
+            assert_sentence(str(error))
+        assert digest(bpy) == before
+        assert selection(bpy) == chosen
+        event("refused")
+        return
+    assert result == {"FINISHED"}
+    after = digest(bpy)
+    assert others(before, after, ("Material", "Collection", "Scene")) == {}
+    new = [kind for uid, (kind, *_) in after.items() if uid not in before]
+    assert (new.count("Object"), new.count("Mesh")) == (1, 1)
+    assert set(new) <= {"Object", "Mesh", "Material", "Collection", "ShaderNodeTree"}
+    painted = bpy.context.view_layer.objects.active
+    assert painted.session_uid not in before
+    examine_map(painted)
 
 
 def shift(bpy, probe, draw):

@@ -255,6 +255,7 @@ def test_faces_of_no_area_are_nothing_to_feel(empty):
     ("arguments", "sentence"),
     [
         ({"spacing": -0.1}, "The spacing is a length"),
+        ({"spacing": np.nan}, "The spacing is a length"),
         ({"extent": 50.0}, "longer than"),
         ({"extent": 0.1, "step": 0.2}, "The step 0.2 is longer"),
         ({"extent": 0.1, "step": 0.09}, "of the 3 contacts it needs"),
@@ -278,8 +279,18 @@ def make_faceless(bpy, obj):
     obj.data.vertices.add(3)
 
 
+def make_curve(bpy, obj):
+    obj.name = "Ball"
+    bpy.ops.curve.primitive_bezier_circle_add()
+    bpy.context.object.name = "Sphere"
+
+
 def make_infinite(bpy, obj):
     obj.data.vertices[5].co.x = np.nan
+
+
+def make_nowhere(bpy, obj):
+    obj.location.y = np.nan
 
 
 def make_flat(bpy, obj):
@@ -304,7 +315,9 @@ def make_distant(bpy, obj):
     ("spoil", "sentence"),
     [
         (make_faceless, "no faces to touch"),
+        (make_curve, '"Sphere" is no mesh: select a mesh object, or convert this one'),
         (make_infinite, "no finite place"),
+        (make_nowhere, "reaches farther than"),
         (make_flat, "scaled to nothing"),
         (make_disabled, "disabled in viewports"),
         (make_disabled_with_a_probe, "disabled in viewports"),

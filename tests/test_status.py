@@ -97,7 +97,7 @@ def test_principal_directions_that_may_be_far_off():
     assert len(turned) > 10
 
 
-def test_the_angle_that_the_frame_may_be_off_is_twice_its_standard_deviation():
+def test_the_frame_is_hardly_ever_off_by_more_than_the_angle_that_is_told():
     s = surfaces.pear()
     exact = s.fit(contours_of(s, noise=0.0)).frame.axes
     angles, told = [], []
@@ -105,7 +105,56 @@ def test_the_angle_that_the_frame_may_be_off_is_twice_its_standard_deviation():
         r = s.fit(contours_of(s, noise=0.1, seed=seed))
         angles.append(np.arccos(min(1.0, abs(exact[:, 0] @ r.frame.axes[:, 0]))))
         told.append(r.posterior.turn())
-    assert np.sqrt(np.mean(np.square(angles))) < np.mean(told) < 4.0 * np.sqrt(np.mean(np.square(angles)))
+    assert np.mean(np.array(angles) <= told) > 0.9
+    assert np.mean(told) < 4.0 * np.sqrt(np.mean(np.square(angles)))
+
+
+@pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.ellipsoid(30, 28, 27, 0.4, 0.5)])
+@pytest.mark.parametrize("degrees", [(13, 73, 133), (13, 33, 53)])
+def test_the_angle_told_is_a_quantile_of_the_posterior(surface, degrees):
+    r = fitted(surface, contours_of(surface, degrees=degrees, noise=0.1))
+    mean, covariance = r.posterior.mean[:5], r.posterior.covariance[:5, :5]
+    drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, 40_000)
+    x, y, xx, xy, yy = drawn.T
+    angles = np.where(
+        2.0 * np.hypot(yy - xx, xy) <= 0.05, 0.0, np.hypot(np.hypot(x, y), 0.5 * np.arctan2(abs(xy), yy - xx))
+    )
+    assert r.posterior.turn() == pytest.approx(np.quantile(angles, 0.95), rel=0.1)
+
+
+def cut_short(contours, point):
+    """The first of them reaches a fifth of the extent."""
+    near = np.linalg.norm(contours[0].points - point, axis=1) < 0.2 * EXTENT + 0.1
+    return [Contour(contours[0].points[near], noise=contours[0].noise), *contours[1:]]
+
+
+def test_the_curvature_known_least_is_that_along_a_short_curve():
+    s = surfaces.pear()
+    contours = cut_short(contours_of(s), s.point)
+    r = fitted(s, contours)
+    azimuth = np.arctan2(*(r.frame.axes[:, 1::-1].T @ (contours[0].points[-1] - s.point)))
+    along, across = np.cos(azimuth), np.sin(azimuth)
+    terms = 2.0 * np.array([along**2, along * across, across**2])
+    std = np.sqrt(terms @ r.posterior.covariance[2:5, 2:5] @ terms)
+    assert r.posterior.curvature_std() == pytest.approx(std, rel=0.05)
+    assert fitted(s, contours_of(s)).posterior.curvature_std() < 0.1 * std
+
+
+def test_a_curve_shorter_than_a_quarter_of_the_radius_leaves_doubt():
+    s = surfaces.torus(40, 20, 2.6)
+    open_curvature = 0
+    for seed in range(10):
+        contours = contours_of(s, seed=seed)
+        assert fitted(s, contours).status == "ok"
+        r = fitted(s, cut_short(contours, s.point))
+        assert r.status == "uncertain"  # whichever doubt comes first
+        if (
+            f"Curvatures are good to {r.posterior.curvature_std() / r.radius:.2g} in the direction"
+            in r.message
+        ):
+            assert "known least: take a longer extent, or add sampling planes" in r.message
+            open_curvature += 1
+    assert open_curvature > 2
 
 
 def test_an_umbilic_has_no_directions_to_be_wrong():
