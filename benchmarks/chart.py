@@ -174,11 +174,30 @@ def touch_of(name, planes, noise, seed):
         sampling = [SamplingPlane(azimuth) for azimuth in azimuths]
         contours[count] = track(surface, case.point, case.axes[:, 2], sampling, rng=number, **lengths)
     ends = np.vstack([contour.points[[0, -1]] for contour in case.contours]) - case.point
-    flat, triangles = closed_spline_domain((ends @ case.axes)[:, :2], extent).triangulation(RINGS)
+    flat, triangles = in_rings(closed_spline_domain((ends @ case.axes)[:, :2], extent))
     vertices = accuracy.above(surface, case.axes, case.kappas, flat)
     offsets = np.random.default_rng(number).normal(0.0, noise, len(vertices))
     offsets[0] = 0.0  # the point is exact, as in the contours
     return Touch(case, contours, vertices + np.outer(offsets, case.axes[:, 2]), triangles, extent)
+
+
+def in_rings(domain):
+    """Points (1 + 3 RINGS (RINGS + 1), 2) and triangles (6 RINGS^2, 3) over a domain, near to equilateral.
+
+    Ring k has 6k points in equal turns.
+    """
+    points, triangles = [np.zeros((1, 2))], []
+    start, inner_start = 1, 0
+    for k in range(1, RINGS + 1):
+        points.append(k / RINGS * domain.boundary(6 * k))
+        outer = np.arange(6 * k)
+        # Outer point s of sector q stands between the inner points s - 1 and s of that sector.
+        sector, s = np.divmod(outer, k)
+        inner, before = (inner_start + (sector * (k - 1) + at) % max(6 * (k - 1), 1) for at in (s, s - 1))
+        triangles.append(np.column_stack([start + outer, start + (outer + 1) % (6 * k), inner]))
+        triangles.append(np.column_stack([start + outer, inner, before])[s > 0])
+        inner_start, start = start, start + 6 * k
+    return np.vstack(points), np.vstack(triangles)
 
 
 def fit_result(method, touch):

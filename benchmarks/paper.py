@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 import core
+from core.triangulation import triangulate
 from core.verification import is_hidden
 from tests import surfaces
 from tools import blender, demo
@@ -43,6 +44,7 @@ LEANS = (0.0, 1.0, 2.0, 4.0)
 DRAWN = 2.0  # of these, off by about as much as the paper's fit under no constraint
 NECK_EXTENT, NECK_STEPS = 11.7, 9
 VERTICES = 1500  # of an exact surface, about
+FINE = 0.01  # of the radius, between the vertices of a patch that is cut off
 LEAST_SQUARES, TAGC, QV, BAYES = "least-squares", "tagc", "quadratic-variation", "bayes"
 METHODS = (LEAST_SQUARES, TAGC, QV, BAYES)
 TABLE_II = (TAGC, QV, BAYES)
@@ -418,10 +420,10 @@ class Stage:
     """A scene to fill and to photograph."""
 
     def __init__(self, extension, scene):
-        self.patch_object, self.scene = extension.tactile_addon.patch_object, scene
+        self.mesh_data, self.scene = extension.tactile_addon.mesh_data, scene
 
     def ink(self, name):
-        return self.patch_object.emission(name, colour=INKS[name])
+        return self.mesh_data.emission(name, colour=INKS[name])
 
     def add(self, name, data, material=None):
         import bpy
@@ -436,7 +438,7 @@ class Stage:
         import bpy
 
         data = bpy.data.meshes.new(name)
-        self.patch_object.fill(data, points, triangles, list(attributes))
+        self.mesh_data.fill(data, points, triangles, list(attributes))
         data.shade_smooth()
         return self.add(name, data, material)
 
@@ -534,9 +536,8 @@ def draw_row(extension, place):
     for gone in (obj, spot):
         gone.hide_render = True
     _cut(stage, obj, place, r)
-    plane, triangles = r.domain.triangulation(40)
-    surface = r.frame.to_world(np.column_stack([plane, r.patch.height(*plane.T)]))
-    stage.mesh("Patch", surface, triangles, stage.ink("black"))
+    points, triangles = r.mesh()
+    stage.mesh("Patch", r.frame.to_world(points), triangles, stage.ink("black"))
     red, brown, size = stage.ink("red"), stage.ink("brown"), r.radius
     overlays = [stage.line(curve.points, 0.02 * size, red) for curve in place.contours(AZIMUTHS, 0)]
     for axis in r.frame.axes.T:
@@ -561,7 +562,7 @@ def _cut(stage, obj, place, r):
     # Emission is in linear light, the colours meant are as seen.
     colours = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
     attributes = [("normal_colour", "FLOAT_COLOR", colours.astype(np.float32))]
-    material = stage.patch_object.emission("Normals", attribute="normal_colour")
+    material = stage.mesh_data.emission("Normals", attribute="normal_colour")
     stage.mesh("Mesh", points, triangles[near[triangles].all(axis=1)], material, attributes)
 
 
@@ -578,7 +579,8 @@ def draw_neck(extension, neck):
         bpy.ops.wm.read_homefile(use_empty=True)
         stage, fit = Stage(extension, bpy.context.scene), fitted(neck, method, seed, DRAWN)
         r, nine = fit.result, _in_frame(fit.result, neck.contours(NINE, seed + 1000 * SEEDS))
-        plane, triangles = r.domain.triangulation(100)
+        size = FINE * r.radius
+        plane, triangles = triangulate(r.domain, lambda at, size=size: np.full(len(at), size), FINE * size)
         patch = stage.mesh("Patch", np.column_stack([plane, r.patch.height(*plane.T)]), triangles)
         _cut_off(patch.data, TALL * neck.extent)
         demo.look(bpy.context.scene, patch)

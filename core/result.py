@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import fitting
 from .arguments import Array
@@ -17,6 +17,7 @@ from .domain import Domain
 from .local_geometry import Curves, Frame, misses
 from .monge import MongePatch, exponents, monomials
 from .posterior import TERMS, Posterior, coefficients_of, terms_to
+from .triangulation import patch_mesh
 from .verification import fit_error, total_absolute_curvature
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
@@ -25,6 +26,7 @@ DOUBTFUL_TURN = math.radians(8.5)  # of the frame
 DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
+MESH_SHARE = 0.25  # of mean_height_std, that the mesh is off the patch, at most
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,13 @@ class Reconstruction:
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
         return mean_height_stds([self])[0]
+
+    def mesh(self) -> tuple[Array, NDArray[np.intp]]:
+        """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
+
+        As fine as what is known of it: off it, and off the boundary, by a quarter of mean_height_std at most.
+        """
+        return patch_mesh(self.patch, self.domain, MESH_SHARE * self.mean_height_std)
 
     @cached_property
     def blind(self) -> int:
