@@ -18,11 +18,11 @@ from .arguments import Array
 from .domain import Domain
 from .monge import MongePatch
 
-CHORD = 4.5  # over the curvature, tolerance in a square of sides as wanted: 8, but for the rim's triangles
+CHORD = 4.6  # over the curvature, tolerance in a square of sides as wanted: 8, were all equilateral
 COARSEST, FINEST = 0.25, 0.02  # of the mean radius, between neighbours: colours are drawn by them too
 VISIBLE = 1e-3  # of the mean radius: a rim that is farther off shows its corners
 AROUND, MOST = 128, 256  # samples of the boundary; edges of the rim, at most
-ALONG = 0.8  # of the distance wanted inside, along the rim, where the lattice does not fit
+ALONG = 0.65  # of the distance wanted inside, along the rim, where the lattice does not fit
 GROWTH = 0.5  # of the distance of neighbours, with the distance from the rim
 CLEAR = 0.6  # of an edge of the rim, to the lattice
 PASSES = 3  # of smoothing
@@ -84,7 +84,7 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
 
 
 def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
-    """Points inside and clear of the rim (n, 2), from the origin outward, as far apart as size and rim ask."""
+    """Points inside and clear of the rim (n, 2), from the origin outward, as size and rim ask."""
     from scipy.spatial import cKDTree
 
     edge = float(np.mean(np.hypot(*(rim - np.roll(rim, 1, 0)).T)))
@@ -101,8 +101,9 @@ def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
     wide[i == 0] *= 2.0  # so that no trapezium lies across the axis, whose diagonal would lean
     distance = cKDTree(rim).query(points)[0]
     wanted = np.minimum(size(points), edge + GROWTH * distance)
-    points = points[(wanted < 1.999 * wide) & (distance > CLEAR * edge)]
-    return points[np.argsort(np.hypot(*points.T), kind="stable")]
+    kept = np.flatnonzero((wanted < 1.999 * wide) & (distance > CLEAR * edge))
+    outward = np.argsort((i**2 + 3 * j**2)[kept], kind="stable")  # whole numbers: the same in any unit
+    return points[kept[outward]]
 
 
 def _delaunay(points: Array, inner: int) -> NDArray[np.intp]:

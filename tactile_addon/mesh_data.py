@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes with point attributes, filled and read as arrays; and the material that shows colours as they are."""
+"""Meshes with point attributes, filled and read as arrays, and the material that shows their colours."""
 
 import bpy
 import numpy as np

@@ -9,6 +9,7 @@ from scipy.optimize import approx_fprime, minimize
 
 from core import METHODS, MongePatch, SamplingPlane, fit_error, fitting, reconstruct, tagc, track
 from core.domain import Domain, closed_spline_domain
+from core.triangulation import triangulate
 
 PLANES = [SamplingPlane(np.radians(a)) for a in (13, 73, 133)]
 PAPER_SIZE = {
