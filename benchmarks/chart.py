@@ -169,11 +169,30 @@ def touch_of(name, planes, noise, seed):
         azimuths = np.pi * np.arange(count) / count + np.radians(accuracy.TURN)
         sampling = [SamplingPlane(azimuth) for azimuth in azimuths]
         contours[count] = track(surface, case.point, case.axes[:, 2], sampling, rng=number, **lengths)
-    flat, triangles = accuracy.domain_of(case.contours, case.point, case.axes, extent).triangulation(RINGS)
+    flat, triangles = in_rings(accuracy.domain_of(case.contours, case.point, case.axes, extent))
     vertices = accuracy.above(surface, case.axes, case.kappas, flat)
     offsets = np.random.default_rng(number).normal(0.0, noise, len(vertices))
     offsets[0] = 0.0  # the point is exact, as in the contours
     return Touch(case, contours, vertices + np.outer(offsets, case.axes[:, 2]), triangles, extent)
+
+
+def in_rings(domain):
+    """Points (1 + 3 RINGS (RINGS + 1), 2) and triangles (6 RINGS^2, 3) over a domain, near to equilateral.
+
+    Ring k has 6k points in equal turns.
+    """
+    points, triangles = [np.zeros((1, 2))], []
+    start, inner_start = 1, 0
+    for k in range(1, RINGS + 1):
+        points.append(k / RINGS * domain.boundary(6 * k))
+        outer = np.arange(6 * k)
+        # Outer point s of sector q stands between the inner points s - 1 and s of that sector.
+        sector, s = np.divmod(outer, k)
+        inner, before = (inner_start + (sector * (k - 1) + at) % max(6 * (k - 1), 1) for at in (s, s - 1))
+        triangles.append(np.column_stack([start + outer, start + (outer + 1) % (6 * k), inner]))
+        triangles.append(np.column_stack([start + outer, inner, before])[s > 0])
+        inner_start, start = start, start + 6 * k
+    return np.vstack(points), np.vstack(triangles)
 
 
 def fit_result(method, touch):

@@ -4,6 +4,7 @@
 
 import numpy as np
 
+from core.triangulation import triangulate
 from core.verification import is_hidden
 from tools import demo
 
@@ -12,6 +13,7 @@ from . import ROOT
 OUTPUT = ROOT / "build" / "paper"
 CUT = 1.65  # radii around the reference point that are shown of a mesh
 TALL = 8.19  # mm above and below the point that are shown of the neck's patches
+FINE = 0.01  # of the radius, between the vertices of a patch that is cut off
 SIZE = 480  # pixels of a picture in a sheet
 INKS = {
     "black": (0.004, 0.004, 0.004, 1.0),
@@ -25,10 +27,10 @@ class Stage:
     """A scene to fill and to photograph."""
 
     def __init__(self, extension, scene):
-        self.patch_object, self.scene = extension.tactile_addon.patch_object, scene
+        self.mesh_data, self.scene = extension.tactile_addon.mesh_data, scene
 
     def ink(self, name):
-        return self.patch_object.emission(name, colour=INKS[name])
+        return self.mesh_data.emission(name, colour=INKS[name])
 
     def add(self, name, data, material=None):
         import bpy
@@ -43,7 +45,7 @@ class Stage:
         import bpy
 
         data = bpy.data.meshes.new(name)
-        self.patch_object.fill(data, points, triangles, list(attributes))
+        self.mesh_data.fill(data, points, triangles, list(attributes))
         data.shade_smooth()
         return self.add(name, data, material)
 
@@ -131,9 +133,8 @@ def draw_row(extension, place, r, contours):
     for gone in (obj, spot):
         gone.hide_render = True
     _cut(stage, obj, place, r)
-    plane, triangles = r.domain.triangulation(40)
-    surface = r.frame.to_world(np.column_stack([plane, r.patch.height(*plane.T)]))
-    stage.mesh("Patch", surface, triangles, stage.ink("black"))
+    points, triangles = r.mesh()
+    stage.mesh("Patch", r.frame.to_world(points), triangles, stage.ink("black"))
     red, brown, size = stage.ink("red"), stage.ink("brown"), r.radius
     overlays = [stage.line(curve.points, 0.02 * size, red) for curve in contours]
     for axis in r.frame.axes.T:
@@ -158,7 +159,7 @@ def _cut(stage, obj, place, r):
     # Emission is in linear light, the colours meant are as seen.
     colours = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
     attributes = [("normal_colour", "FLOAT_COLOR", colours.astype(np.float32))]
-    material = stage.patch_object.emission("Normals", attribute="normal_colour")
+    material = stage.mesh_data.emission("Normals", attribute="normal_colour")
     stage.mesh("Mesh", points, triangles[near[triangles].all(axis=1)], material, attributes)
 
 
@@ -168,7 +169,8 @@ def draw_neck(extension, name, r, contacts, verifying):
 
     bpy.ops.wm.read_homefile(use_empty=True)
     stage = Stage(extension, bpy.context.scene)
-    plane, triangles = r.domain.triangulation(100)
+    size = FINE * r.radius
+    plane, triangles = triangulate(r.domain, lambda at: np.full(len(at), size), FINE * size)
     patch = stage.mesh("Patch", np.column_stack([plane, r.patch.height(*plane.T)]), triangles)
     _cut_off(patch.data, TALL)
     demo.look(bpy.context.scene, patch)

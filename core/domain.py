@@ -39,9 +39,21 @@ class Domain:
         """Azimuths, ascending, and radii of the boundary."""
         at, spline = self._boundary
         x, y = spline(at[-1] / SAMPLES * np.arange(SAMPLES)).T
-        azimuths = np.arctan2(y, x)
+        azimuths, radii = np.arctan2(y, x), np.hypot(x, y)
+        if np.count_nonzero(np.diff(azimuths, append=azimuths[0]) <= 0.0) > 1:
+            azimuths, radii = self._without_turning_back()
         order = np.argsort(azimuths)
-        return azimuths[order], np.hypot(x, y)[order]
+        return azimuths[order], radii[order]
+
+    def _without_turning_back(self) -> tuple[Array, Array]:
+        """Beside an end near to the origin the spline may turn back: a monotone one, of the radius."""
+        from scipy.interpolate import PchipInterpolator
+
+        around = 2.0 * np.pi
+        ends = np.arctan2(self.ends[:, 1], self.ends[:, 0])
+        at = np.concatenate([ends - around, ends, ends + around])
+        azimuths = around / SAMPLES * np.arange(SAMPLES) - np.pi
+        return azimuths, PchipInterpolator(at, np.tile(np.hypot(*self.ends.T), 3))(azimuths)
 
     @cached_property
     def nodes(self) -> tuple[Array, Array]:
@@ -88,16 +100,6 @@ class Domain:
         inside = self.contains(x, y)
         return np.column_stack([x[inside], y[inside]]), h
 
-    def triangulation(self, rings: int) -> tuple[Array, NDArray[np.intp]]:
-        """Points (1 + 3 rings (rings + 1), 2) and counterclockwise triangles (6 rings^2, 3) over the domain.
-
-        Ring k has 6k points in equal turns, so that triangles are of one size and near to equilateral
-        where the domain is near to a disk.
-        """
-        ring = np.repeat(np.arange(rings + 1), [1, *range(6, 6 * rings + 1, 6)])
-        turn = np.concatenate([[0.0], *(np.arange(6 * k) / (6 * k) for k in range(1, rings + 1))])
-        return self._at(2.0 * np.pi * turn) * (ring / rings)[:, None], _disk(rings)
-
 
 @lru_cache(maxsize=16)
 def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
@@ -111,27 +113,6 @@ def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
         np.sqrt(0.5 * (square + 1.0))[:, None, None],
         0.5 * outward[:, None],
     )
-
-
-@lru_cache(maxsize=4)
-def _disk(rings: int) -> NDArray[np.intp]:
-    """The triangles between the rings of Domain.triangulation."""
-    triangles = []
-    start, inner_start = 1, 0
-    for k in range(1, rings + 1):
-        outer = np.arange(6 * k)
-        # Outer point s of sector q stands between the inner points s - 1 and s of that sector.
-        sector, s = np.divmod(outer, k)
-        inner = inner_start + (sector * (k - 1) + s) % max(6 * (k - 1), 1)
-        following = start + (outer + 1) % (6 * k)
-        triangles.append(np.column_stack([start + outer, following, inner]))
-        between = s > 0
-        before = inner_start + (sector * (k - 1) + s - 1) % max(6 * (k - 1), 1)
-        triangles.append(np.column_stack([start + outer, inner, before])[between])
-        inner_start, start = start, start + 6 * k
-    disk = np.vstack(triangles)
-    disk.flags.writeable = False
-    return disk
 
 
 def closed_spline_domain(ends: ArrayLike, radius: float) -> Domain:

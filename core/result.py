@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import fitting
 from .arguments import Array
@@ -18,6 +18,7 @@ from .domain import Domain
 from .local_geometry import Frame
 from .monge import MongePatch, exponents, monomials
 from .posterior import TERMS, Posterior, coefficients_of, terms_to
+from .triangulation import patch_mesh
 from .verification import fit_error, total_absolute_curvature
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
@@ -27,6 +28,7 @@ DOUBTFUL_CURVATURE = 0.1  # of 1 / radius; as well is it known along a curve tha
 DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
+MESH_SHARE = 0.5  # of mean_height_std, that the mesh is off the patch at most; in the mean an eighth
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,13 @@ class Reconstruction:
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
         return mean_height_stds([self])[0]
+
+    def mesh(self) -> tuple[Array, NDArray[np.intp]]:
+        """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
+
+        As fine as what is known of it: off it, and off the boundary, by half of mean_height_std at most.
+        """
+        return patch_mesh(self.patch, self.domain, MESH_SHARE * self.mean_height_std)
 
     @cached_property
     def blind(self) -> int:

@@ -7,6 +7,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from . import colours, patch_object
+from .mesh_data import emission
 from .stability import KEYS, NOTHING, QUANTITIES, REASONS
 
 RECORD = "tactile_map"  # the custom property that holds the report
@@ -48,7 +49,7 @@ def insert(context, obj, touched):
     painted.show_in_front = True  # it lies in the mesh it describes
     _paint(mesh, touched)
     mesh.materials.clear()
-    mesh.materials.append(patch_object.emission("Tactile Stability", attribute=COLOUR))
+    mesh.materials.append(emission("Tactile Stability", attribute=COLOUR))
     painted[RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
     recolour(painted)

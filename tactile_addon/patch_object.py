@@ -10,21 +10,15 @@ from mathutils import Matrix
 
 from .. import core
 from . import colours
+from .contour_mesh import fill_contours
+from .mesh_data import emission, fill, own_mesh, values
 
 COLLECTION = "Tactile Patches"
 RECORD = "tactile"  # the patch object's custom property that holds the report,
 RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
 COLOUR = "curvature_colour"
-RINGS = 25  # of the patch mesh: 1951 vertices
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 CONTOUR_COLOUR = (0.02, 0.02, 0.02, 1.0)
-KEYS = {
-    "FLOAT": "value",
-    "INT": "value",
-    "BOOLEAN": "value",
-    "FLOAT_VECTOR": "vector",
-    "FLOAT_COLOR": "color",
-}
 # What the colours can show: attribute, name, description, and the power of length it is measured in.
 QUANTITIES = [
     ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
@@ -62,7 +56,7 @@ def rewrite(patch, touched):
     _fill_patch(patch.data, touched)
     names = {"patch": patch.name}
     if lines is not None:
-        _fill_contours(lines.data, touched)
+        fill_contours(lines.data, touched)
         names["contours"] = lines.name
     _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
     patch[RECORD] = touched.report | names
@@ -70,12 +64,6 @@ def rewrite(patch, touched):
     if touched.is_complete:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolour(patch)
-
-
-def own_mesh(obj):
-    """A linked copy shows something else than the others from now on."""
-    if obj.data.users > 1:
-        obj.data = obj.data.copy()
 
 
 def reconstruction_of(patch):
@@ -92,8 +80,8 @@ def contacts_of(patch):
         raise ValueError(f'"{patch.name}" has no contours any more: touch again')
     frame = patch[RECORD]["frame"]
     axes = np.transpose([frame[name] for name in ("d1", "d2", "normal")])
-    curve, contact, points = (_values(lines.data, name) for name in ("contour", "contact", "position"))
-    normals = _values(lines.data, "contact_normal") if "contact_normal" in lines.data.attributes else None
+    curve, contact, points = (values(lines.data, name) for name in ("contour", "contact", "position"))
+    normals = values(lines.data, "contact_normal") if "contact_normal" in lines.data.attributes else None
     contours = []
     for number in range(int(curve.max()) + 1):
         # An octahedron each, whose six tips are one after the other.
@@ -102,15 +90,6 @@ def contacts_of(patch):
         up = None if normals is None else normals[tips[::6]] @ axes.T
         contours.append(core.Contour(frame["origin"] + centres @ axes.T, normals=up))
     return contours
-
-
-def _values(mesh, name):
-    """Of a point attribute, (n,) or (n, 3)."""
-    attribute = mesh.attributes[name]
-    key = KEYS[attribute.data_type]
-    values = np.empty((len(attribute.data), 3) if key == "vector" else len(attribute.data))
-    attribute.data.foreach_get(key, values.ravel())
-    return values
 
 
 def _place(patch, matrix):
@@ -183,9 +162,9 @@ def _fill_patch(mesh, touched):
     """The patch in the Darboux frame, with its attributes; deviations are 0 until the touch is verified."""
     result = touched.result
     patch, frame = result.patch, result.frame
-    plane, triangles = result.domain.triangulation(RINGS)
-    x, y = plane.T
-    points, normals = np.column_stack([plane, patch.height(x, y)]), patch.normal(x, y)
+    points, triangles = result.mesh()
+    x, y, _ = points.T
+    normals = patch.normal(x, y)
     deviation = np.zeros(len(points))
     if touched.is_verified:
         world = frame.to_world(points), normals @ frame.axes.T
@@ -199,124 +178,3 @@ def _fill_patch(mesh, touched):
         (COLOUR, "FLOAT_COLOR", np.ones((len(points), 4))),
     ]
     fill(mesh, points, triangles, attributes)
-
-
-def _fill_contours(mesh, touched):
-    """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
-
-    Point attributes tell them apart: `contour` counts the contours, `contact` the contacts along
-    one, and is -1 on the tubes; `contact_normal` is there where all contours have normals.
-    """
-    frame, thickness = touched.result.frame, 0.009 * touched.result.radius
-    points, triangles, contour_index, contact_index = [], [], [], []
-    count = 0
-    for number, contour in enumerate(touched.contours):
-        path = frame.to_local(contour.points)
-        across = frame.axes.T @ contour.plane_normal if contour.plane_normal is not None else _across(path)
-        for mesh_points, mesh_triangles, contact in (
-            (*_tube(path, across, thickness), np.full(4 * len(path), -1)),
-            (*_octahedra(path, 3.6 * thickness), np.repeat(np.arange(len(path)), 6)),
-        ):
-            points.append(mesh_points)
-            triangles.append(mesh_triangles + count)
-            contour_index.append(np.full(len(mesh_points), number))
-            contact_index.append(contact)
-            count += len(mesh_points)
-    attributes = [
-        ("contour", "INT", np.concatenate(contour_index)),
-        ("contact", "INT", np.concatenate(contact_index)),
-    ]
-    if all(contour.normals is not None for contour in touched.contours):
-        each = [
-            np.vstack([np.zeros((4 * len(c.points), 3)), np.repeat(c.normals @ frame.axes, 6, axis=0)])
-            for c in touched.contours
-        ]
-        attributes.append(("contact_normal", "FLOAT_VECTOR", np.vstack(each)))
-    fill(mesh, np.vstack(points), np.vstack(triangles), attributes)
-
-
-def _tube(path, across, thickness):
-    """A square tube along a path (n, 3) in the plane normal to `across`: points (4n, 3) and triangles."""
-    ahead = np.gradient(path, axis=0)
-    up = np.cross(across, ahead)
-    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-30)
-    corners = [path + thickness * (a * up + b * across) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
-    ring = np.arange(4)
-    a = (4 * np.arange(len(path) - 1)[:, None] + ring).ravel()
-    b = (4 * np.arange(len(path) - 1)[:, None] + (ring + 1) % 4).ravel()
-    triangles = np.vstack([np.column_stack([a, b, b + 4]), np.column_stack([a, b + 4, a + 4])])
-    return np.stack(corners, axis=1).reshape(-1, 3), triangles
-
-
-def _across(path):
-    """A direction in the tangent plane across a path (n, 3) that is in no plane."""
-    x, y, _ = path[-1] - path[0]
-    return np.array([-y, x, 0.0]) / max(np.hypot(x, y), 1e-30)
-
-
-def _octahedra(centres, radius):
-    """An octahedron at each of centres (n, 3): points (6n, 3) and triangles (8n, 3)."""
-    tips = radius * np.vstack([np.eye(3), -np.eye(3)])
-    faces = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
-    offsets = 6 * np.arange(len(centres))
-    return (centres[:, None] + tips).reshape(-1, 3), (offsets[:, None, None] + faces).reshape(-1, 3)
-
-
-def fill(mesh, points, triangles, attributes):
-    """Gives `mesh` points (n, 3), triangles (m, 3) and point attributes (name, Blender's type, values).
-
-    Where it has these triangles already, only coordinates and values are written.
-    """
-    if not _has_triangles(mesh, len(points), triangles):
-        mesh.clear_geometry()
-        mesh.vertices.add(len(points))
-        mesh.loops.add(triangles.size)
-        mesh.loops.foreach_set("vertex_index", triangles.astype(np.int32).ravel())
-        mesh.polygons.add(len(triangles))
-        mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
-        mesh.update(calc_edges=True)
-    for name, kind, values in [("position", "FLOAT_VECTOR", points), *attributes]:
-        write(mesh, name, kind, values)
-    mesh.update()
-
-
-def write(mesh, name, kind, values):
-    """Writes a point attribute; one of that name that is of another kind makes room."""
-    # No reference to an attribute may outlive the next `new`, which moves them all.
-    attribute = mesh.attributes.get(name)
-    if attribute is not None and (attribute.data_type, attribute.domain) != (kind, "POINT"):
-        mesh.attributes.remove(attribute)
-        attribute = None
-    attribute = attribute or mesh.attributes.new(name, kind, "POINT")
-    attribute.data.foreach_set(KEYS[kind], values.ravel())
-
-
-def _has_triangles(mesh, count, triangles):
-    if (len(mesh.vertices), len(mesh.loops)) != (count, triangles.size):
-        return False
-    corners = np.empty(triangles.size, dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    return np.array_equal(corners, triangles.ravel())
-
-
-def emission(name, attribute=None, colour=(1.0, 1.0, 1.0, 1.0)):
-    """The material of that name, made where missing: a colour attribute or one colour, shown as it is."""
-    material = bpy.data.materials.get(name)
-    if material is None:
-        material = bpy.data.materials.new(name)
-        if material.node_tree is None:  # in Blender 4.5; later ones have it, and deprecate the switch
-            material.use_nodes = True
-        material.diffuse_color = colour
-        nodes, links = material.node_tree.nodes, material.node_tree.links
-        nodes.clear()
-        emission = nodes.new("ShaderNodeEmission")
-        output = nodes.new("ShaderNodeOutputMaterial")
-        links.new(emission.outputs["Emission"], output.inputs["Surface"])
-        if attribute is None:
-            emission.inputs["Color"].default_value = colour
-        else:
-            source = nodes.new("ShaderNodeVertexColor")
-            source.layer_name = attribute
-            links.new(source.outputs["Color"], emission.inputs["Color"])
-        output.location, emission.location = (200, 0), (0, 0)
-    return material

@@ -9,7 +9,7 @@ import numpy as np
 from bpy.props import BoolProperty, StringProperty
 
 from .. import core
-from . import patch_object, probe
+from . import mesh_data, patch_object, probe
 from .live import is_pending
 from .operators import report_error, target_object
 from .report import verification_summary
@@ -72,8 +72,8 @@ def verify_patch(patch, target, depsgraph, write=False):
     found = core.verify(r, surface, vertices)
     points, normals = _vertices(patch.data, r)
     deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
-    patch_object.own_mesh(patch)
-    patch_object.write(patch.data, "deviation", "FLOAT", deviations)
+    mesh_data.own_mesh(patch)
+    mesh_data.write(patch.data, "deviation", "FLOAT", deviations)
     patch_object.recolour(patch)
     record = patch[patch_object.RECORD]
     record["verification"] = {"target": target.name, **found}
@@ -82,8 +82,8 @@ def verify_patch(patch, target, depsgraph, write=False):
     if write:
         distances = np.full(len(target.data.vertices), NOTHING)
         distances[indices] = core.distances(r.patch, r.frame.to_local(vertices))
-        patch_object.write(target.data, DISTANCE, "FLOAT", distances)
-        patch_object.write(target.data, OVERLAP, "BOOLEAN", distances != NOTHING)
+        mesh_data.write(target.data, DISTANCE, "FLOAT", distances)
+        mesh_data.write(target.data, OVERLAP, "BOOLEAN", distances != NOTHING)
         target.data.update()
 
 

@@ -120,8 +120,9 @@ def examine(r):
     assert r.status in ("ok", "uncertain", "not_converged")
     assert r.message.endswith(".")
     assert "nan" not in r.message
-    x, y = np.vstack([r.domain.grid(100)[0], r.domain.boundary(12), r.domain.triangulation(3)[0]]).T
-    assert len(x) > 0
+    points, triangles = r.mesh()
+    assert 0 <= triangles.min() <= triangles.max() < len(points)
+    x, y = np.vstack([r.domain.grid(100)[0], r.domain.boundary(12), points[:, :2]]).T
     patch = r.patch
     numbers = [
         *(r.radius, r.accuracy, r.mean_height_std, r.blind, r.fit_error, r.total_absolute_curvature),

@@ -93,7 +93,7 @@ def compose(extension, patch, unit):
         scene.collection.objects.link(obj)
     scene.camera = camera
 
-    material = extension.tactile_addon.patch_object.emission
+    material = extension.tactile_addon.mesh_data.emission
     ink = material("Ink", colour=(0.01, 0.01, 0.01, 1.0))
     put = _Overlay(camera, radius, ink)
     _colour_bar(extension, put, report["colour_limit"], unit)
@@ -146,7 +146,7 @@ def _colour_bar(extension, put, limit, unit):
     colours = module.colours.diverging(np.repeat(at, 2), 1.0)
     attributes = [(module.patch_object.COLOUR, "FLOAT_COLOR", colours)]
     strip = bpy.data.meshes.new("Colour Bar")
-    module.patch_object.fill(strip, points, triangles, attributes)
+    module.mesh_data.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])
     put.add("Colour Bar", strip, 2.35, 0.0)
     put.text("Gaussian curvature", 1.6, BAR_REACH + 0.45, 0.18)
