@@ -112,7 +112,7 @@ def test_the_frame_is_hardly_ever_off_by_more_than_the_angle_that_is_told():
 @pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.ellipsoid(30, 28, 27, 0.4, 0.5)])
 @pytest.mark.parametrize("degrees", [(13, 73, 133), (13, 33, 53)])
 def test_the_angle_told_is_a_quantile_of_the_posterior(surface, degrees):
-    r = fitted(surface, contours_of(surface, degrees=degrees, noise=0.1))
+    r = surface.fit(contours_of(surface, degrees=degrees, noise=0.1))
     mean, covariance = r.posterior.mean[:5], r.posterior.covariance[:5, :5]
     drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, 40_000)
     x, y, xx, xy, yy = drawn.T
@@ -131,13 +131,13 @@ def cut_short(contours, point):
 def test_the_curvature_known_least_is_that_along_a_short_curve():
     s = surfaces.pear()
     contours = cut_short(contours_of(s), s.point)
-    r = fitted(s, contours)
+    r = s.fit(contours)
     azimuth = np.arctan2(*(r.frame.axes[:, 1::-1].T @ (contours[0].points[-1] - s.point)))
     along, across = np.cos(azimuth), np.sin(azimuth)
     terms = 2.0 * np.array([along**2, along * across, across**2])
     std = np.sqrt(terms @ r.posterior.covariance[2:5, 2:5] @ terms)
     assert r.posterior.curvature_std() == pytest.approx(std, rel=0.05)
-    assert fitted(s, contours_of(s)).posterior.curvature_std() < 0.1 * std
+    assert s.fit(contours_of(s)).posterior.curvature_std() < 0.1 * std
 
 
 def test_a_curve_shorter_than_a_quarter_of_the_radius_leaves_doubt():
@@ -145,8 +145,8 @@ def test_a_curve_shorter_than_a_quarter_of_the_radius_leaves_doubt():
     open_curvature = 0
     for seed in range(10):
         contours = contours_of(s, seed=seed)
-        assert fitted(s, contours).status == "ok"
-        r = fitted(s, cut_short(contours, s.point))
+        assert s.fit(contours).status == "ok"
+        r = s.fit(cut_short(contours, s.point))
         assert r.status == "uncertain"  # whichever doubt comes first
         if (
             f"Curvatures are good to {r.posterior.curvature_std() / r.radius:.2g} in the direction"
