@@ -52,7 +52,7 @@ class Domain:
         around = 2.0 * np.pi
         ends = np.arctan2(self.ends[:, 1], self.ends[:, 0])
         at = np.concatenate([ends - around, ends, ends + around])
-        azimuths: Array = around / SAMPLES * np.arange(SAMPLES) - np.pi
+        azimuths = around / SAMPLES * np.arange(SAMPLES, dtype=np.float64) - np.pi
         return azimuths, PchipInterpolator(at, np.tile(np.hypot(*self.ends.T), 3))(azimuths)
 
     @cached_property
