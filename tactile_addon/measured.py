@@ -11,7 +11,8 @@ import numpy as np
 
 from .. import core
 from . import contact_file
-from .touch import Touch, reconstruction_report, reference_axes, suggestion_report
+from .record import reconstruction_report, suggestion_report
+from .touch import Touch, reference_axes
 
 FLAT = 0.02  # of k1 + k2, in unit radius: less bulges to no side
 

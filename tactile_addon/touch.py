@@ -3,13 +3,13 @@
 """One touch, from an object of the scene to a reconstruction and its report; nothing in the scene changes."""
 
 import math
-from collections import Counter
 from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
 from .. import core
+from .record import ends, judgement, reconstruction_report, suggestion_report
 from .settings import MOST_PLANES, STEEPEST
 from .surface import MeshSurface
 
@@ -18,14 +18,6 @@ AWAY = 1.0 / 8.0  # of it, that the location may be off the surface where no ext
 FINEST = 1.0 / 128.0  # of it, a step where neither is given
 STEPS = 12  # of a half contour at least, where no step is given
 HELPS = 0.1  # of the mean deviation of the height, that one more plane is to take off
-BEYOND = 3.0  # times its own deviation, that a patch may be off the mesh in the mean
-ENDS = {
-    core.UNEXPLAINED: "end where the patch could not be trusted any more",
-    core.EXTENT: "are as long as may be",
-    core.NO_CONTACT: "end at an edge",
-    core.CREASE: "end at a crease",
-    core.NOT_MONGE: "end where the surface turns away",
-}
 COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about curvature
 
 
@@ -122,11 +114,6 @@ def touch_along(
     )
     clock.append(perf_counter())
     result, contours = found.result, found.contours
-    said = reconstruction_report(result)
-    if not extent:
-        ended = _ends(contours)
-        said["message"] += ended
-        said["fit"]["message"] += ended
     report = {
         "source": obj.name,
         "method": fit["method"],
@@ -135,23 +122,13 @@ def touch_along(
         "step": found.step,
         "noise": noise,
         "seed": seed,
-        **said,
+        **reconstruction_report(result, "" if extent else ends(contours)),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
         "axes": axes.tolist(),
         "stops": [list(contour.stops) for contour in contours],
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
     return Touch(surface, result, contours, report)
-
-
-def _ends(contours):
-    """A sentence on what has ended curves that were free to grow."""
-    counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
-    if len(counts) == 1:
-        return f" All half curves {ENDS[counts[0][0]]}."
-    return (
-        f" Of {2 * len(contours)} half curves {', '.join(f'{count} {ENDS[stop]}' for stop, count in counts)}."
-    )
 
 
 def verify(touched, most=None):
@@ -244,56 +221,3 @@ def reachable(surface, r, most=None):
     near, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius, most)
     over = core.reachable(r, surface, vertices, normals)
     return near[over], vertices[over]
-
-
-def judgement(report, mean, scale=1.0):
-    """Status and message: the fit's own, unless it has no doubt and the mesh contradicts it.
-
-    mean : distance of the mesh; scale : of a patch that was scaled since its report
-    """
-    std, percent = scale * report["height_std"], 100.0 / (scale * report["radius"])
-    if report["fit"]["status"] != "ok" or mean <= BEYOND * std:
-        return report["fit"]
-    return {
-        "status": "uncertain",
-        "message": f"The mesh is {percent * mean:.3g} % of the radius off the patch in the mean, which "
-        f"expects {percent * std:.3g} %, for between the curves there is what they do not show: take a "
-        "shorter extent, or add sampling planes.",
-    }
-
-
-def suggestion_report(result, reference):
-    """The plane that would tell most, as an azimuth like those of `planes`, and what it would bring."""
-    plane, expected = core.suggest_plane(result)
-    d1, _, n = result.frame.axes.T
-    tangent = plane.axes(n, d1)[:, 0]
-    return {
-        "azimuth": math.degrees(core.azimuth_of(tangent, reference[:, 1], reference[:, 0])),
-        "tangent": tangent.tolist(),
-        "expected_height_std": expected,
-    }
-
-
-def reconstruction_report(result):
-    d1, d2, n = result.frame.axes.T.tolist()
-    return {
-        "status": result.status,
-        "message": result.message,
-        "fit": {"status": result.status, "message": result.message},  # a mesh may say otherwise
-        "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
-        "k1": result.patch.k1,
-        "k2": result.patch.k2,
-        "gaussian_curvature": float(result.patch.gaussian_curvature(0.0, 0.0)),
-        "mean_curvature": float(result.patch.mean_curvature(0.0, 0.0)),
-        "coefficients": result.patch.coefficients.tolist(),
-        "radius": result.radius,
-        "ends": result.domain.ends.tolist(),
-        "points": result.contacts.tolist(),
-        "area": result.domain.area,
-        "contacts": len(result.contacts),
-        "fit_error": result.fit_error,
-        "height_std": result.mean_height_std,
-        "blind": result.blind,
-        "total_absolute_curvature": result.total_absolute_curvature,
-        "condition_number": result.condition_number,
-    }

@@ -12,9 +12,10 @@ from .. import core
 from . import mesh_data, patch_object, probe
 from .live import is_pending
 from .operators import report_error, target_object
+from .record import judgement
 from .report import verification_summary
 from .surface import MeshSurface
-from .touch import judgement, reachable
+from .touch import reachable
 
 DISTANCE, OVERLAP = "patch_distance", "patch_overlap"  # attributes of the mesh
 NOTHING = -1.0  # the distance of a vertex that does not count
