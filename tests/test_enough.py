@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""No more than a scene needs, in Blender: extents, steps and planes that choose themselves."""
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from scenes import made, positions
+
+PLACE = (0.2, 0.1, 0.06)
+
+
+@pytest.fixture
+def sheet(empty):
+    """A wavy sheet, which three planes do not show well."""
+    empty.ops.mesh.primitive_grid_add(x_subdivisions=200, y_subdivisions=200, size=2.0)
+    obj = empty.context.object
+    co = positions(obj.data)
+    co[:, 2] = 0.2 * np.sin(3.0 * co[:, 0]) * np.cos(2.0 * co[:, 1])
+    obj.data.vertices.foreach_set("co", co.astype(np.float32).ravel())
+    obj.data.update()
+    return obj
+
+
+def reconstruct(bpy, **arguments):
+    return made(bpy.ops.tactile.reconstruct, target="Grid", location=PLACE, **arguments)[1]
+
+
+def test_planes_are_added_while_they_help(empty, sheet):
+    three = reconstruct(empty, extent=0.5)
+    report = reconstruct(empty, extent=0.5, tolerance=0.0)
+    added = report["added_planes"]
+    assert three["added_planes"] == []
+    assert len(report["planes"]) == 3 + len(added) > 3
+    assert [plane[0] for plane in report["planes"][3:]] == pytest.approx([p["azimuth"] for p in added])
+    assert added[0]["azimuth"] == pytest.approx(three["suggested_plane"]["azimuth"])
+    assert added[0]["height_std_before"] == three["height_std"]
+    assert report["height_std"] == added[-1]["height_std"] < 0.5 * three["height_std"]
+    assert report["vertex_distance_mean"] < three["vertex_distance_mean"]
+    assert report["contacts"] > three["contacts"]
+
+
+def test_planes_are_added_until_it_is_good_enough(empty, sheet):
+    stds = [plane["height_std"] for plane in reconstruct(empty, extent=0.5, tolerance=0.0)["added_planes"]]
+    report = reconstruct(empty, extent=0.5, tolerance=1.001 * stds[0])
+    assert [plane["height_std"] for plane in report["added_planes"]] == stds[:1]
+    assert reconstruct(empty, extent=0.5, tolerance=1.0)["added_planes"] == []
+
+
+def test_more_planes_make_a_better_patch_not_a_larger_one(empty, sheet):
+    before, after = reconstruct(empty), reconstruct(empty, tolerance=0.0)
+    assert after["added_planes"]
+    assert after["extent"] <= before["extent"] * (1.0 + 1e-9)
+    assert after["height_std"] < 0.9 * before["height_std"]
+
+
+def test_a_probe_keeps_the_planes_that_were_added(empty, sheet):
+    empty.ops.tactile.pick(target="Grid", location=PLACE, new=True)
+    probe = empty.context.object
+    settings, (patch,) = probe.tactile_probe, probe.children
+    assert empty.ops.tactile.add_planes() == {"FINISHED"}
+    report, digest = patch["tactile"].to_dict(), settings.digest
+    count = settings.plane_count
+    assert count == 3 + len(report["added_planes"]) > 3
+    assert np.degrees(settings.azimuths[:count]) == pytest.approx([plane[0] for plane in report["planes"]])
+    assert (settings.extent, settings.step, settings.is_probe) == (0.0, 0.0, True)
+    empty.context.view_layer.update()
+    assert settings.digest == digest
+    assert patch["tactile"].to_dict() == report
+    settings.azimuths[0] += 0.1  # and goes on being live
+    assert patch["tactile"]["planes"][0][0] == pytest.approx(math.degrees(0.1))
+
+
+def test_while_a_gesture_goes_on_the_extent_stays(empty, sheet, extension):
+    empty.ops.tactile.pick(target="Grid", location=PLACE, new=True)
+    probe = empty.context.object
+    before = probe.children[0]["tactile"].to_dict()
+    probe.location.x += 0.3
+    touch_at = extension.tactile_addon.probe.touch_at
+    depsgraph = empty.context.evaluated_depsgraph_get()
+    going, ended = (touch_at(probe, depsgraph, complete=complete).report for complete in (False, True))
+    assert (going["extent"], going["step"]) == pytest.approx((before["extent"], before["step"]), rel=1e-6)
+    stops = [{stop for pair in report["stops"] for stop in pair} for report in (going, ended)]
+    assert stops == [{"extent"}, {"not explained", "no contact"}]
+
+
+def test_the_shell_asks_for_planes_too(command, files):
+    code, out, err = command(
+        "reconstruct", files / "ball.ply", "--location", "0", "0", "2", "--tolerance", "0"
+    )
+    assert (code, err) == (0, "")
+    assert "more planes" in out
+    assert "has become ±" in out
+
+
+@pytest.mark.parametrize(("name", "noise"), [("cad_block.stl", 0.0), ("shell_gastropod.stl", 0.05)])
+def test_no_patch_across_an_edge_or_a_rib(empty, extension, scans, name, noise):
+    """Of touches all over, those without a warning are off the mesh by no more than they say."""
+    extension.tactile_addon.mesh_file.open_file(scans / name)
+    obj = empty.context.scene.objects[0]
+    faces = np.array([(*face.center, face.area) for face in obj.data.polygons])
+    chosen = np.random.default_rng(5).choice(len(faces), 40, p=faces[:, 3] / faces[:, 3].sum())
+    silent = trusted = 0
+    for at in faces[chosen, :3]:
+        try:
+            _, report = made(empty.ops.tactile.reconstruct, target=obj.name, location=at, noise=noise)
+        except RuntimeError:  # on a crease or beside one: no patch
+            continue
+        if report["status"] == "ok" and report["vertices"]:
+            trusted += 1
+            silent += report["vertex_distance_mean"] > 3.0 * report["height_std"]
+    assert trusted > 0
+    assert silent == 0
