@@ -53,7 +53,7 @@ def test_what_cannot_run_says_why(empty):
             getattr(empty.ops.tactile, name)()
         return str(caught.value).partition(".poll() ")[2]
 
-    on_probes = ("add_plane", "remove_plane", "update", "delete")
+    on_probes = ("add_plane", "add_planes", "remove_plane", "update", "delete")
     assert {refused(name) for name in on_probes} == {"Select a probe, or pick a reference point first"}
     assert refused("show_colours") == "Use it in a 3D viewport"
     for name in ("verify", "register", "export_contacts", "export_patch"):

@@ -18,7 +18,7 @@ from mathutils.bvhtree import BVHTree
 RADIUS = 2.0
 TOP, SIDE = Vector((0.3, -0.2, 1.9)), Vector((1.9, 0.3, 0.4))
 SET = ["Sphere", "Sphere Contours", "Sphere Patch", "Sphere Probe"]
-OPERATORS = ("add_plane", "remove_plane", "update", "delete")
+OPERATORS = ("add_plane", "add_planes", "remove_plane", "update", "delete")
 
 
 @pytest.fixture
