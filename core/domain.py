@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A)."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -38,7 +39,8 @@ class Domain:
     def _polar(self) -> tuple[Array, Array]:
         """Azimuths, ascending, and radii of the boundary."""
         at, spline = self._boundary
-        x, y = spline(at[-1] / SAMPLES * np.arange(SAMPLES)).T
+        each = math.ceil(SAMPLES / len(self.ends))  # of a piece: as symmetric as the ends are
+        x, y = spline((at[:-1, None] + np.diff(at)[:, None] / each * np.arange(each)).ravel()).T
         azimuths, radii = np.arctan2(y, x), np.hypot(x, y)
         if np.count_nonzero(np.diff(azimuths, append=azimuths[0]) <= 0.0) > 1:
             azimuths, radii = self._without_turning_back()
@@ -53,7 +55,8 @@ class Domain:
         ends = np.arctan2(self.ends[:, 1], self.ends[:, 0])
         at = np.concatenate([ends - around, ends, ends + around])
         azimuths = around / SAMPLES * np.arange(SAMPLES, dtype=np.float64) - np.pi
-        return azimuths, PchipInterpolator(at, np.tile(np.hypot(*self.ends.T), 3))(azimuths)
+        radii: Array = PchipInterpolator(at, np.tile(np.hypot(*self.ends.T), 3))(azimuths)
+        return azimuths, radii
 
     @cached_property
     def nodes(self) -> tuple[Array, Array]:

@@ -34,7 +34,8 @@ Size = Callable[[Array], Array]
 def patch_mesh(patch: MongePatch, domain: Domain, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
     """Points (n, 3) on the patch over its domain, and counterclockwise triangles (m, 3).
 
-    As many as it takes to be off the patch, and its rim off the boundary, by the tolerance at most.
+    As many as it takes to be off the patch, and its rim off the boundary, by the tolerance at most, as
+    long as that asks for no less than FINEST between neighbours and no more than MOST edges of the rim.
     """
     mean_radius = math.sqrt(domain.area / math.pi)
 

@@ -40,13 +40,17 @@ def test_a_rendered_pixel_has_the_colour_that_the_bar_has_for_its_curvature(exte
     (lines,) = patch.children
     contours = np.array([v.co.xy for v in lines.data.vertices])
     compared = []
-    curvature = patch.data.attributes["gaussian_curvature"].data
-    for vertex, value in zip(patch.data.vertices, curvature, strict=True):
-        clear = np.linalg.norm(contours - vertex.co.xy, axis=1).min() > 0.05 * patch["tactile"]["radius"]
-        inside = vertex.co.xy.length < 0.8 * patch["tactile"]["radius"]
-        if clear and inside and abs(value.value) < 0.95 * limit:
-            on_bar = pixel(bar, (0.1, demo.BAR_REACH * value.value / limit, 0.0))
-            compared.append(np.abs(pixel(patch, vertex.co) - on_bar).max())
+    curvature = np.array([value.value for value in patch.data.attributes["gaussian_curvature"].data])
+    corners = np.array([vertex.co for vertex in patch.data.vertices])
+    edges = np.array([edge.vertices for edge in patch.data.edges])
+    # At vertices, and between neighbours.
+    places = np.vstack([corners, corners[edges].mean(axis=1)])
+    for place, value in zip(places, np.append(curvature, curvature[edges].mean(axis=1)), strict=True):
+        clear = np.linalg.norm(contours - place[:2], axis=1).min() > 0.05 * patch["tactile"]["radius"]
+        inside = np.hypot(*place[:2]) < 0.8 * patch["tactile"]["radius"]
+        if clear and inside and abs(value) < 0.95 * limit:
+            on_bar = pixel(bar, (0.1, demo.BAR_REACH * value / limit, 0.0))
+            compared.append(np.abs(pixel(patch, place) - on_bar).max())
     assert len(compared) > 200
     # Half a pixel of the bar is a 900th of its range, half a pixel of the patch more where K is steep.
     assert np.median(compared) <= 2 / 255

@@ -5,6 +5,7 @@
 What only a window shows (menus, the mouse, undo by keys) is in tests/gui.
 """
 
+import json
 import math
 import os
 import subprocess
@@ -68,7 +69,7 @@ def test_the_patch_of_a_ball(empty, ball):
     assert not ball.data.materials
 
 
-def test_the_patch_object_holds_what_it_says(empty, ball):
+def test_the_patch_object_holds_what_it_says(extension, empty, ball):
     patch, report = reconstruct(empty, **TOUCH)
     mesh = patch.data
     assert (patch.name, mesh.name) == ("Sphere Patch", "Sphere Patch")
@@ -92,7 +93,14 @@ def test_the_patch_object_holds_what_it_says(empty, ball):
     assert np.abs(values(mesh, "deviation")).max() > 1e-4
     std = values(mesh, "height_std")
     assert std[0] == pytest.approx(0.0, abs=1e-9)
-    assert report["height_std"] == pytest.approx(std.mean(), rel=0.2)
+    faces = np.array([face.vertices for face in mesh.polygons])
+    mean_std = np.average(std[faces].mean(axis=1), weights=[face.area for face in mesh.polygons])
+    assert report["height_std"] == pytest.approx(mean_std, rel=0.2)
+    # The vertices are those that the reconstruction asks for.
+    r = extension.core.from_dict(json.loads(patch["tactile_reconstruction"]))
+    points, triangles = r.mesh()
+    assert np.column_stack([x, y, z]) == pytest.approx(points, abs=1e-6)
+    assert len(faces) == len(triangles)
     assert np.abs(values(mesh, "deviation")).mean() < 2.0 * std.mean()
     assert mesh.materials[0].name == "Tactile Curvature"
     areas = [face.area for face in mesh.polygons]
