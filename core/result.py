@@ -28,7 +28,7 @@ DOUBTFUL_CURVATURE = 0.1  # of 1 / radius; as well is it known along a curve tha
 DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
-MESH_SHARE = 0.5  # of mean_height_std, that the mesh is off the patch at most; in the mean an eighth
+MESH_SHARE = 0.5  # of mean_height_std, that the mesh is off the patch at most
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Reconstruction:
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
-        As fine as what is known of it: off it, and off the boundary, by half of mean_height_std at most.
+        As fine as what is known of it: off it by half of mean_height_std at most.
         """
         return patch_mesh(self.patch, self.domain, MESH_SHARE * self.mean_height_std)
 

@@ -34,8 +34,8 @@ Size = Callable[[Array], Array]
 def patch_mesh(patch: MongePatch, domain: Domain, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
     """Points (n, 3) on the patch over its domain, and counterclockwise triangles (m, 3).
 
-    As many as it takes to be off the patch, and its rim off the boundary, by the tolerance at most, as
-    long as that asks for no less than FINEST between neighbours and no more than MOST edges of the rim.
+    As many as it takes to be off the patch by the tolerance at most, as long as that asks for no less
+    than FINEST between neighbours; the rim is off the boundary by VISIBLE at most.
     """
     mean_radius = math.sqrt(domain.area / math.pi)
 
@@ -43,7 +43,7 @@ def patch_mesh(patch: MongePatch, domain: Domain, tolerance: float) -> tuple[Arr
         wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(patch, points), 1e-300))
         return np.clip(wanted, FINEST * mean_radius, COARSEST * mean_radius)
 
-    plane, triangles = triangulate(domain, size, min(tolerance, VISIBLE * mean_radius))
+    plane, triangles = triangulate(domain, size, VISIBLE * mean_radius)
     return np.column_stack([plane, patch.height(*plane.T)]), triangles
 
 
