@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from core import MongePatch, SamplingPlane, reconstruct, track
 from core.domain import Domain, closed_spline_domain
-from core.triangulation import patch_mesh, triangulate
+from core.triangulation import MOST, patch_mesh, triangulate
 
 LEAST_ANGLE = 15.0  # degrees
 
