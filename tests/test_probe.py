@@ -370,6 +370,38 @@ def test_a_probe_that_is_not_live_waits_to_touch_again(empty, ball):
     assert report_of(patch)["planes"][0][0] == pytest.approx(math.degrees(0.2))
 
 
+@pytest.mark.parametrize(
+    ("name", "away"),
+    [
+        ("location", SIDE),
+        ("rotation_euler", (0.3, 1.0, 2.0)),
+        ("scale", (0.0, 1.0, 1.0)),
+        ("scale", (3e38, 1.0, 1.0)),
+    ],
+)
+def test_a_probe_that_is_not_live_leaves_its_patch_where_it_is_when_it_comes_back(empty, ball, name, away):
+    probe, patch = pick(empty)
+    there, back = in_world(patch), getattr(probe, name).copy()
+    probe.tactile_probe.live = False
+    setattr(probe, name, away)
+    update(empty)
+    if name != "scale":  # under such a one nothing can be placed
+        assert in_world(patch) == pytest.approx(there, abs=1e-5)
+    setattr(probe, name, back)
+    update(empty)
+    assert in_world(patch) == pytest.approx(there, abs=1e-5)
+
+
+def test_a_probe_that_is_scaled_does_not_scale_its_patch(empty, ball):
+    probe, patch = pick(empty)
+    before, there = state(patch), in_world(patch)
+    probe.scale = (2.0, 2.0, 2.0)
+    update(empty)
+    assert probe.tactile_probe.live
+    assert state(patch) == before
+    assert in_world(patch) == pytest.approx(there, abs=1e-5)
+
+
 def test_a_probe_off_the_surface_says_so_and_keeps_its_patch(empty, ball):
     probe, patch = pick(empty)
     before, points, there = state(patch), in_world(patch), probe.location.copy()
