@@ -103,7 +103,7 @@ def track(
 
 
 def _in_plane(normals: Array, across: Vector) -> Array:
-    """The curve's unit normals, from those of the surface; shorter where these have next to nothing of one."""
+    """The curve's unit normals, by those of the surface; shorter where these have next to none of it."""
     in_plane = normals - np.outer(normals @ across, across)
     return in_plane / np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), LEAST_IN_PLANE)
 
