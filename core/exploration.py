@@ -78,7 +78,8 @@ def explore(
     feel = partial(track, surface, p, normal, planes, noise=noise, rng=rng, tangent=tangent)
     reaches = None
     if length is None:
-        between = max(spacing or 0.0, number("farthest", farthest, above=0.0) / FELT)
+        farthest = number("farthest", farthest, above=0.0)
+        between = max(spacing or 0.0, farthest / FELT)
         felt = feel(extent=farthest, step=between)
         reaches = between * _grown(felt, p, normal, fit | {"method": "bayes"})
         length = float(reaches.max())
