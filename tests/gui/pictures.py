@@ -22,10 +22,10 @@ def steps():
     yield from open_tab()
     suzanne = bpy.data.objects["Suzanne"]
     evaluated = suzanne.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    place = suzanne.matrix_world @ evaluated.ray_cast((0.0, -5.0, 0.87), (0.0, 1.0, 0.0))[1]
+    place = suzanne.matrix_world @ evaluated.ray_cast((-0.35, -5.0, 0.85), (0.0, 1.0, 0.0))[1]
     suzanne.data.shade_smooth()
     gui.find()[1].spaces.active.overlay.show_cursor = False
-    look(place + Vector((0.15, 0.0, -0.25)), (0.25, -1.0, 0.55), 2.7)
+    look(place + Vector((0.2, 0.0, -0.1)), (0.3, -1.0, 0.5), 1.7)
     yield 0.5
     at = [round(v) for v in gui.view_point(place)]
     gui.click(*PICK_BUTTON)
