@@ -20,10 +20,8 @@ from common import PICK_BUTTON, handle, is_complete, look, open_tab, patch, pict
 
 def steps():
     yield from open_tab()
-    suzanne = bpy.data.objects["Suzanne"]
-    evaluated = suzanne.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    place = suzanne.matrix_world @ evaluated.ray_cast((-0.35, -5.0, 0.85), (0.0, 1.0, 0.0))[1]
-    suzanne.data.shade_smooth()
+    place = bpy.context.scene.cursor.location
+    bpy.data.objects["Suzanne"].data.shade_smooth()
     gui.find()[1].spaces.active.overlay.show_cursor = False
     look(place + Vector((0.2, 0.0, -0.1)), (0.3, -1.0, 0.5), 1.7)
     yield 0.5
