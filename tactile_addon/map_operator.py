@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 from . import map_object, probe
 from .map_report import map_summary
 from .operators import make_active, report_error, target_object
-from .settings import NAMES, TouchSettings, draw_all, touch_arguments
+from .settings import NAMES, TouchSettings, draw_all, draw_chosen, touch_arguments
 from .stability import StabilityMap
 
 SLICE = 0.05  # seconds of work between two events
@@ -161,7 +161,7 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(self, "target")
-        layout.prop(self, "spacing")
+        draw_chosen(layout, self, "spacing")
         layout.prop(self, "keep")
         layout.separator()
         draw_all(layout, self)

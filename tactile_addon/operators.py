@@ -72,7 +72,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
             f"{report['message']} Curvatures {result.patch.k1:.4g} and {result.patch.k2:.4g}, "
             f"{report['contacts']} contacts missed by {result.fit_error:.3g} in the mean"
         )
-        self.report({"INFO"} if result.status == "ok" else {"WARNING"}, summary)
+        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
     def draw(self, context):

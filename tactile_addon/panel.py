@@ -178,7 +178,7 @@ class VIEW3D_MT_tactile(bpy.types.Menu):
         for operator in (TACTILE_OT_verify, TACTILE_OT_register):
             self.layout.operator(operator.bl_idname)
         self.layout.separator()
-        for operator in (TACTILE_OT_add_plane, TACTILE_OT_update, TACTILE_OT_delete):
+        for operator in (TACTILE_OT_add_plane, TACTILE_OT_add_planes, TACTILE_OT_update, TACTILE_OT_delete):
             self.layout.operator(operator.bl_idname)
 
 

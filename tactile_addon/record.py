@@ -9,11 +9,11 @@ from .. import core
 
 BEYOND = 3.0  # times its own deviation, that a patch may be off the mesh in the mean
 ENDS = {
-    core.UNEXPLAINED: "end where the patch could not be trusted any more",
-    core.EXTENT: "are as long as may be",
-    core.NO_CONTACT: "end at an edge",
-    core.CREASE: "end at a crease",
-    core.NOT_MONGE: "end where the surface turns away",
+    core.UNEXPLAINED: "where the patch could not be trusted any more",
+    core.EXTENT: "at the greatest extent allowed",
+    core.NO_CONTACT: "at an edge",
+    core.CREASE: "at a crease",
+    core.NOT_MONGE: "where the surface turns away",
 }
 
 
@@ -21,10 +21,10 @@ def ends(contours):
     """A sentence on what has ended curves that were free to grow."""
     counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
     if len(counts) == 1:
-        return f" All half curves {ENDS[counts[0][0]]}."
-    return (
-        f" Of {2 * len(contours)} half curves {', '.join(f'{count} {ENDS[stop]}' for stop, count in counts)}."
-    )
+        return f" All half curves end {ENDS[counts[0][0]]}."
+    (most, first), *others = [(count, ENDS[stop]) for stop, count in counts]
+    words = [f"{most} end {first}", *(f"{count} {end}" for count, end in others)]
+    return f" Of {2 * len(contours)} half curves {', '.join(words)}."
 
 
 def judgement(report, mean, scale=1.0):

@@ -3,6 +3,7 @@
 """No more than a scene needs, in Blender: extents, steps and planes that choose themselves."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -85,6 +86,8 @@ def test_while_a_gesture_goes_on_the_extent_stays(empty, sheet, extension):
     assert (going["extent"], going["step"]) == pytest.approx((before["extent"], before["step"]), rel=1e-6)
     stops = [{stop for pair in report["stops"] for stop in pair} for report in (going, ended)]
     assert stops == [{"extent"}, {"not explained", "no contact"}]
+    assert "half curves" not in going["message"]
+    assert re.search(r" Of 6 half curves \d end (at|where) .*, \d (at|where) .*\.$", ended["message"])
 
 
 def test_the_shell_asks_for_planes_too(command, files):

@@ -14,7 +14,7 @@ import numpy as np
 from tools import blender
 
 SPOT = (0.32, -0.19, 0.84)  # on Suzanne's forehead
-NOISE = 1.0 / 150.0  # of the extent; 0.05 mm on a 60 mm object
+NOISE = 1.0 / 1200.0  # of the object's size; 0.05 mm on a 60 mm object
 WIDTH, HEIGHT = 1200, 900
 BAR_STEPS = 128
 BAR_REACH = 1.5  # patch radii from the middle of the bar to either end
@@ -55,15 +55,14 @@ def touch(extension, mesh=""):
         depsgraph = bpy.context.evaluated_depsgraph_get()
         hit, point, *_ = bpy.context.scene.ray_cast(depsgraph, location - 2.0 * size * ray, ray)
         location = tuple(point) if hit else tuple(location)
-        extent = size / 8.0
     else:
         bpy.ops.wm.read_homefile(use_empty=True)
         bpy.ops.mesh.primitive_monkey_add(size=2.0)
         target = bpy.context.object
         target.modifiers.new("Subdivision", "SUBSURF").levels = 3
         bpy.ops.object.shade_smooth()
-        location, extent = SPOT, 0.3
-    bpy.ops.tactile.reconstruct(target=target.name, location=location, extent=extent, noise=NOISE * extent)
+        location = SPOT
+    bpy.ops.tactile.reconstruct(target=target.name, location=location, noise=NOISE * max(target.dimensions))
     return bpy.context.view_layer.objects.active
 
 

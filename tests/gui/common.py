@@ -4,6 +4,7 @@
 
 import math
 import os
+import subprocess
 from pathlib import Path
 
 import bpy
@@ -13,6 +14,8 @@ from mathutils import Vector
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
 PICK_BUTTON, ASIDE = (893, 128), (300, 640)
+VIEWPORT = "1052x692+0+28"  # and the viewport itself
+MOST_BYTES = 300_000  # of a picture of the docs
 ARROW = 1.15  # of the extent: where the handles are
 
 
@@ -71,6 +74,13 @@ def last_report():
 
 def picture(name):
     gui.shot(str(FOLDER / f"{name}.png"))
+
+
+def picture_of_docs(name):
+    """The viewport, to be looked at and copied to docs."""
+    file = FOLDER / f"{name}.jpg"
+    subprocess.run(["import", "-window", "root", "-crop", VIEWPORT, "-quality", "88", file], check=True)
+    check(f"{file.name} is small", file.stat().st_size < MOST_BYTES, file.stat().st_size)
 
 
 def probe():
@@ -146,7 +156,9 @@ def undo_redo(what, before, after):
     """One step back and one forth, by keyboard."""
     gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
     yield 1
+    yield from until(lambda: before is None or is_complete())
     check(f"{what}: one Ctrl Z takes it back", same(state(), before), (state(), before))
     gui.xdo("key", "ctrl+shift+z")
     yield 1
+    yield from until(is_complete)
     check(f"{what}: Ctrl Shift Z brings it again", same(state(), after), (state(), after))

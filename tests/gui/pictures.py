@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: the pictures of docs/viewport.md, taken anew.
 
-They are beside the scene: pick.jpg, probe.jpg and deviation.jpg, to be looked at and copied to docs.
+They are beside the scene: pick.jpg, probe.jpg and deviation.jpg. verify.jpg and stability.jpg are those of
+verify.py and stability.py.
 """
 
 import math
-import subprocess
 import sys
 from pathlib import Path
 
@@ -15,49 +15,35 @@ import gui
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import FOLDER, PICK_BUTTON, check, handle, is_complete, look, patch, probe, until
-
-VIEWPORT = "1052x692+0+28"  # in a window of 1280 by 800
-MOST_BYTES = 300_000
-
-
-def picture(name):
-    file = FOLDER / f"{name}.jpg"
-    subprocess.run(["import", "-window", "root", "-crop", VIEWPORT, "-quality", "88", file], check=True)
-    check(f"{file.name} is small", file.stat().st_size < MOST_BYTES, file.stat().st_size)
+from common import PICK_BUTTON, handle, is_complete, look, open_tab, patch, picture_of_docs, probe, until
 
 
 def steps():
-    gui.sidebar()
-    yield 1
-    gui.sidebar("Tactile")
-    yield 1
-    suzanne = bpy.data.objects["Suzanne"]
-    evaluated = suzanne.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    place = suzanne.matrix_world @ evaluated.ray_cast((0.0, -5.0, 0.87), (0.0, 1.0, 0.0))[1]
-    suzanne.data.shade_smooth()
+    yield from open_tab()
+    place = bpy.context.scene.cursor.location
+    bpy.data.objects["Suzanne"].data.shade_smooth()
     gui.find()[1].spaces.active.overlay.show_cursor = False
-    look(place + Vector((0.15, 0.0, -0.25)), (0.25, -1.0, 0.55), 2.7)
+    look(place + Vector((0.2, 0.0, -0.1)), (0.3, -1.0, 0.5), 1.7)
     yield 0.5
     at = [round(v) for v in gui.view_point(place)]
     gui.click(*PICK_BUTTON)
     yield 0.5
     gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.2, "mousemove", *at)
     yield 1
-    picture("pick")
+    picture_of_docs("pick")
     gui.xdo("click", 1)
     yield from until(is_complete)
     start, end = (map(round, handle(math.radians(azimuth))) for azimuth in (60.0, 40.0))
     gui.xdo("mousemove", *start, "sleep", 0.3, "mousedown", 1, "sleep", 0.3, "mousemove", *end)
     yield from until(lambda: probe().tactile_probe.azimuths[1] < math.radians(45.0), 10)
     yield 1
-    picture("probe")
+    picture_of_docs("probe")
     gui.xdo("mouseup", 1)
     yield from until(is_complete)
     patch().tactile_colours = "height_std"
     gui.xdo("mousemove", 300, 640)
     yield 3
-    picture("deviation")
+    picture_of_docs("deviation")
 
 
 gui.play(steps())

@@ -5,7 +5,6 @@
 Every step asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
 """
 
-import os
 import sys
 from pathlib import Path
 from time import perf_counter
@@ -16,16 +15,21 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, last_report, look, open_tab, until
+from common import (
+    FOLDER,
+    check,
+    data_blocks,
+    last_report,
+    look,
+    open_tab,
+    picture,
+    picture_of_docs,
+    until,
+)
 
-FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
 MAP_BUTTON, ASIDE = (943, 193), (300, 180)
 SLICES = []  # seconds of each call of the operator's modal
-
-
-def picture(name):
-    gui.shot(str(FOLDER / f"{name}.png"))
 
 
 def running():
@@ -121,6 +125,7 @@ def by_button():
         maps()[0].tactile_map_colours = name
         yield 1
         picture(f"map_{name}")
+    picture_of_docs("stability")
     gui.xdo("key", "ctrl+z")
     yield 1
 
@@ -195,7 +200,7 @@ def meanwhile():
         disturb()
         yield 1
         picture(f"map_{disturb.__name__}")
-        yield from until(lambda: not running(), 20)
+        yield from until(lambda: not running(), 60)  # whether it was changed is looked at in the end
         check(f"{disturb.__name__}: it stops", is_clean())
         if disturb in SAID:
             said = last_report()

@@ -6,7 +6,6 @@ The button of the panel, undo and redo by keyboard, another mesh by selection, t
 pictures of the table, at 100 and at 200 % resolution scale.
 """
 
-import os
 import sys
 from pathlib import Path
 
@@ -15,16 +14,11 @@ import gui
 from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, last_report, look, open_tab
+from common import FOLDER, check, last_report, look, open_tab, picture, picture_of_docs
 
-FOLDER = Path(os.environ["GUI_SHOT"]).parent
 # Where they are in a window of 1280 by 800 with the sidebar open.
 BUTTON, OBJECT_MENU, ASIDE = (893, 498), (330, 40), (300, 180)
 TABLE = "verification"
-
-
-def picture(name):
-    gui.shot(str(FOLDER / f"{name}.png"))
 
 
 def patch():
@@ -112,8 +106,10 @@ def scan():
     activate(patch())
     patch().tactile_colours = "deviation"
     bpy.ops.tactile.verify("EXEC_DEFAULT", True)
+    gui.xdo("mousemove", *BUTTON, "sleep", 0.2, "click", 5)  # the whole table
+    gui.xdo("mousemove", *ASIDE)
     yield 1
-    picture("verify_scan")
+    picture_of_docs("verify")
     bpy.context.preferences.view.ui_scale = 2.0
     yield 1
     gui.xdo("mousemove", 1000, 600, *["click", 5, "sleep", 0.1] * 30, "click", 4, "sleep", 0.1, "click", 4)

@@ -25,6 +25,7 @@ from common import (
     extent,
     handle,
     is_complete,
+    last_report,
     look,
     open_tab,
     patch,
@@ -38,6 +39,8 @@ from common import (
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
 EXTENT_FIELD, MOVE_BUTTON, DELETE_BUTTON, COLOURS_BUTTON = (943, 180), (837, 128), (1001, 128), (893, 430)
+PLANES_BUTTON = (893, 634)  # once the sidebar is scrolled to its end
+VIEW = 6.0  # extents, that the view is away from the probe
 
 
 def pick(target):
@@ -99,7 +102,8 @@ def pick(target):
 
 def drag_handles():
     settings = probe().tactile_probe
-    look(probe().location, probe().matrix_world.col[2].xyz + 0.3 * probe().matrix_world.col[1].xyz, 2)
+    axes = probe().matrix_world
+    look(axes.translation, axes.col[2].xyz + 0.3 * axes.col[1].xyz, VIEW * extent(probe()))
     yield 0.5
     before, blocks = state(), data_blocks()
     start, azimuth = handle(settings.azimuths[0]), settings.azimuths[0] + 0.5
@@ -139,8 +143,7 @@ def drag_handles():
     gui.find()[1].spaces.active.region_3d.view_rotation = direction
     yield 0.5
 
-    axes = probe().matrix_world
-    reach = extent(probe())
+    axes, reach = probe().matrix_world, extent(probe())
     number = probe().tactile_probe.active_plane
     top = axes.translation + 0.75 * reach * axes.col[2].xyz
     gui.drag(gui.view_point(top), [v + 35 for v in gui.view_point(top)])
@@ -192,9 +195,29 @@ def type_a_number():
     gui.xdo("key", "ctrl+a", "sleep", 0.2, "type", "0.2")
     gui.xdo("key", "Return")
     yield 1.5
+    yield from until(is_complete)
     check("a number typed in the panel counts", abs(probe().tactile_probe.extent - 0.2) < 1e-5, state())
     consistent("a number typed")
     yield from undo_redo("a number typed", before, state())
+
+
+def add_planes():
+    before, planes = state(), probe().tactile_probe.plane_count
+    gui.xdo("mousemove", *PLANES_BUTTON, "sleep", 0.3, *("click", 5, "sleep", 0.1) * 15)
+    yield 1.5
+    picture("sidebar_end")
+    gui.click(*PLANES_BUTTON)
+    yield from until(lambda: probe().tactile_probe.plane_count > planes, 10)
+    more = len(patch()["tactile"]["added_planes"])
+    there = probe().tactile_probe.plane_count
+    check("a button adds planes while they help", there == planes + more > planes, (planes, more, there))
+    said = last_report()
+    check("... and says what they have brought", "Planes added at" in said and "has become" in said, said)
+    consistent("more planes")
+    gui.xdo("mousemove", *PLANES_BUTTON, "sleep", 0.3, *("click", 4, "sleep", 0.1) * 15)
+    yield 1
+    picture("planes_added")
+    yield from undo_redo("more planes", before, state())
 
 
 def save_and_reload():
@@ -457,6 +480,7 @@ def steps():
     yield from drag_handles()
     yield from move_probe()
     yield from type_a_number()
+    yield from add_planes()
     yield from save_and_reload()
 
 
