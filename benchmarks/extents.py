@@ -76,7 +76,7 @@ def _rows(extension, name, count):
 
 def _touched(extension, obj, depsgraph, place, extent):
     """The report of a touch and how far the patch is off the mesh; None where there is no patch."""
-    add_on, fit = extension.tactile_addon, {"seed": 0, "method": "bayes", "degree": 4}
+    add_on, fit = extension.tactile_addon, {"seed": 0, "method": "bayes", "degree": "auto"}
     try:
         touched = add_on.touch.touch(
             obj, depsgraph, place, sampling_planes(extension), extent=extent, step=0.0, noise=0.0, **fit
