@@ -71,14 +71,12 @@ def explore(
     `reconstruct` raise.
     """
     p = finite_array("point", point, (3,), LARGEST)
-    length, spacing = (
-        None if value == "auto" else number(name, value, above=0.0)  # type: ignore[arg-type]
-        for name, value in (("extent", extent), ("step", step))
-    )
+    length, spacing = _given("extent", extent), _given("step", step)
     feel = partial(track, surface, p, normal, planes, noise=noise, rng=rng, tangent=tangent)
     reaches = None
     if length is None:
-        between = max(spacing or 0.0, number("farthest", farthest, above=0.0) / FELT)
+        farthest = number("farthest", farthest, above=0.0)
+        between = max(spacing or 0.0, farthest / FELT)
         felt = feel(extent=farthest, step=between)
         reaches = between * _grown(felt, p, normal, fit | {"method": "bayes"})
         length = float(reaches.max())
@@ -97,6 +95,12 @@ def explore(
     shortest = length if reaches is None else float(reaches[reaches > 0.0].min())
     coarsest = max(shortest / LEAST, length / CONTACTS[-1])
     return _enough(touched, [min(length / count, coarsest) for count in CONTACTS])
+
+
+def _given(name: str, length: float | str) -> float | None:
+    """None for "auto"."""
+    automatic = isinstance(length, str) and length == "auto"
+    return None if automatic else number(name, length, above=0.0)  # type: ignore[arg-type]
 
 
 def _enough(touched: Callable[[float], Exploration], steps: Sequence[float]) -> Exploration:

@@ -74,9 +74,11 @@ class Posterior(NamedTuple):
     def degree_shown(self, contacts: Array) -> int:
         """The least whose patch departs from the mean by half its deviation at most, at contacts (n, 3)."""
         x, y, _ = contacts.T
-        variance = np.mean(self.height_std(x, y) ** 2)
+        basis = monomials(x, y, TERMS)
+        variance = np.einsum("ni,ni->", basis @ self.covariance, basis)
         for degree in range(2, DEGREE):
-            if np.mean((self.patch(degree).height(x, y) - self.height(x, y)) ** 2) <= 0.25 * variance:
+            off = basis @ (self.mean - coefficients_of(self.patch(degree)))
+            if off @ off <= 0.25 * variance:
                 return degree
         return DEGREE
 

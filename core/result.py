@@ -153,6 +153,10 @@ class Reconstruction:
                 f"Heights are good to {100.0 * share:.1f} % of the radius in the mean: take a shorter "
                 "extent, or add sampling planes."
             )
+        return self._doubt_about_frame
+
+    @property
+    def _doubt_about_frame(self) -> tuple[str, str] | None:
         distances, stds = misses(self.curves)
         stds = np.maximum(stds, LEAST_SCATTER * self.accuracy)
         apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))

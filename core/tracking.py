@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import LARGEST, finite_array, list_of, number, shown, unit_vector
+from .arguments import LARGEST, Array, finite_array, list_of, number, shown, unit_vector
 from .contour import (
     CREASE,
     EXTENT,
@@ -95,14 +95,17 @@ def track(
         points = np.array([*back[0][::-1], tuple(p), *ahead[0]])
         normals = np.array([*back[1][::-1], up, *ahead[1]])
         if noise:
-            in_plane = normals - np.outer(normals @ across, across)
-            # The point, which stays where it is, may have no normal in the plane.
-            in_plane /= np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), LEAST_IN_PLANE)
             offsets = generator.normal(0.0, noise, len(points))
-            offsets[len(back[0])] = 0.0
-            points += offsets[:, None] * in_plane
+            offsets[len(back[0])] = 0.0  # the point stays where it is
+            points += offsets[:, None] * _in_plane(normals, across)
         contours.append(Contour(points, np.array(across), normals, noise, (back[2], ahead[2])))
     return contours
+
+
+def _in_plane(normals: Array, across: Vector) -> Array:
+    """The curve's unit normals, by those of the surface; shorter where these have next to none of it."""
+    in_plane = normals - np.outer(normals @ across, across)
+    return in_plane / np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), LEAST_IN_PLANE)
 
 
 def _first_contact(

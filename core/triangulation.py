@@ -40,8 +40,9 @@ def patch_mesh(patch: MongePatch, domain: Domain, tolerance: float) -> tuple[Arr
     mean_radius = math.sqrt(domain.area / math.pi)
 
     def size(points: Array) -> Array:
-        wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(patch, points), 1e-300))
-        return np.clip(wanted, FINEST * mean_radius, COARSEST * mean_radius)
+        flattest = CHORD * tolerance / (COARSEST * mean_radius) ** 2
+        wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(patch, points), flattest))
+        return np.maximum(wanted, FINEST * mean_radius)
 
     plane, triangles = triangulate(domain, size, VISIBLE * mean_radius)
     return np.column_stack([plane, patch.height(*plane.T)]), triangles

@@ -12,8 +12,9 @@ from pathlib import Path
 import bpy
 
 from . import contact_file, map_object, measured, mesh_file, patch_object
+from .map_report import map_readable
 from .registration import register_patch
-from .report import map_readable, readable, verification_columns
+from .report import readable, verification_columns
 from .settings import METHODS, SOLVERS
 from .units import ADAPTIVE, METRES
 from .verification import verify_patch

@@ -22,16 +22,17 @@ def on_depsgraph_update(scene, depsgraph):
     if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
     reshaped = {u.id.original for u in depsgraph.updates if u.is_updated_geometry}
+    moved = {u.id.original for u in depsgraph.updates if u.is_updated_transform}
     for probe in filter(is_free, _concerned(depsgraph)):
         settings = probe.tactile_probe
         _forget_deleted(probe)
         measure_shape(settings, depsgraph, reshaped)
         patch = patch_of(probe)
-        if is_outdated(probe, depsgraph):
-            if settings.live:
-                update(probe, depsgraph, complete=bpy.app.background)
-            elif patch is not None:
-                patch_object.hold(patch)
+        outdated = is_outdated(probe, depsgraph)
+        if outdated and settings.live:
+            update(probe, depsgraph, complete=bpy.app.background)
+        elif patch is not None and (outdated or probe in moved):  # on its way back, or scaled
+            patch_object.hold(patch)
         if is_pending(probe) and not bpy.app.background:
             _settle_soon()
 

@@ -9,8 +9,8 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from . import map_object, probe
+from .map_report import map_summary
 from .operators import make_active, report_error, target_object
-from .report import map_summary
 from .settings import NAMES, TouchSettings, draw_all, touch_arguments
 from .stability import StabilityMap
 

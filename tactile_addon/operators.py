@@ -83,7 +83,8 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         for name in filter(self.properties.is_property_set, ("location", "normal")):
             layout.prop(self, name)
         draw_all(layout, self)
-        layout.prop(self, "tolerance")
+        given = self.properties.is_property_set("tolerance")
+        layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
 
 
 def report_error(operator, error):

@@ -10,6 +10,7 @@ from bpy.props import StringProperty
 
 from . import map_object, patch_object, probe, units
 from .map_operator import TACTILE_OT_stability_map
+from .map_report import map_rows, median_rows
 from .operators import TACTILE_OT_reconstruct
 from .pick import TACTILE_OT_pick
 from .probe_operators import (
@@ -22,7 +23,7 @@ from .probe_operators import (
     shows_colours,
 )
 from .registration import TACTILE_OT_register
-from .report import map_rows, median_rows, patch_rows, verification_rows, verification_table
+from .report import patch_rows, verification_rows, verification_table
 from .settings import draw_chosen, draw_sensor, draw_solver
 from .verification import TACTILE_OT_verify
 

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The reports of patches and maps as tables and sentences for people; and errors as sentences."""
 
-from . import map_object, units
-from .stability import REASONS
+from . import units
 from .units import say
 
 SPREAD = ("mean", "median", "max", "rms")
@@ -45,7 +44,7 @@ def readable(report):
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
-    return _table(rows)
+    return table(rows)
 
 
 def added_planes(report, unit):
@@ -75,32 +74,10 @@ def _lengths(report):
     return rows
 
 
-def map_readable(record):
-    """The same of a stability map."""
-    refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
-    names = [key for key in record if key.endswith("_median")]
-    return _table(
-        [
-            ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
-            ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
-            ("refused", refused),
-            ("fit", f"{record['method']}, degree {record['degree']}"),
-            ("spacing, extent, step", ", ".join(f"{record[k]:.4g}" for k in ("spacing", "extent", "step"))),
-            *((f"median {name.removesuffix('_median')}", f"{record[name]:.4g}") for name in names),
-        ]
-    )
-
-
-def _table(rows):
+def table(rows):
+    """Labels and values as aligned lines."""
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
-
-
-def map_summary(record):
-    """What a stability map has found, in a sentence."""
-    words = [f"{record['patches']} patches at {record['touched']} points, {record['in_doubt']} in doubt"]
-    words += [f"{count} refused by {key}" for key, count in record["refused"].items() if count]
-    return "; ".join(words)
 
 
 def sentence(error):
@@ -198,24 +175,6 @@ def patch_rows(record, unit):
         ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
         ("… Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
     ]
-
-
-def map_rows(record, unit):
-    """(label, value) of how many patches a stability map has, and why not more."""
-    names = {key: f"No Patch: {name}" for key, name, _ in REASONS}
-    return [
-        ("Points", str(record["touched"])),
-        ("Spacing", units.say(record["spacing"], 1, unit)),
-        ("Patches", str(record["patches"])),
-        ("… in Doubt", str(record["in_doubt"])),
-        *((names[key], str(count)) for key, count in record["refused"].items() if count),
-    ]
-
-
-def median_rows(record, unit):
-    """(label, value) of the medians over the patches of a stability map."""
-    quantities = [(title, f"{name}_median", power) for name, title, _, power in map_object.SHOWN]
-    return [(title, units.say(record[key], power, unit)) for title, key, power in quantities if key in record]
 
 
 def verification_table(found, unit):

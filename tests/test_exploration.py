@@ -157,6 +157,11 @@ def test_given_lengths_are_those_of_track_and_reconstruct():
     assert (found.extent, found.step) == (8.0, 0.8)
 
 
+def test_numbers_are_taken_as_track_takes_them():
+    found = explore(surfaces.plane(), farthest="30", step="2")
+    assert (found.extent, found.step) == (30.0, 2.0)
+
+
 def test_a_given_step_is_kept_where_the_extent_is_free():
     ball = surfaces.sphere(20.0)
     found = explore(ball, ball.point, ball.normal, step=1.5)

@@ -27,6 +27,7 @@ from core import (
     SamplingPlane,
     common_point,
     distances,
+    explore,
     from_dict,
     reconstruct,
     reconstruct_many,
@@ -36,7 +37,7 @@ from core import (
 )
 
 NAMES = (
-    "azimuth|contours|contours_list|degree|extent|method|noise|normal|normal_std|normals|outward|plane_normal|planes|point|"
+    "azimuth|contours|contours_list|degree|extent|farthest|method|noise|normal|normal_std|normals|outward|plane_normal|planes|point|"
     "points|rng|sensor_std|solver|step|stops|surface|tangent|tilt|weight"
 )
 SHAPES = (
@@ -468,6 +469,11 @@ def test_a_surface_that_answers_oddly(data, shape, rarely, hits):
         r = refused(reconstruct, s.point, contours, outward=s.normal)
         if r is not None:
             examine(r)
+    found = refused(
+        explore, OddSurface(s, data, rarely, hits), s.point, s.normal, PLANES[0], farthest=24.0, rng=1
+    )
+    if found is not None:
+        examine(found.result)
 
 
 TRACKING = {
@@ -497,3 +503,25 @@ def test_tracking_with_odd_arguments(names, data):
         for contour in contours:
             assert np.isfinite(contour.points).all()
         event("tracked")
+
+
+EXPLORING = TRACKING | {
+    "farthest": ODD_NUMBERS,
+    "extent": st.one_of(TRACKING["extent"], st.sampled_from(["auto", "far"])),
+    "step": st.one_of(TRACKING["step"], st.sampled_from(["auto", "near"])),
+    "method": st.sampled_from([*METHODS, "magic", None]),
+    "degree": st.sampled_from([2, 4, "auto", 7]),
+}
+
+
+@given(st.sets(st.sampled_from(sorted(EXPLORING)), min_size=1, max_size=2), st.data())
+@in_time
+def test_exploring_with_odd_arguments(names, data):
+    s = SHAPES[1]
+    arguments = {"point": s.point, "normal": s.normal, "planes": PLANES[0], "farthest": 16.0}
+    arguments |= {name: data.draw(EXPLORING[name]) for name in sorted(names)}
+    found = refused(explore, s, **arguments)
+    if found is not None:
+        examine(found.result)
+        assert 0.0 < found.step <= found.extent
+        event("explored")

@@ -397,7 +397,7 @@ def test_from_the_shell(empty, command, tmp_path):
     # Where no vertex is over the patch the cells are empty.
     empty.ops.wm.read_homefile(use_empty=True)
     empty.ops.mesh.primitive_plane_add(size=10.0)
-    assert command("reconstruct", "--location", 0.5, 0.2, 0, "--verify", table)[0] == 0
+    assert command("reconstruct", "--location", 0.5, 0.2, 0, "--extent", 1, "--verify", table)[0] == 0
     (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())
     cells = [row[key] for key in ("vertices", "vertex_distance_mean [unit of the file]", "contacts")]
     assert cells == ["0", "", "72"]
