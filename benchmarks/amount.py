@@ -3,12 +3,14 @@
 """How few contacts, and how few sampling planes, are enough: the error against the amount of data.
 
 `python -m benchmarks.amount [--quick]`, from the root of a checkout. Prints Markdown tables of the errors,
-and for each noise how many contacts make a patch as good as the most do; draws build/charts/amount.png.
+and for each noise how many contacts make a patch as good as the most do, and how many core.explore takes by
+itself; draws build/charts/amount.png.
 
 The surfaces are those of benchmarks.accuracy and random shapes like its own. Each plane is tracked with
-contacts close together, of which evenly spread ones are taken: noise and extent stay as they are. The
-error is the mean |dz| over a hold-out, the same for all rows of a surface: some 300 points above the
-domain of the curves in three planes. Lengths are in mm, errors in micrometres.
+contacts close together, of which evenly spread ones are taken: noise and extent stay as they are. Where
+core.explore chooses, it touches anew. The error is the mean |dz| over a hold-out, the same for all rows of
+a surface: some 300 points above the domain of the curves in three planes. Lengths are in mm, errors in
+micrometres.
 """
 
 import argparse
@@ -22,7 +24,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
-from core import SamplingPlane, track
+from core import SamplingPlane, explore, track
 from core.domain import closed_spline_domain
 from core.monge import exponents, monomials
 
@@ -35,6 +37,7 @@ PLANES = (3, 4, 5, 6)
 TOTAL, EACH = 72, 24  # contacts of all curves, or of each, against the number of planes
 ENOUGH = 1.25
 BAYES, TAGC, BOUND = "Bayes, degree 4", "TAGC", "Cramér-Rao bound, degree 4"
+CHOSEN = "as many as core.explore takes"
 METHODS = {BAYES: accuracy.ours, TAGC: partial(accuracy.ours, method="tagc")}
 LOOKS = {  # by noise: colour, mark, and how the label stands to the line's end
     0.0: (plot.BLUE, "o", "top"),
@@ -81,12 +84,16 @@ class Place(NamedTuple):
     axes: np.ndarray
     kappas: tuple[float, float]
 
-    def tracked(self, planes, noise, seed):
-        """Contours in planes at equal turns, fine."""
+    def touched(self, touch, planes, noise, seed, **more):
+        """What core.track or core.explore finds in planes at equal turns."""
         azimuths = np.radians(accuracy.TURN) + np.pi * np.arange(planes) / planes
         sampling = [SamplingPlane(azimuth) for azimuth in azimuths]
-        lengths = {"extent": self.extent, "step": self.extent / FINE, "tangent": self.axes[:, 0]}
-        return track(self.surface, self.point, self.axes[:, 2], sampling, noise=noise, rng=seed, **lengths)
+        more |= {"extent": self.extent, "noise": noise, "rng": seed, "tangent": self.axes[:, 0]}
+        return touch(self.surface, self.point, self.axes[:, 2], sampling, **more)
+
+    def tracked(self, planes, noise, seed):
+        """Contours, fine."""
+        return self.touched(track, planes, noise, seed, step=self.extent / FINE)
 
 
 class Remembering:
@@ -140,16 +147,24 @@ def cases(place, hold_out, noise, seed):
 
 
 def errors(key, seeds):
-    """((noise, touch, method or limit), the error in um) for all touches of a surface."""
+    """((noise, touch, method or limit), the error in um) for all touches of a surface.
+
+    Where core.explore chooses, contacts and the error.
+    """
     place, hold_out = find(key)
     over = hold_out @ place.axes
     rows = [((None, None, name), best_polynomial(over, degree)) for degree, name in BEST.items()]
     for noise in accuracy.NOISES:
         for seed in range(seeds if noise else 1):
-            for touch, case in cases(place, hold_out, noise, [seed, *str(key).encode()]):
+            entropy = [seed, *str(key).encode()]
+            for touch, case in cases(place, hold_out, noise, entropy):
                 scores = {name: accuracy.score(fit(case), case).error for name, fit in METHODS.items()}
                 scores[BOUND] = cramer_rao(case)
                 rows += [((noise, touch, name), error) for name, error in scores.items()]
+            contours = place.touched(explore, PLANES[0], noise, entropy, farthest=place.extent).contours
+            case = accuracy.Case(place.point, place.axes, place.kappas, contours, noise, hold_out)
+            contacts = sum(len(contour.points) - 1 for contour in contours)
+            rows.append(((noise, None, CHOSEN), (contacts, accuracy.score(accuracy.ours(case), case).error)))
     return rows
 
 
@@ -180,6 +195,11 @@ def cramer_rao(case):
     return 1e3 * np.sqrt(2.0 / np.pi) * std.mean()
 
 
+def chosen(found, noise):
+    """How many contacts were taken by choice, and the error with them: medians."""
+    return np.median(found[noise, None, CHOSEN], axis=0)
+
+
 def medians(found, touches, noise, name, quantile=0.5):
     return [float(np.quantile(found[noise, touch, name], quantile)) for touch in touches]
 
@@ -205,7 +225,8 @@ def print_tables(found):
         enough = contacts[np.flatnonzero(error > ENOUGH * error[-1]).max(initial=-1) + 1]
         print(
             f"Noise {noise:g} mm: from {enough} contacts on, the error of {BAYES} is within {ENOUGH:g} "
-            f"of that with {contacts[-1]}."
+            f"of that with {contacts[-1]}. "
+            "core.explore takes {:.0f}, with which it is {:.1f} um.".format(*chosen(found, noise))
         )
     print(*(f"The {name} is {np.median(found[None, None, name]):.2g} um off." for name in BEST.values()))
 
@@ -230,6 +251,8 @@ def draw(found):
     contacts = [touch.contacts for touch in BY_CONTACTS]
     draw_lines(left, found, BY_CONTACTS, contacts)
     draw_lines(right, found, SAME_TOTAL, PLANES)
+    for noise, (colour, *_) in LOOKS.items():
+        left.plot(*chosen(found, noise), "*", color=colour, mec="black", mew=0.8, markersize=14, zorder=3)
     for noise, (colour, mark, _) in LOOKS.items():
         each = medians(found, SAME_EACH, noise, BAYES)
         right.plot(PLANES, each, "-.", color=colour, marker=mark, mfc="white", markersize=5, linewidth=1)
@@ -262,13 +285,21 @@ def label(left, right, found):
         "Cramér-Rao bound": {"ls": ":"},
     }
     handles = [Line2D([], [], color="#555555", label=name, **style) for name, style in lines.items()]
+    star = {"marker": "*", "mec": "black", "mew": 0.8, "markersize": 12, "ls": ""}
+    left.legend(
+        handles=[Line2D([], [], color="#bbbbbb", label=CHOSEN, **star)], loc="upper right", fontsize=8
+    )
     right.legend(handles=handles, loc="upper right", fontsize=8)
 
 
 def csv_rows(found):
     for (noise, touch, name), values in found.items():
-        amount = ("", "", "") if touch is None else (touch.planes, touch.contacts, noise)
-        yield [*amount, name, *(f"{value:.4g}" for value in np.quantile(values, (0.5, 0.25, 0.75)))]
+        planes, contacts = ("", "") if touch is None else (touch.planes, touch.contacts)
+        if name == CHOSEN:
+            planes, contacts = PLANES[0], f"{chosen(found, noise)[0]:g}"
+            values = [error for _, error in values]
+        quantiles = (f"{value:.4g}" for value in np.quantile(values, (0.5, 0.25, 0.75)))
+        yield [planes, contacts, noise, name, *quantiles]
 
 
 def main():

@@ -140,22 +140,11 @@ class StabilityMap:
 
     def _note(self, number, result):
         self.reason[number] = KEYS.index("patch" if result.status == "ok" else "doubt")
-        self.error[number] = self._error(result)
+        off = height_error(self.surface, result)
+        self.error[number] = NOTHING if off is None else off
         self.height_std[number] = result.mean_height_std
         self.condition_number[number] = result.condition_number
         self.blind_share[number] = result.blind_share
-
-    def _error(self, result):
-        """The mean distance in height of patch and mesh over the domain; NOTHING where there is no mesh."""
-        points, weights = result.domain.nodes
-        some = slice(None, None, len(points) // SAMPLES | 1)
-        points, weights = points[some], weights[some]
-        heights = result.patch.height(*points.T)
-        up = result.frame.axes[:, 2].tolist()
-        starts = result.frame.to_world(np.column_stack([points, heights])).tolist()
-        offs = [_height_off(self.surface, start, up, result.radius) for start in starts]
-        met = [i for i, off in enumerate(offs) if off is not None]
-        return float(np.average([offs[i] for i in met], weights=weights[met])) if met else NOTHING
 
     def require_same(self, obj, depsgraph):
         """Raises ValueError where the mesh has another shape than the one touched."""
@@ -183,6 +172,19 @@ class StabilityMap:
         report |= {name: getattr(self, name) for name in names} | self.fit
         angles = [(plane.azimuth, plane.tilt) for plane in self.planes]
         return report | {"planes": np.degrees(angles).tolist()}
+
+
+def height_error(surface, result):
+    """The mean distance in height of patch and mesh over the domain; None where there is no mesh."""
+    points, weights = result.domain.nodes
+    some = slice(None, None, len(points) // SAMPLES | 1)
+    points, weights = points[some], weights[some]
+    heights = result.patch.height(*points.T)
+    up = result.frame.axes[:, 2].tolist()
+    starts = result.frame.to_world(np.column_stack([points, heights])).tolist()
+    offs = [_height_off(surface, start, up, result.radius) for start in starts]
+    met = [i for i, off in enumerate(offs) if off is not None]
+    return float(np.average([offs[i] for i in met], weights=weights[met])) if met else None
 
 
 def _height_off(surface, start, up, reach):

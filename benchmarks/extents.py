@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a patch reaches by itself, beside fixed extents.
+
+`python -m benchmarks.extents ZIP [--touches N]`, from the root of a checkout; ZIP is the built extension.
+
+Scans, some of them ribbed or sharp-edged, and a ball are touched without noise at random points (seeded, by
+area), with the extent left to the touch and with fixed ones; the step is left to it always. The Markdown
+table has, of patches without a warning, medians: radius and summed area, and how far patch and mesh are
+apart along the normal, in the mean over the domain. `contradicted` are those in no doubt of their own whose
+vertices are off by more than they say: they carry a warning. `silent` are those without one and off by
+more than five times their own deviation.
+"""
+
+import argparse
+import sys
+from itertools import islice
+from pathlib import Path
+from statistics import median
+
+from tools import blender
+
+from . import SCANS_FOLDER, machine, table
+from .refusals import SILENT
+from .scans import random_places, sampling_planes
+
+NECK = 0.19  # of the bottle, and what is above: the shoulder, the neck, the cap
+SCANS = {  # file, and the least height of a point that is touched
+    "shell": ("shell_gastropod.stl", None),
+    "bottle neck": ("bottle_bleach.ply", NECK),
+    "CAD block": ("cad_block.stl", None),
+    "lemon": ("lemon.ply", None),
+    "pear": ("pear.ply", None),
+    "ball": (None, None),
+}
+EXTENTS = {"auto": 0.0, "1/16": 1.0 / 16.0, "1/8": 1.0 / 8.0, "1/4": 1.0 / 4.0}  # of the object's size
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("zip", type=Path, help="the built extension")
+    parser.add_argument("--touches", type=int, default=100, help="of each object and extent (%(default)s)")
+    options = parser.parse_args()
+    for path in (options.zip, *(SCANS_FOLDER / file for file, _ in SCANS.values() if file)):
+        if not path.is_file():
+            sys.exit(f"extents: there is no file {path}")
+    with blender.quiet():
+        extension = blender.start(options.zip)
+        rows = [row for name in SCANS for row in _rows(extension, name, options.touches)]
+    head = "object, extent|patches|refused|sure|contradicted|silent|radius|area|all areas|off|off / std|ms"
+    table(head.split("|"), rows)
+    print(
+        f"{options.touches} touches a row. Radius and `off` in thousandths of the object's size, areas in "
+        f"thousandths of its square; {machine('bpy', 'numpy', 'scipy')}."
+    )
+
+
+def _rows(extension, name, count):
+    """A line of the table for each extent."""
+    import bpy
+
+    file, least = SCANS[name]
+    if file:
+        extension.tactile_addon.mesh_file.open_file(SCANS_FOLDER / file)
+    else:
+        bpy.ops.wm.read_homefile(use_empty=True)
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6)
+    obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
+    size = extension.tactile_addon.surface.MeshSurface(obj, depsgraph).size
+    places = (place for _, place in random_places(obj, 10 * count) if least is None or place.z > least)
+    places = list(islice(places, count))
+    for title, share in EXTENTS.items():
+        found = [_touched(extension, obj, depsgraph, place, share * size) for place in places]
+        yield [f"{name}, {title}", *_cells([each for each in found if each], size, count)]
+
+
+def _touched(extension, obj, depsgraph, place, extent):
+    """The report of a touch and how far the patch is off the mesh; None where there is no patch."""
+    add_on, fit = extension.tactile_addon, {"seed": 0, "method": "bayes", "degree": "auto"}
+    try:
+        touched = add_on.touch.touch(
+            obj, depsgraph, place, sampling_planes(extension), extent=extent, step=0.0, noise=0.0, **fit
+        )
+    except ValueError:
+        return None
+    add_on.touch.verify(touched)
+    return touched.report, add_on.stability.height_error(touched.surface, touched.result)
+
+
+def _cells(found, size, count):
+    sure = [(report, off) for report, off in found if report["status"] == "ok"]
+    contradicted = sum(r["fit"]["status"] == "ok" != r["status"] for r, _ in found)
+    met = [(off, off / report["height_std"]) for report, off in sure if off is not None]
+    numbers = len(found), count - len(found), len(sure), contradicted, sum(ratio > SILENT for _, ratio in met)
+    areas = [1e3 * report["area"] / size**2 for report, _ in sure]
+    return [
+        *(f"{number}" for number in numbers),
+        _median([1e3 * report["radius"] / size for report, _ in sure]),
+        _median(areas),
+        f"{sum(areas):.3g}",
+        _median([1e3 * off / size for off, _ in met]),
+        _median([ratio for _, ratio in met]),
+        f"{1e3 * median(report['seconds']['touch'] for report, _ in found):.1f}",
+    ]
+
+
+def _median(values):
+    return f"{median(values):.3g}" if values else ""
+
+
+if __name__ == "__main__":
+    main()
