@@ -35,7 +35,12 @@ SOLVERS = [
     ("fast", "Fast", "Quasi-Newton minimisation"),
     ("descent", "Steepest Descent", "The paper's minimisation, slower, to compare with"),
 ]
-AUTO = {name: f"{name.capitalize()} (Auto)" for name in ("extent", "step", "degree", "spacing")}
+AUTO = {  # literals, to be translated
+    "extent": "Extent (Auto)",
+    "step": "Step (Auto)",
+    "degree": "Degree (Auto)",
+    "spacing": "Spacing (Auto)",
+}
 MOST_PLANES = 6
 STEEPEST = math.radians(60)  # of a tilt, by mouse
 
