@@ -14,6 +14,7 @@ from .posterior import TERMS
 from .result import Reconstruction
 
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))
+MOST = 50  # contacts of a contour: more tell of its seven terms no more than as many of less noise
 
 
 def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
@@ -28,14 +29,15 @@ def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
     """
     (x, y), weights = r.domain.nodes[0].T, r.domain.nodes[1]
     over = monomials(x / r.radius, y / r.radius, TERMS)
-    count = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
-    along = np.linspace(-1.0, 1.0, count)
+    wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
+    count = min(wanted, MOST)
+    along, noise_variance = np.linspace(-1.0, 1.0, count), r.posterior.noise**2 * count / wanted
     u, v = np.outer(np.cos(AZIMUTHS), along), np.outer(np.sin(AZIMUTHS), along)
     contours = monomials(u.ravel(), v.ravel(), TERMS).reshape(*u.shape, len(TERMS))
     # A contour's heights have the covariance `seen`, and `shared` with the coefficients; it takes
     # shared' seen^-1 shared off the coefficients' covariance.
     shared = contours @ r.posterior.covariance
-    seen = shared @ np.swapaxes(contours, 1, 2) + r.posterior.noise**2 * np.eye(count)
+    seen = shared @ np.swapaxes(contours, 1, 2) + noise_variance * np.eye(count)
     taken = np.swapaxes(shared, 1, 2) @ np.linalg.solve(seen, shared)
     best = int(np.argmax(np.einsum("kij,ij->k", taken, over.T @ (weights[:, None] * over))))
     lost = np.einsum("ni,ij,nj->n", over, taken[best], over)

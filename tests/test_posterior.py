@@ -179,6 +179,25 @@ def test_following_the_suggested_plane_shows_a_monkey_saddle(noise):
     assert surfaces.off_data(s, after) < 0.02
 
 
+def test_many_contacts_suggest_what_fewer_of_less_noise_do(monkeypatch):
+    s = surfaces.pear()
+    contours = track(s, s.point, s.normal, THREE, extent=12, step=0.1, noise=0.03, rng=0)
+    r = reconstruct(s.point, contours, outward=s.normal)
+    plane, expected = suggest_plane(r)
+    monkeypatch.setattr("core.next_plane.MOST", 1000)
+    all_of_them = suggest_plane(r)
+    assert plane == all_of_them[0]
+    assert expected == pytest.approx(all_of_them[1], rel=0.01)
+
+
+def test_thousands_of_contacts_suggest_a_plane():
+    s = surfaces.pear()
+    contours = track(s, s.point, s.normal, THREE, extent=12, step=0.005)
+    r = reconstruct(s.point, contours, outward=s.normal)
+    assert len(r.contacts) > 14_000
+    assert 0.0 < suggest_plane(r)[1] < r.mean_height_std
+
+
 @pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.torus(40, 20, 0.6)], ids=["pear", "torus"])
 def test_the_suggested_plane_brings_what_was_expected_and_no_other_much_more(surface):
     contours = surface.track(THREE, noise=0.03, rng=0)
