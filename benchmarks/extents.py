@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far a patch reaches by itself, beside fixed extents.
 
-`python -m benchmarks.extents ZIP [--touches N]`, from the root of a checkout; ZIP is the built extension.
+`python -m benchmarks.extents ZIP [--touches N | --pictures]`, from the root of a checkout; ZIP is the built
+extension. With --pictures it draws build/paper/extent.jpg instead.
 
 Scans, some of them ribbed or sharp-edged, and a ball are touched without noise at random points (seeded, by
 area), with the extent left to the touch and with fixed ones; the step is left to it always. The Markdown
@@ -18,9 +19,10 @@ from itertools import islice
 from pathlib import Path
 from statistics import median
 
-from tools import blender
+from tools import blender, demo
 
 from . import SCANS_FOLDER, machine, table
+from .paper_pictures import Stage, sheet
 from .refusals import SILENT
 from .scans import random_places, sampling_planes
 
@@ -33,6 +35,11 @@ SCANS = {  # file, and the least height of a point that is touched
     "pear": ("pear.ply", None),
     "ball": (None, None),
 }
+PICTURES = {  # file, a point between ribs, between pockets, on a smooth side; how much is seen, of the size
+    "shell": ("shell_gastropod.stl", (-14.46461, -7.82709, 23.23658), 0.5),
+    "CAD block": ("cad_block.stl", (-0.45, 0.3, 1.375), 0.7),
+    "lemon": ("lemon.ply", (-0.03383, 0.02996, 0.03865), 1.0),
+}
 EXTENTS = {"auto": 0.0, "1/16": 1.0 / 16.0, "1/8": 1.0 / 8.0, "1/4": 1.0 / 4.0}  # of the object's size
 
 
@@ -40,12 +47,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, help="the built extension")
     parser.add_argument("--touches", type=int, default=100, help="of each object and extent (%(default)s)")
+    parser.add_argument("--pictures", action="store_true", help="draw three patches instead")
     options = parser.parse_args()
     for path in (options.zip, *(SCANS_FOLDER / file for file, _ in SCANS.values() if file)):
         if not path.is_file():
             sys.exit(f"extents: there is no file {path}")
     with blender.quiet():
         extension = blender.start(options.zip)
+        if options.pictures:
+            return _draw(extension)
         rows = [row for name in SCANS for row in _rows(extension, name, options.touches)]
     head = "object, extent|patches|refused|sure|contradicted|silent|radius|area|all areas|off|off / std|ms"
     table(head.split("|"), rows)
@@ -102,6 +112,27 @@ def _cells(found, size, count):
         _median([ratio for _, ratio in met]),
         f"{1e3 * median(report['seconds']['touch'] for report, _ in found):.1f}",
     ]
+
+
+def _draw(extension):
+    """A sheet of patches on their objects."""
+    import bpy
+    from mathutils import Vector
+
+    for name, (file, place, share) in PICTURES.items():
+        extension.tactile_addon.mesh_file.open_file(SCANS_FOLDER / file)
+        (obj,) = bpy.context.scene.objects
+        bpy.ops.tactile.reconstruct(target=obj.name, location=place)
+        patch = bpy.context.view_layer.objects.active
+        (lines,) = patch.children
+        normal = patch.matrix_world.col[2].xyz.normalized()
+        up = Vector((0, 0, 1)) if abs(normal.z) < 0.8 else Vector((0, 1, 0))
+        view = (normal + 0.35 * up + 0.3 * up.cross(normal)).normalized()
+        width = share * max(obj.dimensions)
+        lines.delta_location = patch.matrix_world.to_3x3().inverted() @ (0.05 * width * view)  # off the patch
+        demo.look(bpy.context.scene, obj)
+        Stage(extension, bpy.context.scene).photograph(name, patch.location, view, up, width, [patch])
+    sheet("extent", [list(PICTURES)], list(PICTURES), [""], "")
 
 
 def _median(values):
