@@ -138,21 +138,21 @@ def _is_enough(r: Reconstruction) -> bool:
 def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, Any]) -> Counts:
     """To how many contacts on either side of p the contours can be followed."""
     whole = np.array([_on_either_side(contour, p) for contour in felt])
-    counts, doubt = _seed(felt, whole, p, normal, fit)
+    counts, doubt, sure = _seed(felt, whole, p, normal, fit)
     growing = (counts < whole) & (doubt <= 1.0)
     while growing.any():
         longer = np.minimum(np.ceil(GROWTH * counts).astype(np.intp), whole)
         trial = np.where(growing, longer, counts)
         try:
-            misfits, spread = _doubts(felt, trial, p, normal, fit)
+            misfits, spread, still = _doubts(felt, trial, p, normal, fit)
         except DegenerateCurvesError:
             break
         if misfits.max() > 1.0:  # the half curve that is explained worst ends here
             growing.flat[np.argmax(np.where(growing, misfits, -1.0))] = False
-        elif spread > 1.0:
+        elif spread > 1.0 or (sure and not still):
             break
         else:
-            counts = trial
+            counts, sure = trial, still
             growing &= counts < whole
     return counts
 
@@ -167,17 +167,17 @@ def _seed(
     found, error = [], None
     for seed in SEEDS:
         try:
-            misfits, spread = _doubts(felt, np.minimum(seed, whole), p, normal, fit)
+            misfits, spread, sure = _doubts(felt, np.minimum(seed, whole), p, normal, fit)
         except DegenerateCurvesError as why:
             error = why
             continue
-        found.append((max(float(misfits.max()), spread), seed))
+        found.append((max(float(misfits.max()), spread), seed, sure))
         if found[-1][0] <= 1.0:
             break
     if not found and error is not None:
         raise error
-    doubt, seed = min(found)
-    return np.minimum(seed, whole), doubt
+    doubt, seed, sure = min(found)
+    return np.minimum(seed, whole), doubt, sure
 
 
 def _doubts(
@@ -194,7 +194,7 @@ def _doubts(
         sides = squares[i][at - before : at], squares[i][at + 1 : at + after + 1]
         misfits[i] = [np.sqrt(side.mean()) if len(side) else 0.0 for side in sides]
     limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
-    return misfits / limit, r.mean_height_std / (DOUBTFUL_STD * r.radius)
+    return misfits / limit, r.mean_height_std / (DOUBTFUL_STD * r.radius), r.status == "ok"
 
 
 def _on_either_side(contour: Contour, p: Array) -> tuple[int, int]:
