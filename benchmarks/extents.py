@@ -107,7 +107,7 @@ def _cells(found, size, count):
         *(f"{number}" for number in numbers),
         _median([1e3 * report["radius"] / size for report, _ in sure]),
         _median(areas),
-        f"{sum(areas):.3g}",
+        f"{sum(areas):.0f}",
         _median([1e3 * off / size for off, _ in met]),
         _median([ratio for _, ratio in met]),
         f"{1e3 * median(report['seconds']['touch'] for report, _ in found):.1f}",
@@ -136,7 +136,7 @@ def _draw(extension):
 
 
 def _median(values):
-    return f"{median(values):.3g}" if values else ""
+    return f"{round(median(values), 3):.3g}" if values else ""
 
 
 if __name__ == "__main__":
