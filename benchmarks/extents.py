@@ -94,7 +94,7 @@ def _touched(extension, obj, depsgraph, place, extent):
     except ValueError:
         return None
     add_on.touch.verify(touched)
-    return touched.report, add_on.stability.height_error(touched.surface, touched.result)
+    return touched.report, add_on.mesh_error.height_error(touched.surface, touched.result)
 
 
 def _cells(found, size, count):

@@ -9,6 +9,7 @@ from statistics import median
 import numpy as np
 
 from .. import core
+from .mesh_error import height_error
 from .snapshot import MeshSnapshot
 from .surface import evaluated_mesh
 from .touch import STEPS, require_fine, require_lengths
@@ -16,8 +17,6 @@ from .touch import STEPS, require_fine, require_lengths
 EXTENT_SHARE = 1.0 / 8.0  # of the object's size, where no extent is given
 SPACING_SHARE = 1.0 / 4.0  # of the extent, where no spacing is given
 BATCH = 20  # touches that are fitted at once: in a hundredth of a second
-SAMPLES = 15  # of a patch, that are compared with the mesh
-LAYERS = 4  # of the mesh that a sample is compared with, at most
 CROWD = 10_000  # vertices that are given their nearest touch at once
 NOTHING = -1.0  # where there is no patch, in the place of each quantity
 # What the attribute `reason` counts: key, name, and the stop of a curve that it follows from.
@@ -172,42 +171,6 @@ class StabilityMap:
         report |= {name: getattr(self, name) for name in names} | self.fit
         angles = [(plane.azimuth, plane.tilt) for plane in self.planes]
         return report | {"planes": np.degrees(angles).tolist()}
-
-
-def height_error(surface, result):
-    """The mean distance in height of patch and mesh over the domain; None where there is no mesh."""
-    points, weights = result.domain.nodes
-    some = slice(None, None, len(points) // SAMPLES | 1)
-    points, weights = points[some], weights[some]
-    heights = result.patch.height(*points.T)
-    up = result.frame.axes[:, 2].tolist()
-    starts = result.frame.to_world(np.column_stack([points, heights])).tolist()
-    offs = [_height_off(surface, start, up, result.radius) for start in starts]
-    met = [i for i, off in enumerate(offs) if off is not None]
-    return float(np.average([offs[i] for i in met], weights=weights[met])) if met else None
-
-
-def _height_off(surface, start, up, reach):
-    """How far along `up`, either way, the nearest layer is whose outside is up; None beyond `reach`.
-
-    Layers that are seen from within are another wall of the object, or its other side.
-    """
-    nearest = None
-    for direction in (up, [-v for v in up]):
-        at, gone = start, 0.0
-        for _ in range(LAYERS):
-            hit = surface.ray_cast(at, direction, reach - gone)
-            if hit is None:
-                break
-            gone = abs(sum((a - b) * v for a, b, v in zip(hit[0], start, up, strict=True)))
-            if sum(a * v for a, v in zip(hit[1], up, strict=True)) > 0.0:
-                nearest = reach = gone
-                break
-            gone += 1e-4 * reach
-            at = [a + gone * v for a, v in zip(start, direction, strict=True)]
-            if gone >= reach:
-                break
-    return nearest
 
 
 def _ended(contours, point):

@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from .. import core
+from .mesh_error import height_error
 from .record import ends, judgement, reconstruction_report, suggestion_report
 from .settings import MOST_PLANES, STEEPEST
 from .surface import MeshSurface
@@ -138,7 +139,9 @@ def verify(touched, most=None):
     """
     clock = [perf_counter()]
     touched.report.update(_verification_report(touched.surface, touched.result, most))
-    touched.report.update(judgement(touched.report, touched.report.get("vertex_distance_mean", 0.0)))
+    # Where faces are large a pocket between the curves may have no vertex that lies over the patch.
+    offs = touched.report.get("vertex_distance_mean"), height_error(touched.surface, touched.result)
+    touched.report.update(judgement(touched.report, max(off or 0.0 for off in offs)))
     clock.append(perf_counter())
     touched.report["suggested_plane"] = suggestion_report(touched.result, np.array(touched.report["axes"]))
     clock.append(perf_counter())

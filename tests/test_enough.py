@@ -106,14 +106,19 @@ def test_no_patch_across_an_edge_or_a_rib(empty, extension, scans, name, noise):
     obj = empty.context.scene.objects[0]
     faces = np.array([(*face.center, face.area) for face in obj.data.polygons])
     chosen = np.random.default_rng(5).choice(len(faces), 40, p=faces[:, 3] / faces[:, 3].sum())
+    planes = [extension.core.SamplingPlane(azimuth) for azimuth in np.radians([0.0, 60.0, 120.0])]
+    inputs = {"extent": 0.0, "step": 0.0, "noise": noise, "seed": 0, "method": "bayes", "degree": "auto"}
+    add_on, depsgraph = extension.tactile_addon, empty.context.evaluated_depsgraph_get()
     silent = trusted = 0
     for at in faces[chosen, :3]:
         try:
-            _, report = made(empty.ops.tactile.reconstruct, target=obj.name, location=at, noise=noise)
-        except RuntimeError:  # on a crease or beside one: no patch
+            touched = add_on.touch.touch(obj, depsgraph, at, planes, **inputs)
+        except ValueError:  # on a crease or beside one: no patch
             continue
-        if report["status"] == "ok" and report["vertices"]:
+        add_on.touch.verify(touched)
+        if touched.report["status"] == "ok":
             trusted += 1
-            silent += report["vertex_distance_mean"] > 3.0 * report["height_std"]
+            off = add_on.mesh_error.height_error(touched.surface, touched.result)
+            silent += off > 3.0 * touched.report["height_std"]
     assert trusted > 0
     assert silent == 0
