@@ -149,7 +149,7 @@ def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, 
             break
         if misfits.max() > 1.0:  # the half curve that is explained worst ends here
             growing.flat[np.argmax(np.where(growing, misfits, -1.0))] = False
-        elif spread > 1.0 or (sure and not still):
+        elif spread > 1.0 or (sure and not still):  # what is known for sure is not given away for more
             break
         else:
             counts, sure = trial, still
@@ -159,8 +159,10 @@ def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, 
 
 def _seed(
     felt: Sequence[Contour], whole: Counts, p: Array, normal: ArrayLike, fit: dict[str, Any]
-) -> tuple[Counts, float]:
-    """The longest of SEEDS that is in no doubt, or the one in the least; and its doubt, at most 1 for none.
+) -> tuple[Counts, float, bool]:
+    """The longest of SEEDS that is in no doubt, or the one in the least.
+
+    And its doubt, at most 1 for none, and whether its status is "ok".
 
     Raises DegenerateCurvesError where none of them carries a fit.
     """
@@ -182,8 +184,11 @@ def _seed(
 
 def _doubts(
     felt: Sequence[Contour], counts: Counts, p: Array, normal: ArrayLike, fit: dict[str, Any]
-) -> tuple[Array, float]:
-    """How far contacts are off the fit of so many, (c, 2), and its mean deviation; above 1 is too much."""
+) -> tuple[Array, float, bool]:
+    """How far contacts are off the fit of so many, (c, 2), and its mean deviation: above 1 is too much.
+
+    And whether its status is "ok".
+    """
     few = [_shortened(*each, p, most=CONTACTS[0]) for each in zip(felt, counts, strict=True)]
     r = reconstruct(p, few, outward=normal, **fit)
     x, y, z = r.frame.to_local(np.vstack([contour.points for contour in felt])).T
