@@ -73,28 +73,43 @@ def explore(
     p = finite_array("point", point, (3,), LARGEST)
     length, spacing = _given("extent", extent), _given("step", step)
     feel = partial(track, surface, p, normal, planes, noise=noise, rng=rng, tangent=tangent)
-    reaches = None
-    if length is None:
-        farthest = number("farthest", farthest, above=0.0)
-        between = max(spacing or 0.0, farthest / FELT)
-        felt = feel(extent=farthest, step=between)
-        reaches = between * _grown(felt, p, normal, fit | {"method": "bayes"})
-        length = float(reaches.max())
+    touched = partial(_touched, feel, p, normal, fit, spacing)
+    if length is not None:
+        return touched(length)
+    farthest = number("farthest", farthest, above=0.0)
+    between = max(spacing or 0.0, farthest / FELT)
+    counts, sure = _grown(feel(extent=farthest, step=between), p, normal, fit | {"method": "bayes"})
+    reaches = between * counts.astype(np.float64)
+    found = touched(farthest, reaches)
+    if sure and found.result.status != "ok" and found.result.method == "bayes":
+        return touched(farthest, reaches / GROWTH)  # these contacts are others than those felt
+    return found
 
-    def touched(step: float) -> Exploration:
-        if reaches is None:
-            contours = feel(extent=length, step=step)
-        else:
-            contours = feel(extent=min(length + step, farthest), step=step)  # the end of a half curve shows
+
+def _touched(
+    feel: Callable[..., list[Contour]],
+    p: Array,
+    normal: ArrayLike,
+    fit: dict[str, Any],
+    spacing: float | None,
+    extent: float,
+    reaches: Array | None = None,
+) -> Exploration:
+    """A touch of this extent, or of one for each half curve (c, 2) up to it; with that spacing, or its own."""
+    length = extent if reaches is None else float(reaches.max())
+
+    def at(step: float) -> Exploration:
+        contours = feel(extent=length if reaches is None else min(length + step, extent), step=step)
+        if reaches is not None:  # a step longer than that, so that where they end shows
             counts = (reaches / step * (1.0 + 1e-6)).astype(np.intp)
             contours = [_shortened(*each, p) for each in zip(contours, counts, strict=True)]
         return Exploration(contours, reconstruct(p, contours, outward=normal, **fit), length, step)
 
     if spacing is not None:
-        return touched(spacing)
+        return at(spacing)
     shortest = length if reaches is None else float(reaches[reaches > 0.0].min())
     coarsest = max(shortest / LEAST, length / CONTACTS[-1])
-    return _enough(touched, [min(length / count, coarsest) for count in CONTACTS])
+    return _enough(at, [min(length / count, coarsest) for count in CONTACTS])
 
 
 def _given(name: str, length: float | str) -> float | None:
@@ -135,8 +150,8 @@ def _is_enough(r: Reconstruction) -> bool:
     return bool(then >= (1.0 - NOTICEABLE) * now or now <= MISFIT)
 
 
-def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, Any]) -> Counts:
-    """To how many contacts on either side of p the contours can be followed."""
+def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, Any]) -> tuple[Counts, bool]:
+    """To how many contacts on either side of p the contours can be followed, and whether that is "ok"."""
     whole = np.array([_on_either_side(contour, p) for contour in felt])
     counts, doubt, sure = _seed(felt, whole, p, normal, fit)
     growing = (counts < whole) & (doubt <= 1.0)
@@ -154,7 +169,7 @@ def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, 
         else:
             counts, sure = trial, still
             growing &= counts < whole
-    return counts
+    return counts, sure
 
 
 def _seed(
