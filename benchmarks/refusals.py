@@ -3,7 +3,7 @@
 """What becomes of touches all over scans that are creased, holed, nested, thin or far from the origin.
 
 `python -m benchmarks.refusals ZIP [--touches N]`, from the root of a checkout; ZIP is the built extension.
-Each scan is touched at random points (seeded, by area) with the extension's own defaults. Prints Markdown:
+Each scan is touched at random points (seeded, by area) in fixed extents, all else by the extension's own defaults. Prints Markdown:
 how many patches there are, how many of them with a warning, how many refusals, and why; and how many patches
 are `silent`: without a warning, and off the mesh by more than five times their own deviation, in the mean.
 """
@@ -22,7 +22,7 @@ from . import SCANS_FOLDER, machine, table
 from .scans import random_places, sampling_planes
 
 SILENT = 5.0
-EXTENTS = (1.0 / 8.0, 1.0 / 32.0)  # of the object's size: the default, and one for details
+EXTENTS = (1.0 / 8.0, 1.0 / 32.0)  # of the object's size: that of a map, and one for details
 
 
 def main():

@@ -95,7 +95,7 @@ def _touched(
     extent: float,
     reaches: Array | None = None,
 ) -> Exploration:
-    """A touch of this extent, or of one for each half curve (c, 2) up to it; with that spacing, or its own."""
+    """A touch of this extent, or of one for each half curve (c, 2) up to it; with that spacing or its own."""
     length = extent if reaches is None else float(reaches.max())
 
     def at(step: float) -> Exploration:
