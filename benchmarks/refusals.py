@@ -3,7 +3,7 @@
 """What becomes of touches all over scans that are creased, holed, nested, thin or far from the origin.
 
 `python -m benchmarks.refusals ZIP [--touches N]`, from the root of a checkout; ZIP is the built extension.
-Each scan is touched at random points (seeded, by area) in fixed extents, all else by the extension's own defaults. Prints Markdown:
+Each scan is touched at random points (seeded, by area), with fixed extents and degree 4. Prints Markdown:
 how many patches there are, how many of them with a warning, how many refusals, and why; and how many patches
 are `silent`: without a warning, and off the mesh by more than five times their own deviation, in the mean.
 """
