@@ -145,10 +145,10 @@ def _departure(one, other):
 PARTS = {
     "curves through the point": (reconstruction, "curves_through"),
     "Darboux frame": (reconstruction, "darboux_frames"),
-    "equations of the contacts": (bayes, "_system"),
+    "equations of the contacts": (bayes, "linear_system"),
     "their QR": (bayes, "restricted"),
-    "waviness and noise": (bayes, "evidence"),
-    "posterior": (bayes, "_posterior"),
+    "waviness and noise": (bayes, "hyperparameters"),
+    "posterior": (bayes, "posterior"),
     "patch and domain": (reconstruction, "_result"),
 }
 
