@@ -51,12 +51,17 @@ class Domain:
         """Beside an end near to the origin the spline may turn back: a monotone one, of the radius."""
         from scipy.interpolate import PchipInterpolator
 
-        around = 2.0 * np.pi
-        ends = np.arctan2(self.ends[:, 1], self.ends[:, 0])
-        at = np.concatenate([ends - around, ends, ends + around])
-        azimuths = around / SAMPLES * np.arange(SAMPLES, dtype=np.float64) - np.pi
-        radii: Array = PchipInterpolator(at, np.tile(np.hypot(*self.ends.T), 3))(azimuths)
-        return azimuths, radii
+        # Two ends in one direction count once, the farther.
+        turns, place = np.unique(
+            np.round(np.arctan2(self.ends[:, 1], self.ends[:, 0]) / (2.0 * np.pi), 9) % 1.0,
+            return_inverse=True,
+        )
+        reach = np.zeros(len(turns))
+        np.maximum.at(reach, place, np.hypot(*self.ends.T))
+        at = np.concatenate([turns + whole for whole in (-2.0, -1.0, 0.0, 1.0)])
+        azimuths = np.arange(SAMPLES, dtype=np.float64) / SAMPLES - 0.5
+        radii: Array = PchipInterpolator(at, np.tile(reach, 4))(azimuths)
+        return 2.0 * np.pi * azimuths, radii
 
     @cached_property
     def nodes(self) -> tuple[Array, Array]:

@@ -87,3 +87,14 @@ def test_lengths_scale():
     small, large = closed_spline_domain(STUBBY, 1.0), closed_spline_domain(STUBBY * 1e6, 1e6)
     assert large.area == pytest.approx(small.area * 1e12)
     assert large.boundary(50) == pytest.approx(small.boundary(50) * 1e6)
+
+
+@pytest.mark.parametrize("others", [[(-1.0, 0.2), (-0.9, -0.3)], [(0.9, 0.1), (0.8, -0.1)]])
+def test_two_ends_in_one_direction_bound_what_the_farther_does(others):
+    """As where a curve comes back over itself; the spline through both would turn back."""
+    domain = closed_spline_domain([(1.0, 0.5), (0.02, 0.01), (0.5, 0.25), *others], 1.0)
+    azimuths, radii = domain._polar
+    assert np.isfinite(radii).all()
+    assert (np.diff(azimuths) > 0.0).all()
+    assert np.isfinite(domain.area)
+    assert domain.contains(0.5, 0.25)
