@@ -56,8 +56,12 @@ def touch(obj, depsgraph, location, planes, *, tolerance=None, **inputs):
         plane = suggestion_report(touched.result, np.array(report["axes"]))
         if std <= tolerance or plane["expected_height_std"] > (1.0 - HELPS) * std:
             break
-        planes = [*planes, core.SamplingPlane(math.radians(plane["azimuth"]))]
-        touched = touch_along(obj, depsgraph, location, planes, farthest=farthest, **inputs)
+        more = [*planes, core.SamplingPlane(math.radians(plane["azimuth"]))]
+        try:
+            touched = touch_along(obj, depsgraph, location, more, farthest=farthest, **inputs)
+        except ValueError:  # nothing can be felt along that one: what was felt so far stays
+            break
+        planes = more
         after = touched.result.mean_height_std
         added.append({"azimuth": plane["azimuth"], "height_std_before": std, "height_std": after})
     touched.report["added_planes"] = added

@@ -58,6 +58,25 @@ def test_more_planes_make_a_better_patch_not_a_larger_one(empty, sheet):
     assert after["height_std"] < 0.9 * before["height_std"]
 
 
+def test_a_plane_along_which_nothing_can_be_felt_is_not_added(empty):
+    """A flat disk with a gap where the fourth plane is suggested."""
+    turns = np.arange(0, 360, 5)
+    n, after = len(turns), np.roll(np.arange(len(turns)), -1)
+    rim = np.column_stack([np.cos(np.radians(turns)), np.sin(np.radians(turns)), np.zeros(n)])
+    faces = [(0, 1 + i, 1 + after[i]) for i in range(n)]
+    there = np.abs(turns % 180 + 2.5 - 90.0) > 15.0
+    faces += [(1 + i, 1 + n + i, 1 + n + after[i], 1 + after[i]) for i in np.flatnonzero(there)]
+    mesh = empty.data.meshes.new("Disk")
+    mesh.from_pydata(np.vstack([np.zeros(3), 0.02 * rim, rim]).tolist(), [], faces)
+    empty.context.scene.collection.objects.link(empty.data.objects.new("Disk", mesh))
+    inputs = {"target": "Disk", "location": (0.001, 0.0005, 0.0), "extent": 0.8}
+    three = made(empty.ops.tactile.reconstruct, **inputs)[1]
+    assert 75.0 < three["suggested_plane"]["azimuth"] < 105.0
+    report = made(empty.ops.tactile.reconstruct, tolerance=0.0, **inputs)[1]
+    assert (report["added_planes"], len(report["planes"])) == ([], 3)
+    assert report["points"] == three["points"]
+
+
 def test_a_probe_keeps_the_planes_that_were_added(empty, sheet):
     empty.ops.tactile.pick(target="Grid", location=PLACE, new=True)
     probe = empty.context.object
