@@ -99,6 +99,7 @@ def _touched(
     length = extent if reaches is None else float(reaches.max())
 
     def at(step: float) -> Exploration:
+        """With contacts so far apart."""
         contours = feel(extent=length if reaches is None else min(length + step, extent), step=step)
         if reaches is not None:  # a step longer than that, so that where they end shows
             counts = (reaches / step * (1.0 + 1e-6)).astype(np.intp)

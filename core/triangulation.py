@@ -40,6 +40,7 @@ def patch_mesh(patch: MongePatch, domain: Domain, tolerance: float) -> tuple[Arr
     mean_radius = math.sqrt(domain.area / math.pi)
 
     def size(points: Array) -> Array:
+        """The distance of neighbours that the second derivatives allow, (n,)."""
         flattest = CHORD * tolerance / (COARSEST * mean_radius) ** 2
         wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(patch, points), flattest))
         return np.maximum(wanted, FINEST * mean_radius)
@@ -74,6 +75,7 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
 
     def around(count: int) -> Array:
+        """So many points in equal steps, (count, 2)."""
         at = lengths[-1] / count * np.arange(count)
         return np.column_stack([np.interp(at, lengths, values) for values in closed.T])
 

@@ -72,9 +72,8 @@ class MeshSurface:
         near = np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
         if most is not None:
             near = near[:: math.ceil(len(near) / most) or 1]
-        normals = np.empty_like(
-            self._co
-        )  # all of them: one by one, a few thousand take longer than a million
+        # All of them: one by one, a few thousand take longer than a million.
+        normals = np.empty_like(self._co)
         self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
         return (
             near,

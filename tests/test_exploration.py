@@ -13,42 +13,14 @@ PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
 UP = (0.0, 0.0, 1.0)
 
 
-class Relief:
-    """A surface z = f(x, y) that answers rays along any direction, by bisection; f and its gradient given."""
-
-    def __init__(self, height, gradient):
-        self.height, self.gradient = height, gradient
-
-    def ray_cast(self, origin, direction, distance):
-        o, d = np.array(origin), np.array(direction)
-
-        def above(t):
-            x, y, z = o + t * d
-            return z - self.height(x, y)
-
-        steps = np.linspace(0.0, distance, 33)
-        signs = np.sign([above(t) for t in steps])
-        crossings = np.flatnonzero(signs[:-1] * signs[1:] <= 0.0)
-        if not len(crossings):
-            return None
-        a, b = steps[crossings[0]], steps[crossings[0] + 1]
-        for _ in range(60):
-            c = 0.5 * (a + b)
-            a, b = (c, b) if above(c) * above(a) > 0.0 else (a, c)
-        hit = o + b * d
-        n = np.array([*(-v for v in self.gradient(*hit[:2])), 1.0])
-        return tuple(hit), tuple(n / np.linalg.norm(n))
-
-
-def paraboloid(x, y):
-    return -(x * x + y * y) / 80.0
-
-
 def bowl_with(height, gradient):
-    """The paraboloid, plus something."""
-    return Relief(
-        lambda x, y: paraboloid(x, y) + height(x, y),
-        lambda x, y: (-x / 40.0 + gradient(x, y)[0], -y / 40.0 + gradient(x, y)[1]),
+    """A paraboloid, plus something of which the gradient is given; its level is the height above it."""
+    return surfaces.Exact(
+        lambda x, y, z: z + (x * x + y * y) / 80.0 - height(x, y),
+        lambda p: np.array([*(p[:2] / 40.0 - gradient(*p[:2])), 1.0]),
+        np.zeros(3),
+        -1.0 / 40.0,
+        -1.0 / 40.0,
     )
 
 
@@ -74,9 +46,8 @@ def reach(contour, point=(0.0, 0.0, 0.0)):
 def true_error(surface, found):
     """The mean |dz| over the domain; the reference point is the origin."""
     points, weights = found.result.domain.nodes
-    x, y = points.T
-    world = found.result.frame.to_world(np.column_stack([x, y, found.result.patch.height(x, y)]))
-    return float(weights @ np.abs(world[:, 2] - surface.height(world[:, 0], world[:, 1])))
+    world = found.result.frame.to_world(np.column_stack([points, found.result.patch.height(*points.T)]))
+    return float(weights @ np.abs(surface.level(*world.T)))
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
