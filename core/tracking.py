@@ -76,13 +76,7 @@ def track(
         raise ValueError(f"step: wanted no more than the extent {extent:g}, got {step:g}")
     if extent / step > MOST_CONTACTS:
         raise ValueError(f"step: wanted at least a {MOST_CONTACTS}th of the extent {extent:g}, got {step:g}")
-    noise = number("noise", noise, least=0.0)
-    try:
-        generator = np.random.default_rng(rng)
-    except (TypeError, ValueError):
-        raise ValueError(
-            f"rng: wanted a Generator or a whole number of 0 or more, got {shown(rng)}"
-        ) from None
+    noise, generator = number("noise", noise, least=0.0), _generator(rng)
     count = math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
     e1 = tangent_of(n, tangent)
     start, up, side = _first_contact(surface, vector_of(p), n, e1, step)
@@ -100,6 +94,16 @@ def track(
             points += offsets[:, None] * _in_plane(normals, across)
         contours.append(Contour(points, np.array(across), normals, noise, (back[2], ahead[2])))
     return contours
+
+
+def _generator(rng: np.random.Generator | int | None) -> np.random.Generator:
+    """Raises ValueError for what is no seed."""
+    try:
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"rng: wanted a Generator or a whole number of 0 or more, got {shown(rng)}"
+        ) from None
 
 
 def _in_plane(normals: Array, across: Vector) -> Array:

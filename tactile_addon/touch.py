@@ -104,19 +104,13 @@ def touch_along(
         outward = [-v for v in outward]
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
-    found = core.explore(
-        surface,
-        point,
-        outward,
-        planes,
-        farthest=farthest or FARTHEST * surface.size,
-        extent=extent or "auto",
-        step=step or "auto",
-        noise=noise,
-        rng=seed,
-        tangent=axes[:, 0],
-        **fit,
-    )
+    size = {
+        "farthest": farthest or FARTHEST * surface.size,
+        "extent": extent or "auto",
+        "step": step or "auto",
+    }
+    sensor = {"noise": noise, "rng": seed, "tangent": axes[:, 0]}
+    found = core.explore(surface, point, outward, planes, **size, **sensor, **fit)
     clock.append(perf_counter())
     result, contours = found.result, found.contours
     report = {
