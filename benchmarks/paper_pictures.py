@@ -198,7 +198,9 @@ def sheet(name, pictures, column_titles, row_titles, caption):
     from .plot import plt
 
     rows, columns = len(pictures), len(pictures[0])
-    figure, axes = plt.subplots(rows, columns, figsize=(10, 10 * rows / columns + 0.9), squeeze=False)
+    foot = 0.55 if caption else 0.05  # inches
+    size = (10, 10 * rows / columns + 0.35 + foot)
+    figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False)
     for i, j in np.ndindex(rows, columns):
         axes[i, j].imshow(plt.imread(OUTPUT / f"{pictures[i][j]}.png"), interpolation="lanczos")
         axes[i, j].set(xticks=[], yticks=[], frame_on=False)
@@ -207,6 +209,6 @@ def sheet(name, pictures, column_titles, row_titles, caption):
     for axis, title in zip(axes[:, 0], row_titles, strict=False):
         axis.set_ylabel(title, fontsize=14)
     inch = 1.0 / figure.get_figheight()
-    figure.subplots_adjust(0.03, 0.55 * inch, 1.0, 1.0 - 0.4 * inch, wspace=0.02, hspace=0.02)
+    figure.subplots_adjust(0.03, foot * inch, 1.0, 1.0 - 0.4 * inch, wspace=0.02, hspace=0.02)
     figure.text(0.5, 0.08 * inch, caption, ha="center", va="bottom", fontsize=12)
     figure.savefig(OUTPUT / f"{name}.jpg", dpi=100, facecolor="white", pil_kwargs={"quality": 88})
