@@ -13,3 +13,13 @@ def unregister():
     from . import tactile_addon
 
     tactile_addon.unregister()
+
+
+def reconstruction_of(obj):
+    """The core.Reconstruction of a patch, or of its probe or contours, in the world, where the patch is now.
+
+    Raises ValueError, with a sentence, where there is none.
+    """
+    from .tactile_addon import probe
+
+    return probe.reconstruction_of(obj)

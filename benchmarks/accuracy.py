@@ -204,7 +204,7 @@ def _random_shape(rng, waves=40):
 
 def ours(case, **options):
     r = reconstruct(case.point, case.contours, outward=case.axes[:, 2], **options)
-    return Fit(r.frame.axes, r.patch.height, (r.patch.k1, r.patch.k2), r.height_std)
+    return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
 
 METHODS = {

@@ -93,13 +93,14 @@ def _touched(extension, obj, depsgraph, place, extent):
         )
     except ValueError:
         return None
-    add_on.touch.verify(touched)
-    return touched.report, add_on.mesh_error.height_error(touched.surface, touched.result)
+    touched = add_on.touch.verify(touched)
+    off = add_on.mesh_error.height_error(touched.surface, touched.result)
+    return touched.report | {"fit": touched.result.status}, off
 
 
 def _cells(found, size, count):
     sure = [(report, off) for report, off in found if report["status"] == "ok"]
-    contradicted = sum(r["fit"]["status"] == "ok" != r["status"] for r, _ in found)
+    contradicted = sum(r["fit"] == "ok" != r["status"] for r, _ in found)
     met = [(off, off / report["height_std"]) for report, off in sure if off is not None]
     numbers = len(found), count - len(found), len(sure), contradicted, sum(ratio > SILENT for _, ratio in met)
     areas = [1e3 * report["area"] / size**2 for report, _ in sure]

@@ -150,7 +150,7 @@ def scan_places(extension):
 def _within_reach(surface, r):
     """The mesh vertices over the domain that a finger can touch from outside."""
     _, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius)
-    return r.frame.to_local(vertices[core.reachable(r, surface, vertices, normals)])
+    return r.frame.to_local(vertices[core.reachable(r.geometry, surface, vertices, normals)])
 
 
 # Experiments -------------------------------------------------------------------------------------------

@@ -71,7 +71,7 @@ def row(name, surface, extent, noise):
     contours = track(
         surface, surface.point, surface.normal, PLANES, extent=extent, step=extent / 12.0, noise=noise, rng=0
     )
-    r = reconstruct(surface.point, contours, outward=surface.normal, sensor_std=noise)
+    r = reconstruct(surface.point, contours, outward=surface.normal, noise=noise)
     points, triangles = r.mesh()
     _, _, off = between(r, points, triangles)
     lengths = (r.mean_height_std, MESH_SHARE * r.mean_height_std, off.max(), off.mean())

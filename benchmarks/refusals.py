@@ -68,8 +68,7 @@ def _touches(extension, path, share, count):
             continue
         finally:
             slowest = max(slowest, perf_counter() - start)
-        extension.tactile_addon.touch.verify(touched)
-        report = touched.report
+        report = extension.tactile_addon.touch.verify(touched).report
         reports.append(report)
         _check_finite(report)
         if report["status"] != "ok":

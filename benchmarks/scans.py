@@ -166,9 +166,8 @@ def random_places(obj, count):
 
 
 def _report(extension, *place, **inputs):
-    touched = extension.tactile_addon.touch.touch(*place, **inputs)
-    extension.tactile_addon.touch.verify(touched)
-    return touched.report
+    touch = extension.tactile_addon.touch
+    return touch.verify(touch.touch(*place, **inputs)).report
 
 
 def _caption():

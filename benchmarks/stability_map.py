@@ -53,7 +53,7 @@ def main():
 
     addon, clock = extension.tactile_addon, Clock()
     clock.wrap(addon.snapshot.MeshSnapshot, "__init__", "snapshot")
-    for name, stage in (("track", "tracking"), ("reconstruct_many", "fit"), ("mean_height_stds", "fit")):
+    for name, stage in (("track", "tracking"), ("reconstruct_many", "fit"), ("with_height_stds", "fit")):
         clock.wrap(addon.stability.core, name, stage)
     clock.wrap(addon.stability.StabilityMap, "_note", "noting")
     clock.wrap(addon.stability, "height_error", "error")

@@ -9,18 +9,20 @@ convex body has negative curvatures under its outward normal.
 from .coefficients import SOLVERS
 from .common_point import common_point, in_running_order
 from .contour import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, UNEXPLAINED, Contour, SamplingPlane
+from .deviations import mean_height_stds, with_height_stds
 from .domain import Domain
 from .exploration import Exploration, explore
+from .geometry import Geometry, distances, fit_error, overlapped
 from .local_geometry import DegenerateCurvesError, Frame
 from .monge import MongePatch
 from .next_plane import azimuth_of, suggest_plane
 from .reconstruction import METHODS, reconstruct, reconstruct_many
 from .registration import Pose, register
-from .result import Reconstruction, mean_height_stds
+from .result import Reconstruction
 from .sampling import spaced
 from .serialization import from_dict, to_dict
 from .tracking import Surface, track
-from .verification import distances, fit_error, overlapped, reachable, verify
+from .verification import reachable, verify
 
 __all__ = [
     "CREASE",
@@ -35,6 +37,7 @@ __all__ = [
     "Domain",
     "Exploration",
     "Frame",
+    "Geometry",
     "MongePatch",
     "Pose",
     "Reconstruction",
@@ -58,4 +61,5 @@ __all__ = [
     "to_dict",
     "track",
     "verify",
+    "with_height_stds",
 ]

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+ROUNDING = 4e-16  # of a unit vector's length
 LARGEST, SMALLEST = 1e50, 1e-50  # lengths whose sixth powers are numbers
 
 
@@ -20,8 +21,10 @@ def finite_array(
 ) -> Array:
     """`value` as a float64 array of `shape`, where None stands for any length.
 
-    Raises ValueError where the shape differs, or a number is not finite or beyond +-`largest`.
+    Raises ValueError where the shape differs, or a number is masked, not finite or beyond +-`largest`.
     """
+    if np.ma.is_masked(value):  # type: ignore[no-untyped-call]
+        raise ValueError(f"{name}: wanted numbers, got masked ones among them: take them out")
     try:
         array = np.array(value)
         if array.dtype.kind not in "biufO":  # text, and complex numbers
@@ -70,6 +73,8 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 def unit_vector(name: str, value: ArrayLike) -> Array:
     """`value` (3,) scaled to length 1. Raises ValueError where it has no direction."""
     x, y, z = finite_array(name, value, (3,)).tolist()
+    if abs(math.hypot(x, y, z) - 1.0) <= ROUNDING:  # once is enough: twice would change its last bit
+        return np.array([x, y, z])
     largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:
         raise ValueError(f"{name}: wanted a vector with a direction, got (0, 0, 0)")

@@ -57,7 +57,7 @@ def joint_fit(
     tangent: Array,
     accuracy: Array,
     normals: Array | None = None,
-) -> tuple[Array, Posterior]:
+) -> tuple[Array, Posterior, Array]:
     """The Darboux frames and the surfaces that the contacts of b touches show, and how well they show them.
 
     contacts : (b, n, 3), in unit radius, in a frame near to the Darboux frame
@@ -67,9 +67,10 @@ def joint_fit(
     accuracy : (b,), standard deviation of a contact, at least
     normals : (b, n, 3), measured, over their standard deviation; 0 where there is none
 
-    Returns the columns d1, d2, n (b, 3, 3) in the frame given, and the posteriors in the new one, where
-    the means of the slopes and of the mixed second derivative are 0. Where a residual is beyond
-    OUTLYING standard deviations, contacts weigh as under a Student t distribution.
+    Returns the columns d1, d2, n (b, 3, 3) in the frame given, the posteriors in the new one, where
+    the means of the slopes and of the mixed second derivative are 0, and the weights (b, n) that the
+    contacts have in the end: where one is beyond OUTLYING standard deviations, they weigh as under a
+    Student t distribution.
     """
     axes = np.eye(3)[None].repeat(len(contacts), axis=0)
     given = contacts[:, :0] if normals is None else normals
@@ -78,17 +79,17 @@ def joint_fit(
     for step in range(PASSES):
         touches, settled, surface = _pass(touches, step)
         if surface is not None:
-            found.append((pending[settled], touches.axes[settled], *surface))
+            found.append((pending[settled], touches.axes[settled], touches.weights[settled], *surface))
         if settled.all():
             break
         if not settled.any():
             continue
         touches, pending = _Touches(*(values[~settled] for values in touches)), pending[~settled]
     if len(found) == 1:  # all at once, as nearly always: in the order they came
-        return found[0][1], Posterior(*found[0][2:])
-    order, turns, *surfaces = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return found[0][1], Posterior(*found[0][3:]), found[0][2]
+    order, turns, found_weights, *surfaces = (np.concatenate(parts) for parts in zip(*found, strict=True))
     back = np.argsort(order)
-    return turns[back], Posterior(*(values[back] for values in surfaces))
+    return turns[back], Posterior(*(values[back] for values in surfaces)), found_weights[back]
 
 
 def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
@@ -104,8 +105,8 @@ def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Po
         hyper = hyperparameters(system, data, touches.weights, touches.floor)
     found = solution(system, hyper)
     mean = expected + found
-    turned = [_turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
-    axes, k1, k2, angle = (np.array(values) for values in zip(*turned, strict=True))
+    found_axes = [turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
+    axes, k1, k2, angle = (np.array(values) for values in zip(*found_axes, strict=True))
     # Outliers show against a surface in level axes.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
     weights, settled, surface = touches.weights, np.full(len(mean), step == PASSES - 1), None
@@ -146,7 +147,7 @@ def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array)
     return np.where(present, np.where(outlying[:, None], (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0), 0.0)
 
 
-def _turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:
+def turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:
     """The axes tilted to a surface's normal and turned to its principal directions; k1, k2; that angle."""
     sx, sy, xx, xy, yy = mean[:FREE].tolist()
     n = axes @ np.array([-sx, -sy, 1.0]) / math.sqrt(1.0 + sx**2 + sy**2)

@@ -11,13 +11,16 @@ from numpy.typing import ArrayLike
 
 from .arguments import LARGEST, Array, finite_array, list_of
 from .contour import Contour
-from .curves import LEAST_CONTACTS, curves_through, local_curves, stacked
+from .curves import LEAST_CONTACTS, WINDOW, curves_through, local_curves, stacked
 from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 
 APART = 0.1  # of a curve's size, that it may miss the point by
 GAP = 0.25  # of a curve's size, that it may have no contacts in around the point
 STEPS = 50  # of Gauss-Newton; five are the rule
 STARTS = 3  # curves may come near each other in several places
+MOST = 1000  # contacts of a curve, and
+QUERIES = 10**6  # distances of a contact to a curve, that a start is looked for among
+NEAREST = 4 * WINDOW  # contacts of a curve that are looked at around a point
 
 
 def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
@@ -68,17 +71,24 @@ def _misses(point: Array, feet: Array, tangents: Array) -> Array:
 
 
 def _starts(contours: Sequence[Contour]) -> Array:
-    """The contacts nearest to all curves in the sense of least squares, best first, apart from each other."""
+    """The contacts nearest to all curves in the sense of least squares, best first, apart from each other.
+
+    Of many contacts some: Gauss-Newton goes on from there.
+    """
     from scipy.spatial import cKDTree
 
-    contacts = np.vstack([contour.points for contour in contours])
-    squares = np.sum([cKDTree(contour.points).query(contacts)[0] ** 2 for contour in contours], axis=0)
+    thinned = [contour.points[:: -(-len(contour.points) // MOST)] for contour in contours]
+    contacts = np.vstack(thinned)
+    contacts = contacts[:: -(-len(contacts) * len(thinned) // QUERIES)]
+    squares = np.zeros(len(contacts))
+    for points in thinned:
+        squares += cKDTree(points).query(contacts)[0] ** 2
     apart, starts = APART * min(map(_size, contours)), np.empty((0, 3))
-    for i in np.argsort(squares, kind="stable"):
-        if len(starts) == STARTS or squares[i] > 4.0 * squares.min() + len(contours) * apart**2:
-            break
-        if not len(starts) or np.linalg.norm(starts - contacts[i], axis=1).min() > 2.0 * apart:
-            starts = np.vstack([starts, contacts[i]])
+    left = squares <= 4.0 * squares.min() + len(contours) * apart**2
+    while len(starts) < STARTS and left.any():
+        best = contacts[np.argmin(np.where(left, squares, np.inf))]
+        starts = np.vstack([starts, best])
+        left &= np.linalg.norm(contacts - best, axis=1) > 2.0 * apart
     return starts
 
 
@@ -90,8 +100,8 @@ def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, A
     """Gauss-Newton from a start: the point, and the feet and tangents (c, 3) of the curves next to it."""
     reach = min(map(_size, contours))
     for _ in range(STEPS):
-        curves = curves_through(*stacked(point[None], [contours])).at(0)
-        local, _ = local_curves(curves)
+        near = [Contour(_near(point, contour.points)) for contour in contours]
+        local = local_curves(curves_through(*stacked(point[None], [near])))[0][0]
         speeds = np.linalg.norm(local[:, 1], axis=1, keepdims=True)
         feet, tangents = point + local[:, 0], local[:, 1] / np.maximum(speeds, 1e-300)
         across = np.eye(3) - tangents[:, :, None] * tangents[:, None]
@@ -102,6 +112,13 @@ def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, A
             break
         point = point + step * min(1.0, 0.5 * reach / length)
     return point, feet, tangents
+
+
+def _near(point: Array, points: Array) -> Array:
+    """Those of a curve that say how it passes the point, and some more, in their order."""
+    if len(points) <= NEAREST:
+        return points
+    return points[np.sort(np.argpartition(np.sum((points - point) ** 2, axis=1), NEAREST)[:NEAREST])]
 
 
 def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> None:

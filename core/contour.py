@@ -45,7 +45,7 @@ class SamplingPlane:
         return t, u, cross(t, u)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contour:
     """A tracked contour: the contacts along one curve through the reference point.
 
@@ -86,8 +86,10 @@ class Contour:
             object.__setattr__(self, "normals", normals)
         if self.noise is not None:
             object.__setattr__(self, "noise", number("noise", self.noise, least=0.0))
-        if self.stops is not None and len(list_of("stops", self.stops, str)) != 2:
-            raise ValueError(f"stops: wanted two words, got {shown(self.stops)}")
+        if self.stops is not None:
+            object.__setattr__(self, "stops", tuple(list_of("stops", self.stops, str)))
+            if len(self.stops) != 2:
+                raise ValueError(f"stops: wanted two words, got {shown(self.stops)}")
         if self.normal_std is not None:
             object.__setattr__(self, "normal_std", number("normal_std", self.normal_std, least=0.0))
             if self.normals is None:

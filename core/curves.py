@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import SMALLEST, Array
-from .contour import Contour, cross
+from .contour import Contour
 
 WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
 LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
+RIDGE = 1e-12  # of the equations of r0, r1 and r2, where all s are one
 EXACT = 1e-6  # radians, of a measured normal: no less is told apart
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curves:
     """The contours of b touches as seen from their reference points, c curves a touch, n contacts a curve.
 
@@ -82,9 +83,8 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
     """
     shape, curve = present.shape, np.arange(present[..., 0].size)[:, None]
     r, present = r.reshape(len(curve), -1, 3), present.reshape(len(curve), -1)
-    distance = np.sqrt(np.einsum("cni,cni->cn", r, r))
-    least = np.maximum(1e-9 * distance.max(axis=1, initial=0.0, keepdims=True), SMALLEST)
-    present = present & (distance > least)
+    distance, beside = besides_point(r)
+    present = present & beside
     distance = np.where(present, distance, np.inf)
     near = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
     counts = present.sum(axis=1)[:, None]
@@ -107,36 +107,45 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
     )
 
 
-def local_curves(curves: Curves) -> tuple[Array, Array]:
-    """r = r0 + r1 s + r2 s^2 of the c curves of one touch, s along the tangent t; and the deviation of r0.
+def besides_point(r: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Distances (..., n) of contacts (..., n, 3) of curves from the point, and which are not the point."""
+    distance = np.sqrt(np.einsum("...ni,...ni->...n", r, r))
+    least = np.maximum(1e-9 * distance.max(axis=-1, initial=0.0, keepdims=True), SMALLEST)
+    return distance, distance > least
 
-    (c, 3, 3), rows r0, r1 and r2, fitted to the nearest contacts, and (c,). 0 where there are too few
-    of them to tell.
+
+def local_curves(curves: Curves) -> tuple[Array, Array]:
+    """r = r0 + r1 s + r2 s^2 of the curves of b touches, s along the tangent t; and the deviation of r0.
+
+    (b, c, 3, 3), rows r0, r1 and r2, fitted to the nearest contacts, and (b, c). 0 where there are too
+    few of them to tell.
     """
     distance = np.where(curves.present, np.abs(curves.along), np.inf)
-    order = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
-    near = np.take_along_axis(curves.present, order, axis=1)
-    r = near[..., None] * np.take_along_axis(curves.points, order[..., None], axis=1)
-    s = np.einsum("cni,ci->cn", r, curves.tangents)
-    count, longest = np.count_nonzero(near, axis=1), np.abs(s).max(axis=1)
+    order = np.argsort(distance, axis=-1, kind="stable")[..., :WINDOW]
+    near = np.take_along_axis(curves.present, order, axis=-1)
+    r = near[..., None] * np.take_along_axis(curves.points, order[..., None], axis=-2)
+    s = (r @ curves.tangents[..., None])[..., 0]
+    count, longest = np.count_nonzero(near, axis=-1), np.abs(s).max(axis=-1)
     told = (count > LEAST_CONTACTS) & (longest > 0.0)
-    powers = np.where(told, longest, 1.0)[:, None] ** np.arange(3)
-    basis = near[..., None] * (s / powers[:, 1:2])[..., None] ** np.arange(3)
-    inverse = np.linalg.pinv(basis)
-    solution = inverse @ r
-    variance = np.sum((r - basis @ solution) ** 2, axis=(1, 2)) / np.maximum(count - 3, 1)
-    stds = np.sqrt(variance * np.sum(inverse[:, 0] ** 2, axis=1))
+    powers = np.where(told, longest, 1.0)[..., None] ** np.arange(3)
+    basis = (near & told[..., None])[..., None] * (s / powers[..., 1:2])[..., None] ** np.arange(3)
+    gram = np.swapaxes(basis, -1, -2) @ basis + RIDGE * np.eye(3)
+    inverse = np.linalg.inv(gram)
+    solution = inverse @ (np.swapaxes(basis, -1, -2) @ r)
+    variance = np.sum((r - basis @ solution) ** 2, axis=(-2, -1)) / np.maximum(count - 3, 1)
+    stds = np.sqrt(variance * inverse[..., 0, 0])
     solution /= powers[..., None]
-    return np.where(told[:, None, None], solution, 0.0), np.where(told, stds, 0.0)
+    return np.where(told[..., None, None], solution, 0.0), np.where(told, stds, 0.0)
 
 
-def misses(curves: Curves) -> tuple[Array, Array]:
-    """The distances at which the c curves of one touch pass its reference point, and their deviations.
+def misses(curves: Curves) -> Array:
+    """The distances at which the curves of b touches pass the reference points, and their deviations.
 
-    (c,) each: the part of r0 across the tangent. 0 where there are too few contacts to tell.
+    (b, c, 2): the part of r0 across the tangent. 0 where there are too few contacts to tell.
     """
     local, stds = local_curves(curves)
-    return np.linalg.norm(cross(local[:, 0].T, curves.tangents.T), axis=0), stds
+    across = np.cross(local[..., 0, :], curves.tangents)
+    return np.stack([np.linalg.norm(across, axis=-1), stds], axis=-1)
 
 
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:

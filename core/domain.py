@@ -16,7 +16,7 @@ SAMPLES = 1024  # of the boundary; its radius is then good to 1e-5
 ALONG, ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Domain:
     """The part of the tangent plane a patch is meant for; star-shaped about the origin.
 
@@ -84,12 +84,18 @@ class Domain:
         """Whether each (x, y) lies inside or on the boundary; booleans of the shape of x and y."""
         return np.hypot(x, y) <= self._radius(np.arctan2(y, x)) * (1.0 + 1e-5)
 
+    def places(self, points: Array) -> Array:
+        """Points (n, 2) as points of the unit disk, at their azimuth and their share of the radius there."""
+        return points / self._radius(np.arctan2(points[:, 1], points[:, 0]))[:, None]
+
+    def points_at(self, places: Array) -> Array:
+        """The points (n, 2) that have these `places`."""
+        return places * self._radius(np.arctan2(places[:, 1], places[:, 0]))[:, None]
+
     def boundary(self, n: int) -> Array:
         """n points on the boundary, (n, 2), counterclockwise from azimuth 0 in equal turns."""
-        return self._at(2.0 * np.pi * np.arange(n) / n)
-
-    def _at(self, azimuth: Array) -> Array:
-        return self._radius(azimuth)[:, None] * np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+        azimuths = 2.0 * np.pi * np.arange(n) / n
+        return self.points_at(np.column_stack([np.cos(azimuths), np.sin(azimuths)]))
 
     @cached_property
     def area(self) -> float:

@@ -116,8 +116,9 @@ def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
     """Over a grid of waviness and noise, by -2 log likelihood there (b, 6, 5) and the waviness's prior."""
     likelihood = -0.5 * (surprise + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2)
     variances = prior_variances(WAVINESS)
-    weights = np.exp(likelihood - likelihood.max(axis=(1, 2), keepdims=True))
-    weights /= weights.sum(axis=(1, 2), keepdims=True)
+    with np.errstate(under="ignore"):  # what is that unlikely counts for nothing
+        weights = np.exp(likelihood - likelihood.max(axis=(1, 2), keepdims=True))
+        weights /= weights.sum(axis=(1, 2), keepdims=True)
     by_waviness = weights.sum(axis=2)
     return Hyperparameters(
         np.exp(by_waviness @ np.log(WAVINESS)),

@@ -7,9 +7,9 @@ by surface fitting: fit, go on where the fit explains the contacts, fit again.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,24 +18,25 @@ from .arguments import LARGEST, Array, finite_array, number
 from .bayes import MISFIT
 from .contour import UNEXPLAINED, Contour, SamplingPlane
 from .local_geometry import DegenerateCurvesError
-from .monge import monomials
-from .posterior import TERMS
 from .reconstruction import reconstruct
+from .residual_evidence import PLACES
 from .result import DOUBTFUL_STD, Reconstruction
 from .tracking import Surface, track
 
 CONTACTS = (12, 24, 48)  # of the longest half curve: the first that are enough
 NOTICEABLE = 0.15  # of the mean deviation of the height, that twice as many contacts take off
 LEAST = 4  # contacts of the shortest half curve
-FELT = 64  # contacts of a half curve as long as may be
-SEEDS = (16, 8, 4)  # of them, that a half curve may begin with
+FELT = 128  # contacts of a half curve as long as may be
+SEEDS = (32, 16, 8, 4)  # of them, that a half curve may begin with
+GROWN_STD = 0.6 * DOUBTFUL_STD  # at which growth ends: as long as possible is where it is underestimated
 GROWTH = 1.5  # of a half curve at once
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
 
 Counts = NDArray[np.intp]  # of the contacts of the c contours on either side of the point, (c, 2)
 
 
-class Exploration(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Exploration:
     """What was felt and found, and the length of the longest half curve and the step that it took."""
 
     contours: list[Contour]
@@ -47,7 +48,7 @@ class Exploration(NamedTuple):
 def explore(
     surface: Surface,
     point: ArrayLike,
-    normal: ArrayLike,
+    outward: ArrayLike,
     planes: Sequence[SamplingPlane],
     *,
     farthest: float,
@@ -72,13 +73,13 @@ def explore(
     """
     p = finite_array("point", point, (3,), LARGEST)
     length, spacing = _given("extent", extent), _given("step", step)
-    feel = partial(track, surface, p, normal, planes, noise=noise, rng=rng, tangent=tangent)
-    touched = partial(_touched, feel, p, normal, fit, spacing)
+    feel = partial(track, surface, p, outward, planes, noise=noise, rng=rng, tangent=tangent)
+    touched = partial(_touched, feel, p, outward, fit, spacing)
     if length is not None:
         return touched(length)
     farthest = number("farthest", farthest, above=0.0)
     between = max(spacing or 0.0, farthest / FELT)
-    counts, sure = _grown(feel(extent=farthest, step=between), p, normal, fit | {"method": "bayes"})
+    counts, sure = _grown(feel(extent=farthest, step=between), p, outward, fit | {"method": "bayes"})
     reaches = between * counts.astype(np.float64)
     found = touched(farthest, reaches)
     if sure and found.result.status != "ok" and found.result.method == "bayes":
@@ -89,7 +90,7 @@ def explore(
 def _touched(
     feel: Callable[..., list[Contour]],
     p: Array,
-    normal: ArrayLike,
+    outward: ArrayLike,
     fit: dict[str, Any],
     spacing: float | None,
     extent: float,
@@ -104,7 +105,7 @@ def _touched(
         if reaches is not None:  # a step longer than that, so that where they end shows
             counts = (reaches / step * (1.0 + 1e-6)).astype(np.intp)
             contours = [_shortened(*each, p) for each in zip(contours, counts, strict=True)]
-        return Exploration(contours, reconstruct(p, contours, outward=normal, **fit), length, step)
+        return Exploration(contours, reconstruct(p, contours, outward=outward, **fit), length, step)
 
     if spacing is not None:
         return at(spacing)
@@ -138,29 +139,28 @@ def _is_enough(r: Reconstruction) -> bool:
 
     They would tell nothing where that is less than a polynomial may be off.
     """
-    x, y, _ = r.curves.points[r.curves.present].T
-    basis = monomials(x, y, TERMS)
-    precision = np.linalg.inv(r.posterior.covariance) + basis.T @ basis / r.posterior.noise**2
-    (u, v), weights = r.domain.nodes[0].T / r.radius, r.domain.nodes[1]
-    over = monomials(u, v, TERMS)
-    stds = (
-        weights @ np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", over, covariance, over), 0.0))
-        for covariance in (r.posterior.covariance, np.linalg.inv(precision))
-    )
-    now, then = stds
+    surface, (points, weights) = r.uncertainty, r.domain.nodes
+    over, contacts = points / r.radius, r.contacts[:, :2] / r.radius
+    some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), PLACES)).astype(np.intp)]
+    shared = surface.height_covariance(some, over)
+    seen = surface.height_covariance(some, some)
+    np.einsum("ii->i", seen)[:] += surface.noise**2 * len(some) / len(contacts)  # a view
+    variance = surface.height_std(*over.T) ** 2
+    lost = np.einsum("in,in->n", shared, np.linalg.solve(seen, shared))
+    now, then = weights @ np.sqrt(variance), weights @ np.sqrt(np.maximum(variance - lost, 0.0))
     return bool(then >= (1.0 - NOTICEABLE) * now or now <= MISFIT)
 
 
-def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, Any]) -> tuple[Counts, bool]:
+def _grown(felt: Sequence[Contour], p: Array, outward: ArrayLike, fit: dict[str, Any]) -> tuple[Counts, bool]:
     """To how many contacts on either side of p the contours can be followed, and whether that is "ok"."""
     whole = np.array([_on_either_side(contour, p) for contour in felt])
-    counts, doubt, sure = _seed(felt, whole, p, normal, fit)
+    counts, doubt, sure = _seed(felt, whole, p, outward, fit)
     growing = (counts < whole) & (doubt <= 1.0)
     while growing.any():
         longer = np.minimum(np.ceil(GROWTH * counts).astype(np.intp), whole)
         trial = np.where(growing, longer, counts)
         try:
-            misfits, spread, still = _doubts(felt, trial, p, normal, fit)
+            misfits, spread, still = _doubts(felt, trial, p, outward, fit)
         except DegenerateCurvesError:
             break
         if misfits.max() > 1.0:  # the half curve that is explained worst ends here
@@ -174,7 +174,7 @@ def _grown(felt: Sequence[Contour], p: Array, normal: ArrayLike, fit: dict[str, 
 
 
 def _seed(
-    felt: Sequence[Contour], whole: Counts, p: Array, normal: ArrayLike, fit: dict[str, Any]
+    felt: Sequence[Contour], whole: Counts, p: Array, outward: ArrayLike, fit: dict[str, Any]
 ) -> tuple[Counts, float, bool]:
     """The longest of SEEDS that is in no doubt, or the one in the least.
 
@@ -185,7 +185,7 @@ def _seed(
     found, error = [], None
     for seed in SEEDS:
         try:
-            misfits, spread, sure = _doubts(felt, np.minimum(seed, whole), p, normal, fit)
+            misfits, spread, sure = _doubts(felt, np.minimum(seed, whole), p, outward, fit)
         except DegenerateCurvesError as why:
             error = why
             continue
@@ -199,23 +199,27 @@ def _seed(
 
 
 def _doubts(
-    felt: Sequence[Contour], counts: Counts, p: Array, normal: ArrayLike, fit: dict[str, Any]
+    felt: Sequence[Contour], counts: Counts, p: Array, outward: ArrayLike, fit: dict[str, Any]
 ) -> tuple[Array, float, bool]:
     """How far contacts are off the fit of so many, (c, 2), and its mean deviation: above 1 is too much.
 
     And whether its status is "ok".
     """
     few = [_shortened(*each, p, most=CONTACTS[0]) for each in zip(felt, counts, strict=True)]
-    r = reconstruct(p, few, outward=normal, **fit)
-    x, y, z = r.frame.to_local(np.vstack([contour.points for contour in felt])).T
-    squares = np.split((z - r.patch.height(x, y)) ** 2, np.cumsum([len(c.points) for c in felt])[:-1])
-    misfits = np.zeros(counts.shape)
-    for i, (contour, (before, after)) in enumerate(zip(felt, counts, strict=True)):
-        at = _on_either_side(contour, p)[0]
-        sides = squares[i][at - before : at], squares[i][at + 1 : at + after + 1]
-        misfits[i] = [np.sqrt(side.mean()) if len(side) else 0.0 for side in sides]
+    r = reconstruct(p, few, outward=outward, **fit)
+    sides = [side for each in zip(felt, counts, strict=True) for side in _sides(*each, p)]
+    x, y, z = r.frame.to_local(np.vstack(sides)).T
+    ends = np.cumsum([len(side) for side in sides])
+    squares = np.split((z - r.height(x, y)) ** 2, ends[:-1])
+    misfits = np.array([np.sqrt(side.mean()) if len(side) else 0.0 for side in squares]).reshape(counts.shape)
     limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
-    return misfits / limit, r.mean_height_std / (DOUBTFUL_STD * r.radius), r.status == "ok"
+    return misfits / limit, r.mean_height_std / (GROWN_STD * r.radius), r.status == "ok"
+
+
+def _sides(contour: Contour, counts: Counts, p: Array) -> tuple[Array, Array]:
+    """So many contacts of a tracked contour before p and after it, (2,): (n, 3) each."""
+    at, (before, after) = _on_either_side(contour, p)[0], counts.tolist()
+    return contour.points[at - before : at], contour.points[at + 1 : at + after + 1]
 
 
 def _on_either_side(contour: Contour, p: Array) -> tuple[int, int]:

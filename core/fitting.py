@@ -18,7 +18,7 @@ from .monge import MongePatch, derived_monomials, exponents, monomials
 GRID = 600  # points of (8) over the domain
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """(1) over n contacts: basis (n, m) @ coefficients (m,) ~ remainder (n,) above the quadric."""
 

@@ -22,7 +22,7 @@ class DegenerateCurvesError(ValueError):
     """The contours cannot carry the method; the message says what to move."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """A local frame: world = origin + axes @ local.
 

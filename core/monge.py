@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Monge patch z(x, y) of equation (1) in its Darboux frame, and its differential geometry."""
+"""Surfaces z(x, y) over their tangent plane, their differential geometry, and the one of equation (1)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,8 +45,9 @@ def derived_monomials(
     return derived
 
 
-class Derivatives(NamedTuple):
-    """Height and partial derivatives, all of the shape of x and y."""
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """Height and partial derivatives of a surface z(x, y), all of one shape (...), and its curvatures."""
 
     z: Array
     x: Array
@@ -56,15 +56,105 @@ class Derivatives(NamedTuple):
     xy: Array
     yy: Array
 
+    @property
+    def normal(self) -> Array:
+        """Unit normal on the side of +z, shape (..., 3)."""
+        n = np.stack([-self.x, -self.y, np.ones_like(self.x)], axis=-1)
+        return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
-@dataclass(frozen=True)
-class MongePatch:
+    @property
+    def first_form(self) -> tuple[Array, Array, Array]:
+        """E, F, G of the first fundamental form."""
+        return 1.0 + self.x**2, self.x * self.y, 1.0 + self.y**2
+
+    @property
+    def second_form(self) -> tuple[Array, Array, Array]:
+        """L, M, N of the second fundamental form, negative where the surface falls away below the normal."""
+        w = np.sqrt(1.0 + self.x**2 + self.y**2)
+        return self.xx / w, self.xy / w, self.yy / w
+
+    @property
+    def gaussian_curvature(self) -> Array:
+        """K = (LN - M^2) / (EG - F^2), in 1/length^2."""
+        return (self.xx * self.yy - self.xy**2) / (1.0 + self.x**2 + self.y**2) ** 2
+
+    @property
+    def mean_curvature(self) -> Array:
+        """H = (EN - 2FM + GL) / 2(EG - F^2), in 1/length."""
+        (e, f, g), (ll, mm, nn) = self.first_form, self.second_form
+        # EG - F^2 is E + G - 1, which does not cancel where it is steep.
+        return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e + g - 1.0))
+
+    @property
+    def principal_curvatures(self) -> tuple[Array, Array]:
+        """kappa1 <= kappa2, in 1/length."""
+        mean = self.mean_curvature
+        # H^2 - K is a square, (kappa1 - kappa2)^2 / 4; at umbilics rounding takes it below 0.
+        half = np.sqrt(np.maximum(mean**2 - self.gaussian_curvature, 0.0))
+        return mean - half, mean + half
+
+
+class HeightField:
+    """A surface z(x, y); all follows from its derivatives.
+
+    All methods take x and y of one shape (or that broadcast) and answer in that shape.
+    """
+
+    def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
+        """Height, slopes and second derivatives at (x, y)."""
+        raise NotImplementedError
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """z(x, y)."""
+        return self.derivatives(x, y).z
+
+    def normal(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Unit normal on the side of +z, shape (..., 3)."""
+        return self.derivatives(x, y).normal
+
+    def gaussian_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """K at (x, y), in 1/length^2."""
+        return self.derivatives(x, y).gaussian_curvature
+
+    def mean_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """H at (x, y), in 1/length."""
+        return self.derivatives(x, y).mean_curvature
+
+    def principal_curvatures(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """kappa1 <= kappa2 at (x, y), in 1/length."""
+        return self.derivatives(x, y).principal_curvatures
+
+    def closest_point(self, points: ArrayLike) -> Array:
+        """The foot on the surface of each local point, (n, 3) -> (n, 3).
+
+        Newton's method on the squared distance, all points at once, from the vertical projection;
+        a step that does not shorten the distance is halved.
+        """
+        q = np.asarray(points, dtype=float)
+        foot, damping = q[:, :2].copy(), np.ones(len(q))
+        nearest = np.abs(self.height(*foot.T) - q[:, 2])
+        close_enough = 1e-11 * np.abs(q).max(initial=0.0)
+        active = np.arange(len(q))
+        for _ in range(50):
+            step = damping[active, None] * _newton_step(self, foot[active], q[active])
+            trial = foot[active] + step
+            lifted = np.column_stack([trial, self.height(*trial.T)])
+            distance = np.linalg.norm(lifted - q[active], axis=1)
+            nearer = distance <= nearest[active]
+            foot[active[nearer]], nearest[active[nearer]] = trial[nearer], distance[nearer]
+            damping[active] = np.where(nearer, np.minimum(2.0 * damping[active], 1.0), 0.5 * damping[active])
+            active = active[np.abs(step).max(axis=1, initial=0.0) > close_enough]
+            if not len(active):
+                break
+        return np.column_stack([foot, self.height(*foot.T)])
+
+
+@dataclass(frozen=True, eq=False)
+class MongePatch(HeightField):
     """z = (k1 x^2 + k2 y^2) / 2 + sum a_ij x^i y^j, equation (1), in the local frame.
 
     k1, k2 : the principal curvatures at the origin, k1 <= k2, in 1/length
     coefficients : a30 a21 a12 a03 a40 a31 a22 a13 a04 ..., a_ij in length^(1 - i - j)
-
-    All methods take x and y of one shape (or that broadcast) and answer in that shape.
     """
 
     k1: float
@@ -100,76 +190,21 @@ class MongePatch:
         table = np.zeros((powers, powers))
         i, j = exponents(2, self.degree).T
         table[i, j] = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
-        derive = np.diag(np.arange(1.0, powers), 1)  # takes the a_i of x^i to those of its derivative
-        power = np.linalg.matrix_power
-        tables = [power(derive, dx) @ table @ power(derive.T, dy) for dx, dy in orders]
+        tables = [_derive(powers, dx) @ table @ _derive(powers, dy).T for dx, dy in orders]
         x_powers, y_powers = (np.vander(v.ravel(), powers, increasing=True) for v in (x_array, y_array))
         rows = (x_powers @ np.hstack(tables)).reshape(-1, len(orders), powers)
         return np.einsum("nmj,nj->mn", rows, y_powers).reshape(len(orders), *x_array.shape)
 
-    def normal(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Unit normal on the side of +z, shape (..., 3)."""
-        d = self.derivatives(x, y)
-        n = np.stack([-d.x, -d.y, np.ones_like(d.x)], axis=-1)
-        return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
-    def first_form(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array, Array]:
-        """E, F, G of the first fundamental form."""
-        d = self.derivatives(x, y)
-        return 1.0 + d.x**2, d.x * d.y, 1.0 + d.y**2
-
-    def second_form(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array, Array]:
-        """L, M, N of the second fundamental form, negative where the patch falls away below the normal."""
-        d = self.derivatives(x, y)
-        w = np.sqrt(1.0 + d.x**2 + d.y**2)
-        return d.xx / w, d.xy / w, d.yy / w
-
-    def gaussian_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """K = (LN - M^2) / (EG - F^2), in 1/length^2."""
-        d = self.derivatives(x, y)
-        return (d.xx * d.yy - d.xy**2) / (1.0 + d.x**2 + d.y**2) ** 2
-
-    def mean_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """H = (EN - 2FM + GL) / 2(EG - F^2), in 1/length."""
-        (e, f, g), (ll, mm, nn) = self.first_form(x, y), self.second_form(x, y)
-        # EG - F^2 is E + G - 1, which does not cancel where the patch is steep.
-        return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e + g - 1.0))
-
-    def principal_curvatures(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """kappa1 <= kappa2 at (x, y), in 1/length."""
-        mean = self.mean_curvature(x, y)
-        # H^2 - K is a square, (kappa1 - kappa2)^2 / 4; at umbilics rounding takes it below 0.
-        half = np.sqrt(np.maximum(mean**2 - self.gaussian_curvature(x, y), 0.0))
-        return mean - half, mean + half
-
-    def closest_point(self, points: ArrayLike) -> Array:
-        """The foot on the patch of each local point, (n, 3) -> (n, 3).
-
-        Newton's method on the squared distance, all points at once, from the vertical projection;
-        a step that does not shorten the distance is halved.
-        """
-        q = np.asarray(points, dtype=float)
-        foot, damping = q[:, :2].copy(), np.ones(len(q))
-        nearest = np.abs(self.height(*foot.T) - q[:, 2])
-        close_enough = 1e-11 * np.abs(q).max(initial=0.0)
-        active = np.arange(len(q))
-        for _ in range(50):
-            step = damping[active, None] * _newton_step(self, foot[active], q[active])
-            trial = foot[active] + step
-            lifted = np.column_stack([trial, self.height(*trial.T)])
-            distance = np.linalg.norm(lifted - q[active], axis=1)
-            nearer = distance <= nearest[active]
-            foot[active[nearer]], nearest[active[nearer]] = trial[nearer], distance[nearer]
-            damping[active] = np.where(nearer, np.minimum(2.0 * damping[active], 1.0), 0.5 * damping[active])
-            active = active[np.abs(step).max(axis=1, initial=0.0) > close_enough]
-            if not len(active):
-                break
-        return np.column_stack([foot, self.height(*foot.T)])
+@cache
+def _derive(powers: int, order: int) -> Array:
+    """(powers, powers): takes the a_i of x^i to those of its derivative of that order."""
+    return np.linalg.matrix_power(np.diag(np.arange(1.0, powers), 1), order)
 
 
-def _newton_step(patch: MongePatch, foot: Array, q: Array) -> Array:
+def _newton_step(surface: HeightField, foot: Array, q: Array) -> Array:
     """-H^-1 g of half the squared distance, (n, 2); where H is not positive, without its z'' part."""
-    d = patch.derivatives(*foot.T)
+    d = surface.derivatives(*foot.T)
     above = d.z - q[:, 2]
     gx, gy = foot[:, 0] - q[:, 0] + above * d.x, foot[:, 1] - q[:, 1] + above * d.y
     hxx, hxy, hyy = 1.0 + d.x**2 + above * d.xx, d.x * d.y + above * d.xy, 1.0 + d.y**2 + above * d.yy

@@ -7,42 +7,54 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import unit_vector
+from .arguments import Array, unit_vector
 from .contour import SamplingPlane
-from .monge import monomials
-from .posterior import TERMS
 from .result import Reconstruction
 
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))
-MOST = 50  # contacts of a contour: more tell of its seven terms no more than as many of less noise
+COARSE = 4  # of them between those that are tried first
+MOST = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
 
 
 def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
     """The plane that would lower the mean variance of the height over the domain most.
 
     Also the mean height_std that is expected after it, in the caller's unit. The plane holds the
-    normal and is measured from d1 about n of `r.frame`: track it with normal=r.frame.axes[:, 2],
+    normal and is measured from d1 about n of `r.frame`: track it with outward=r.frame.axes[:, 2],
     tangent=r.frame.axes[:, 0].
 
     The contour is taken to reach as far and to have as many contacts as those before, with their
     noise. What it will show follows from where it runs, not from the heights found there.
     """
-    (x, y), weights = r.domain.nodes[0].T, r.domain.nodes[1]
-    over = monomials(x / r.radius, y / r.radius, TERMS)
+    points, weights = r.domain.nodes
+    over = points / r.radius
+    tried = np.arange(0, len(AZIMUTHS), COARSE)
+    lost = _lost(r, over, AZIMUTHS[tried])
+    # Beside the best of them.
+    near = tried[np.argmax(lost @ weights)] + np.arange(1 - COARSE, COARSE)
+    near = near[near % COARSE > 0] % len(AZIMUTHS)
+    tried, lost = np.concatenate([tried, near]), np.vstack([lost, _lost(r, over, AZIMUTHS[near])])
+    best = int(np.argmax(lost @ weights))
+    variance = np.maximum((r.height_std(*points.T) / r.radius) ** 2 - lost[best], 0.0)
+    azimuth = float(AZIMUTHS[tried[best]])
+    return SamplingPlane(azimuth), r.radius * float(weights @ np.sqrt(variance))
+
+
+def _lost(r: Reconstruction, over: Array, azimuths: Array) -> Array:
+    """What contours at azimuths (k,) take off the variances at points (n, 2), (k, n); in unit radius.
+
+    A contour's heights have the covariance `seen`, and `shared` with those at the points, off whose variance
+    it takes the diagonal of shared' seen^-1 shared.
+    """
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
-    count = min(wanted, MOST)
-    along, noise_variance = np.linspace(-1.0, 1.0, count), r.posterior.noise**2 * count / wanted
-    u, v = np.outer(np.cos(AZIMUTHS), along), np.outer(np.sin(AZIMUTHS), along)
-    contours = monomials(u.ravel(), v.ravel(), TERMS).reshape(*u.shape, len(TERMS))
-    # A contour's heights have the covariance `seen`, and `shared` with the coefficients; it takes
-    # shared' seen^-1 shared off the coefficients' covariance.
-    shared = contours @ r.posterior.covariance
-    seen = shared @ np.swapaxes(contours, 1, 2) + noise_variance * np.eye(count)
-    taken = np.swapaxes(shared, 1, 2) @ np.linalg.solve(seen, shared)
-    best = int(np.argmax(np.einsum("kij,ij->k", taken, over.T @ (weights[:, None] * over))))
-    lost = np.einsum("ni,ij,nj->n", over, taken[best], over)
-    variance = np.maximum((r.height_std(x, y) / r.radius) ** 2 - lost, 0.0)
-    return SamplingPlane(float(AZIMUTHS[best])), r.radius * float(weights @ np.sqrt(variance))
+    count, surface = min(wanted, MOST), r.uncertainty
+    directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
+    contours = np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None]
+    shared = surface.height_covariance(contours, over)
+    seen = surface.height_covariance(contours, contours)
+    seen += surface.noise**2 * count / wanted * np.eye(count)
+    lost: Array = np.einsum("kin,kin->kn", shared, np.linalg.solve(seen, shared))
+    return lost
 
 
 def azimuth_of(direction: ArrayLike, normal: ArrayLike, tangent: ArrayLike | None = None) -> float:

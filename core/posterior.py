@@ -38,6 +38,8 @@ class Posterior(NamedTuple):
     noise: Array
     visibility: Array
 
+    __eq__, __hash__ = object.__eq__, object.__hash__  # type: ignore[misc]  # of arrays there are none
+
     def at(self, index: int | slice | NDArray[np.bool_]) -> "Posterior":
         """One of the stack, or several."""
         return Posterior(*(values[index] for values in self))
@@ -62,6 +64,14 @@ class Posterior(NamedTuple):
         basis = monomials(x, y, TERMS)
         return np.sqrt(np.maximum(np.einsum("ni,ni->n", basis @ self.covariance, basis), 0.0))
 
+    def height_covariance(self, p: Array, q: Array) -> Array:
+        """Of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
+        flat = (v.reshape(-1, 2) for v in (p, q))
+        at_p, at_q = (monomials(v[:, 0], v[:, 1], TERMS) for v in flat)
+        at_p, at_q = at_p.reshape(*p.shape[:-1], -1), at_q.reshape(*q.shape[:-1], -1)
+        covariance: Array = (at_p @ self.covariance) @ np.swapaxes(at_q, -1, -2)
+        return covariance
+
     def height(self, x: Array, y: Array) -> Array:
         """The mean height at n points, (n,)."""
         return monomials(x, y, TERMS) @ self.mean
@@ -82,8 +92,8 @@ class Posterior(NamedTuple):
                 return degree
         return DEGREE
 
-    def turn(self) -> float:
-        """The angle (radians) that the Darboux frame is off by at most, with a probability of CONFIDENCE.
+    def turn(self, confidence: float = CONFIDENCE) -> float:
+        """The angle (radians) that the Darboux frame is off by at most, with a probability of `confidence`.
 
         0 where with that probability the curvatures are ALIKE: then there are no directions.
         """
@@ -97,7 +107,7 @@ class Posterior(NamedTuple):
         difference, mixed = yy - xx + std * u, xy + shared * u + own * v
         angles = 0.5 * np.abs(np.arctan2(mixed, difference))
         angles[2.0 * np.hypot(difference, mixed) <= ALIKE] = 0.0
-        angle = float(np.sort(angles)[int(CONFIDENCE * len(angles))])
+        angle = float(np.sort(angles)[int(confidence * len(angles))])
         return math.hypot(angle, x, y, math.sqrt(c[0, 0] + c[1, 1])) if angle > 0.0 else 0.0
 
     def curvature_std(self) -> float:
@@ -140,7 +150,7 @@ def _turn(angle: Array) -> Array:
 @cache
 def _complex_terms() -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Coefficients of x^i y^j to those of z^i z'^j and back, (27, 27) each."""
-    x, y, _ = _nodes()
+    x, y, _ = nodes()
     z, (i, j) = (x + 1j * y)[:, None], TERMS.T
     complex_terms: NDArray[np.complex128] = z**i * z.conj() ** j
     to_complex = np.linalg.lstsq(complex_terms, monomials(x, y, TERMS).astype(complex), rcond=None)[0]
@@ -150,7 +160,7 @@ def _complex_terms() -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
 @cache
 def _truncation(degree: int) -> Array:
     """(m, 22): least squares over the disk of the terms of degree 3 to 6 by those to `degree`."""
-    x, y, weights = _nodes()
+    x, y, weights = nodes()
     basis = np.sqrt(weights)[:, None] * monomials(x, y, TERMS[FREE:])
     return np.linalg.lstsq(basis[:, : terms_to(degree) - FREE], basis, rcond=None)[0]
 
@@ -171,7 +181,7 @@ def _normal_points() -> Array:
 
 
 @cache
-def _nodes() -> tuple[Array, Array, Array]:
+def nodes() -> tuple[Array, Array, Array]:
     """x, y and weights (52,) that integrate products of two terms over the disk: Gauss by circles."""
     at, weights = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped-call]  # in r^2
     azimuths = 2.0 * np.pi * np.arange(13) / 13

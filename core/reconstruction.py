@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From contours to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,12 +13,16 @@ from .arguments import LARGEST, Array, finite_array, list_of, number, shown, uni
 from .bayes import joint_fit
 from .coefficients import PAPER_METHODS, SOLVERS, coefficients
 from .contour import Contour
-from .curves import Curves, curves_through, has_measured_normals, stacked
+from .curves import Curves, curves_through, has_measured_normals, misses, stacked
 from .domain import Domain, closed_spline_domain
+from .geometry import Geometry
 from .local_geometry import DegenerateCurvesError, Frame, darboux_frames, degeneracy, surface_normals
 from .monge import MongePatch
-from .posterior import Posterior
+from .posterior import DEGREE, Posterior
+from .residual import Residual
 from .result import Reconstruction
+from .rough_fit import rough_fit
+from .thinning import thinned
 
 METHODS = ("bayes", *PAPER_METHODS)
 DEFAULT_WEIGHT = 1000.0  # lambda L^2: the paper's 9.99/mm^2 at L = 10 mm
@@ -32,7 +37,7 @@ def reconstruct(
     outward: ArrayLike,
     method: str = "bayes",
     degree: int | str = 4,
-    sensor_std: float | None = None,
+    noise: float | None = None,
     weight: float | None = None,
     solver: str = "fast",
 ) -> Reconstruction:
@@ -42,7 +47,7 @@ def reconstruct(
     method : "bayes" (bayes.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)
     degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
-    sensor_std : accuracy of a contact; noise is taken for no less. None: the contours' own
+    noise : accuracy of a contact; noise is taken for no less. None: the contours' own
     weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000
     solver : of "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 
@@ -50,7 +55,7 @@ def reconstruct(
     method. A fit in doubt comes back with a status.
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
-    options = _options(method, degree, sensor_std, weight, solver)
+    options = _options(method, degree, noise, weight, solver)
     (result,) = _stack(p[None], [list_of("contours", contours, Contour)], up[None], options)
     if isinstance(result, DegenerateCurvesError):
         raise result
@@ -64,7 +69,7 @@ def reconstruct_many(
     outward: ArrayLike,
     method: str = "bayes",
     degree: int | str = 4,
-    sensor_std: float | None = None,
+    noise: float | None = None,
     weight: float | None = None,
     solver: str = "fast",
 ) -> list[Reconstruction | DegenerateCurvesError]:
@@ -84,7 +89,7 @@ def reconstruct_many(
         raise ValueError(f"contours_list: wanted {len(p)} lists of contours, got {len(touches)}")
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
-    options = _options(method, degree, sensor_std, weight, solver)
+    options = _options(method, degree, noise, weight, solver)
     # Touches of like size together: a stack has room for its longest contour in all places.
     sizes = [len(c) * max((len(contour.points) for contour in c), default=0) for c in touches]
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
@@ -102,7 +107,7 @@ def reconstruct_many(
 class _Options(NamedTuple):
     method: str
     degree: int | None  # None for "auto"
-    sensor_std: float | None  # None for the contours' own
+    noise: float | None  # None for the contours' own
     weight: float
     solver: str
 
@@ -113,15 +118,17 @@ class _Touch(NamedTuple):
     frame: Frame
     radius: float
     curves: Curves
+    misses: Array  # by each curve, (c, 2)
     k1: float
     k2: float
     accuracy: float
     degree: int
     posterior: Posterior | None  # of the joint fit, where that makes the patch
+    residual: Residual | None  # beside it, where the contacts ask for one
 
 
 def _options(
-    method: str, degree: int | str, sensor_std: float | None, weight: float | None, solver: str
+    method: str, degree: int | str, noise: float | None, weight: float | None, solver: str
 ) -> _Options:
     for name, value, choices in (("method", method, METHODS), ("solver", solver, SOLVERS)):
         if not isinstance(value, str) or value not in choices:
@@ -131,7 +138,7 @@ def _options(
     return _Options(
         method,
         None if isinstance(degree, str) else int(degree),
-        None if sensor_std is None else number("sensor_std", sensor_std, least=0.0),
+        None if noise is None else number("noise", noise, least=0.0),
         DEFAULT_WEIGHT if weight is None else number("weight", weight, above=0.0),
         solver,
     )
@@ -141,6 +148,9 @@ def _stack(
     points: Array, touches: Sequence[Sequence[Contour]], outward: Array, options: _Options
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """Results of touches, whose arguments are in order."""
+    thin = [[thinned(contour, point) for contour in c] for point, c in zip(points, touches, strict=True)]
+    touches = [[contour for contour, _ in c] for c in thin]
+    sizes = np.array([min((size for _, size in c), default=1) for c in thin])
     curves = curves_through(*stacked(points, touches))
     normals = surface_normals(curves.tangents, outward)
     each = zip(touches, curves.present, curves.tangents, normals, strict=True)
@@ -150,12 +160,17 @@ def _stack(
         for touch, gap, size in zip(each, apart, reach, strict=True)
     ]
     good = [i for i, error in enumerate(errors) if error is None]
-    std = options.sensor_std
-    stds = [max(c.noise or 0.0 for c in touches[i]) if std is None else std for i in good]
+    std = options.noise
+    stds = [
+        max(c.noise or 0.0 for c in touches[i]) if std is None else std / math.sqrt(sizes[i]) for i in good
+    ]
     found = iter(
         _framed(points[good], curves.at(good), normals[good], np.array(stds), options) if good else ()
     )
-    return [error or _result(next(found), options) for error in errors]
+    return [
+        error or _result(next(found), contours, options)
+        for error, contours in zip(errors, touches, strict=True)
+    ]
 
 
 def _coarse(gap: float, size: float) -> DegenerateCurvesError:
@@ -170,9 +185,10 @@ def _framed(points: Array, curves: Curves, normals: Array, stds: Array, options:
     axes, k1, k2, radii = darboux_frames(curves, normals)
     local, tangents = curves.points @ axes[:, None] / radii[:, None, None, None], curves.tangents @ axes
     count, posteriors = len(points), None
+    beside: list[Residual | None] = [None] * count
     degrees = [options.degree or 0] * count
     if options.method == "bayes" or options.degree is None:
-        turns, fitted = _joint(curves, local, axes, k1, k2, tangents[:, 0], stds / radii)
+        turns, fitted, weights = _joint(curves, local, axes, k1, k2, tangents[:, 0], stds / radii)
         if options.degree is None:
             turned = local @ turns[:, None]
             degrees = [fitted.at(i).degree_shown(turned[i][curves.present[i]]) for i in range(count)]
@@ -180,18 +196,34 @@ def _framed(points: Array, curves: Curves, normals: Array, stds: Array, options:
             axes, local, tangents = axes @ turns, local @ turns[:, None], tangents @ turns
             farthest = np.hypot(local[..., 0], local[..., 1]).max(axis=(1, 2))
             radii, local = radii * farthest, local / farthest[:, None, None, None]
-            posteriors = fitted.scaled(1.0 / farthest)
-    curves = Curves(local, curves.present, curves.along, tangents, curves.curvatures)
+            contacts = local.reshape(count, -1, 3)
+            turns, farthest, posteriors, beside = rough_fit(
+                contacts,
+                weights,
+                fitted.scaled(1.0 / farthest),
+                stds / radii,
+                tangents[:, 0],
+                _normals(curves, axes, contacts),
+            )
+            if any(residual is not None for residual in beside):
+                axes, local, tangents = axes @ turns, local @ turns[:, None], tangents @ turns
+                radii, local = radii * farthest, local / farthest[:, None, None, None]
+    along = curves.along / radii[:, None, None]
+    curvatures = radii[:, None, None] * (curves.curvatures @ axes)
+    curves = Curves(local, curves.present, along, tangents, curvatures)
+    missed = misses(curves)
     return [
         _Touch(
             Frame(points[i], axes[i]),
             float(radii[i]),
             curves.at(i),
+            missed[i],
             float(k1[i]),
             float(k2[i]),
             float(stds[i] / radii[i]),
             degrees[i],
             posteriors and posteriors.at(i),
+            beside[i],
         )
         for i in range(count)
     ]
@@ -199,16 +231,32 @@ def _framed(points: Array, curves: Curves, normals: Array, stds: Array, options:
 
 def _joint(
     curves: Curves, local: Array, axes: Array, k1: Array, k2: Array, tangent: Array, accuracy: Array
-) -> tuple[Array, Posterior]:
+) -> tuple[Array, Posterior, Array]:
     """The joint fit of all the contacts of each touch."""
     contacts, present = local.reshape(len(local), -1, 3), curves.present.reshape(len(local), -1)
-    normals = curves.normals
-    if normals is not None:
-        normals = (normals @ axes[:, None]).reshape(contacts.shape)
-    return joint_fit(contacts, present.astype(float), k1, k2, tangent, accuracy, normals)
+    normals = _normals(curves, axes, contacts)
+    most = present.sum(axis=1).max()
+    if most == present.shape[1]:
+        return joint_fit(contacts, present.astype(float), k1, k2, tangent, accuracy, normals)
+    # Short curves beside a long one are filled up with what costs time.
+    kept = np.argsort(~present, axis=1, kind="stable")[:, :most]
+    rows = np.arange(len(kept))[:, None]
+    few, some = contacts[rows, kept], present[rows, kept].astype(float)
+    normals = None if normals is None else normals[rows, kept]
+    turns, posteriors, found = joint_fit(few, some, k1, k2, tangent, accuracy, normals)
+    weights = np.zeros(present.shape)
+    weights[rows, kept] = found
+    return turns, posteriors, weights
 
 
-def _result(touch: _Touch, options: _Options) -> Reconstruction | DegenerateCurvesError:
+def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
+    """The measured normals in these axes, in the shape of the contacts."""
+    return None if curves.normals is None else (curves.normals @ axes[:, None]).reshape(contacts.shape)
+
+
+def _result(
+    touch: _Touch, contours: Sequence[Contour], options: _Options
+) -> Reconstruction | DegenerateCurvesError:
     try:
         domain = _domain(touch.curves)
     except ValueError:
@@ -223,12 +271,14 @@ def _result(touch: _Touch, options: _Options) -> Reconstruction | DegenerateCurv
         patch = MongePatch(touch.k1, touch.k2, a)
     else:
         patch = touch.posterior.patch(touch.degree)
+    scale = touch.radius
+    surface = patch if touch.posterior is None else touch.posterior.patch(DEGREE)
+    domain = Domain(domain.ends * scale)
     return Reconstruction(
-        frame=touch.frame,
-        radius=touch.radius,
-        patch=patch.scaled(touch.radius),
-        domain=Domain(domain.ends * touch.radius),
-        curves=touch.curves,
+        Geometry(touch.frame, scale, surface.scaled(scale), domain, touch.residual),
+        patch.scaled(scale),
+        tuple(contours),
+        scale * touch.misses[: len(contours)],
         accuracy=touch.accuracy,
         method=options.method,
         converged=converged,

@@ -38,7 +38,7 @@ SIGNIFICANT = 3.0  # standard deviations
 LEAST_RESIDUAL = 1e-3  # less is none: the mesh's own facets
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pose:
     """Contacts placed on a mesh: a contact p is at rotation @ p + translation.
 
@@ -59,7 +59,6 @@ class Pose:
 def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: int = 5) -> list[Pose]:
     """The poses that bring a touch's contacts nearest to a mesh, the best first; `best` of them at most.
 
-    r : a Reconstruction, or what else has its frame, radius, patch and contacts
     vertices : (n, 3), in the contacts' unit; faces : (m, 3), indices, counterclockwise from outside
 
     Raises ValueError for bad arguments, and for a mesh that is smaller or very much larger than the patch.
@@ -68,7 +67,7 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
         raise ValueError(f"best: wanted a whole number of 1 or more, got {shown(best)}")
     co = finite_array("vertices", vertices, (None, 3), LARGEST)
     corners = corners_of(faces, len(co))
-    touch = np.array([r.contacts / r.radius, r.patch.normal(*r.contacts[:, :2].T)])
+    touch = np.array([r.contacts / r.radius, r.geometry.normal(*r.contacts[:, :2].T)])
     centre = 0.5 * (co[corners].min(axis=(0, 1)) + co[corners].max(axis=(0, 1)))
     mesh = mesh_of((co - centre) / r.radius, corners, math.dist(touch[0].min(axis=0), touch[0].max(axis=0)))
     places, residuals, slides = _descended(_coarse(touch, mesh), touch, mesh, NEAREST, FINE_STEPS)

@@ -3,8 +3,7 @@
 """A patch with its frame, and everything one may ask of it."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,82 +12,149 @@ from numpy.typing import ArrayLike, NDArray
 from . import fitting
 from .arguments import Array
 from .bayes import posterior_of
-from .curves import Curves, misses
+from .contour import Contour
+from .curves import besides_point
 from .domain import Domain
+from .geometry import Geometry, fit_error, similarity, total_absolute_curvature
 from .local_geometry import Frame
 from .monge import MongePatch, exponents, monomials
-from .posterior import TERMS, Posterior, coefficients_of, terms_to
-from .triangulation import patch_mesh
-from .verification import fit_error, total_absolute_curvature
+from .posterior import FREE, Posterior, terms_to
+from .residual import Residual
 
 DOUBTFUL_STD = 0.02  # of the radius, in the mean over the domain
 DOUBTFUL_CONDITION = 1e3  # of plain least squares: noise comes out this many times larger
 DOUBTFUL_TURN = math.radians(10.0)  # of the frame
+LIKELY = 0.5  # that it is off by less, of a rough surface: its directions are others at each scale
 DOUBTFUL_CURVATURE = 0.1  # of 1 / radius; as well is it known along a curve that ends at a quarter of it
 DOUBTFUL_MISS = 0.005  # of the radius, by which a curve misses the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # of a contact's accuracy: few contacts may happen to scatter less
-MESH_SHARE = 0.5  # of mean_height_std, that the mesh is off the patch at most
+MESH_SHARE = 0.6  # of mean_height_std, that the mesh is off the patch at most
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """A patch around a reference point, lengths in the caller's unit.
+    """A patch around a reference point, what it was fitted to and what was found; in the caller's unit.
 
-    frame : the Darboux frame
-    radius : L, the largest distance of a contact from the point in the tangent plane
-    patch, domain : the surface (1) and the part of the tangent plane it is meant for
-    curves : what was fitted, in the frame and in units of L
+    geometry : the surface that was found: of "bayes" the posterior's mean, else `patch`
+    patch : equation (1) of the degree asked for, in the frame
+    contours : what was fitted, in the world
+    misses : at which distance each of the c curves passes the reference point, and its deviation, (c, 2)
     accuracy : standard deviation of a contact, at least, in units of L
     method : of the fit
     converged : whether its solver did
     joint_posterior : what "bayes" has found
+    known_height_std : mean_height_std, where it is known already
 
     All else follows from these, once it is asked for.
     """
 
-    frame: Frame
-    radius: float
+    geometry: Geometry
     patch: MongePatch
-    domain: Domain
-    curves: Curves
+    contours: tuple[Contour, ...]
+    misses: Array
     accuracy: float
     method: str
     converged: bool = True
     joint_posterior: Posterior | None = None
+    known_height_std: float | None = None
+
+    @property
+    def frame(self) -> Frame:
+        """The Darboux frame."""
+        return self.geometry.frame
+
+    @property
+    def radius(self) -> float:
+        """L, the largest distance of a contact from the point in the tangent plane."""
+        return self.geometry.radius
+
+    @property
+    def domain(self) -> Domain:
+        """The part of the tangent plane that the patch is meant for."""
+        return self.geometry.domain
+
+    @property
+    def residual(self) -> Residual | None:
+        """What the surface is beside its polynomial, where the contacts ask for more."""
+        return self.geometry.residual
 
     @cached_property
     def contacts(self) -> Array:
-        """What was fitted, (n, 3), in the frame."""
-        return self.radius * self.curves.points[self.curves.present]
+        """What was fitted besides the reference point, (n, 3), in the frame."""
+        curves = [contour.points - self.frame.origin for contour in self.contours]
+        return np.vstack([r[besides_point(r)[1]] for r in curves]) @ self.frame.axes
 
     @cached_property
     def posterior(self) -> Posterior:
         """What the contacts leave open, in the frame and in units of L."""
         if self.joint_posterior is not None:
             return self.joint_posterior
-        contacts = self.curves.points[self.curves.present]
-        return posterior_of(self.patch.k1 * self.radius, self.patch.k2 * self.radius, contacts, self.accuracy)
+        k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
+        return posterior_of(k1, k2, self.contacts / self.radius, self.accuracy)
+
+    @property
+    def uncertainty(self) -> Residual | Posterior:
+        """What knows the covariances of the heights, in the frame and in units of L."""
+        return self.posterior if self.residual is None else self.residual
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The height of the surface at local (x, y), in their shape.
+
+        Of "bayes" it is the posterior's mean, a sextic and the residual, whatever the patch's degree; of the
+        paper's methods that of the patch.
+        """
+        return self.geometry.height(x, y)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
-        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        u, v = x_array.ravel() / self.radius, y_array.ravel() / self.radius
-        # A patch of lower degree, or by another method, departs from the posterior's mean as well.
-        off = self.posterior.height(u, v) - self.patch.height(x_array, y_array).ravel() / self.radius
-        return (self.radius * np.hypot(self.posterior.height_std(u, v), off)).reshape(x_array.shape)
+        u, v = self.geometry.in_unit_radius(x, y)
+        std = self.uncertainty.height_std(u, v)
+        if self.joint_posterior is None:  # a patch by another method departs from the posterior's mean too
+            off = self.posterior.height(u, v) - np.ravel(self.height(x, y)) / self.radius
+            std = np.hypot(std, off)
+        return self.radius * std.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
 
     @cached_property
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
-        return mean_height_stds([self])[0]
+        if self.known_height_std is not None:
+            return self.known_height_std
+        (x, y), weights = self.domain.nodes[0].T, self.domain.nodes[1]
+        return float(weights @ self.height_std(x, y))
 
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
-        As fine as what is known of it: off it by half of mean_height_std at most.
+        As fine as what is known of it: off it by 0.6 of mean_height_std at most.
         """
-        return patch_mesh(self.patch, self.domain, MESH_SHARE * self.mean_height_std)
+        return self.geometry.mesh(MESH_SHARE * self.mean_height_std)
+
+    @property
+    def k1_std(self) -> float:
+        """Standard deviation of the principal curvature k1, in 1/length."""
+        return 2.0 * math.sqrt(self.posterior.covariance[2, 2]) / self.radius
+
+    @property
+    def k2_std(self) -> float:
+        """Standard deviation of the principal curvature k2, in 1/length."""
+        return 2.0 * math.sqrt(self.posterior.covariance[4, 4]) / self.radius
+
+    @property
+    def mean_curvature_std(self) -> float:
+        """Standard deviation of H at the point, in 1/length."""
+        c = self.posterior.covariance
+        return math.sqrt(c[2, 2] + 2.0 * c[2, 4] + c[4, 4]) / self.radius
+
+    @property
+    def gaussian_curvature_std(self) -> float:
+        """Standard deviation of K at the point, in 1/length^2; of normally distributed k1 and k2."""
+        c, k = (
+            4.0 * self.posterior.covariance[2:FREE:2, 2:FREE:2],
+            self.radius * np.array([self.patch.k2, self.patch.k1]),
+        )
+        variance = k @ c @ k + c[0, 0] * c[1, 1] + c[0, 1] ** 2
+        return math.sqrt(variance) / self.radius**2
 
     @cached_property
     def blind(self) -> int:
@@ -103,7 +169,7 @@ class Reconstruction:
     @cached_property
     def fit_error(self) -> float:
         """(6), the mean of |dz| over the contacts."""
-        return fit_error(self.patch, self.contacts)
+        return fit_error(self.geometry, self.contacts)
 
     @cached_property
     def total_absolute_curvature(self) -> float:
@@ -115,6 +181,36 @@ class Reconstruction:
         """Of the least-squares system of the coefficients, in unit radius."""
         x, y, _ = self.contacts.T / self.radius
         return fitting.condition_number(monomials(x, y, exponents(3, self.patch.degree)))
+
+    def moved(self, matrix: ArrayLike) -> "Reconstruction":
+        """The same after a similarity of the world, (4, 4): rotation, one scale above 0 and shift.
+
+        Raises ValueError for any other matrix.
+        """
+        scale, turn, _ = similarity(matrix)
+        geometry = self.geometry.moved(matrix)
+        # From the reference point, which so stays a point of its curves whatever its coordinates.
+        start, end = self.frame.origin, geometry.frame.origin
+
+        def placed(contour: Contour) -> Contour:
+            """The contour after the similarity, normals and noise included."""
+            plane, normals, noise = contour.plane_normal, contour.normals, contour.noise
+            return replace(
+                contour,
+                points=end + scale * (contour.points - start) @ turn.T,
+                plane_normal=None if plane is None else turn @ plane,
+                normals=None if normals is None else normals @ turn.T,
+                noise=None if noise is None else scale * noise,
+            )
+
+        return replace(
+            self,
+            geometry=geometry,
+            patch=self.patch.scaled(scale),
+            contours=tuple(map(placed, self.contours)),
+            misses=scale * self.misses,
+            known_height_std=None,
+        )
 
     @property
     def status(self) -> str:
@@ -157,7 +253,7 @@ class Reconstruction:
 
     @property
     def _doubt_about_frame(self) -> tuple[str, str] | None:
-        distances, stds = misses(self.curves)
+        distances, stds = self.misses.T / self.radius
         stds = np.maximum(stds, LEAST_SCATTER * self.accuracy)
         apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))
         if len(apart):
@@ -165,7 +261,7 @@ class Reconstruction:
                 f"Curve {apart[0] + 1} passes the reference point at {self.radius * distances[apart[0]]:.3g}"
                 ", more than its scatter explains: set the point where the curves meet."
             )
-        turn = self.posterior.turn()
+        turn = self.posterior.turn() if self.residual is None else self.posterior.turn(LIKELY)
         if turn > DOUBTFUL_TURN:
             return "uncertain", (
                 f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
@@ -178,24 +274,3 @@ class Reconstruction:
                 "extent, or add sampling planes."
             )
         return None
-
-
-def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
-    """mean_height_std of each, which keeps it: of many at once it is some times as fast as one by one."""
-    nodes = [r.domain.nodes for r in results]
-    most = max((len(weights) for _, weights in nodes), default=0)
-    points, weights = np.zeros((len(results), most, 2)), np.zeros((len(results), most))
-    for i, (r, (at, weight)) in enumerate(zip(results, nodes, strict=True)):
-        points[i, : len(at)], weights[i, : len(at)] = at / r.radius, weight
-    covariance = np.array([r.posterior.covariance for r in results]).reshape(-1, len(TERMS), len(TERMS))
-    # A patch of lower degree than the posterior departs from its mean as well.
-    off = np.array([r.posterior.mean - coefficients_of(r.patch.scaled(1.0 / r.radius)) for r in results])
-    off = off.reshape(-1, len(TERMS))
-    x, y = points.reshape(-1, 2).T
-    basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
-    variance = np.einsum("bni,bni->bn", basis @ covariance, basis) + (basis @ off[..., None])[..., 0] ** 2
-    means = np.einsum("bn,bn->b", weights, np.sqrt(np.maximum(variance, 0.0)))
-    stds = [r.radius * float(mean) for r, mean in zip(results, means, strict=True)]
-    for r, std in zip(results, stds, strict=True):
-        vars(r)["mean_height_std"] = std
-    return stds

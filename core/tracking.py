@@ -48,7 +48,7 @@ _Cast = Callable[[complex, complex, float], _Contact | None]  # start, direction
 def track(
     surface: Surface,
     point: ArrayLike,
-    normal: ArrayLike,
+    outward: ArrayLike,
     planes: Sequence[SamplingPlane],
     *,
     extent: float,
@@ -59,7 +59,7 @@ def track(
 ) -> list[Contour]:
     """Slides a finger over `surface` both ways from `point`, once in each plane.
 
-    point, normal : (3,), the reference point and the outward normal; a sheet can be touched from either side
+    point, outward : (3,), the reference point and the outward normal; a sheet can be touched from either side
     planes : azimuths measured from `tangent`, see SamplingPlane.axes
     extent, step : lengths along the curve, of each half and between contacts
     noise : standard deviation of the sensor, in the plane along the curve's normal; drawn from `rng`
@@ -68,7 +68,7 @@ def track(
     Raises ValueError for bad numbers, and where there is no surface at the point.
     """
     p = finite_array("point", point, (3,), LARGEST)
-    n = vector_of(unit_vector("normal", normal))
+    n = vector_of(unit_vector("outward", outward))
     planes = list_of("planes", planes, SamplingPlane)
     step = number("step", step, above=0.0)
     extent = number("extent", extent, above=0.0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .arguments import Array
 from .domain import Domain
-from .monge import MongePatch
+from .monge import HeightField
 
 CHORD = 4.6  # over the curvature, tolerance in a square of sides as wanted: 8, were all equilateral
 COARSEST, FINEST = 0.25, 0.02  # of the mean radius, between neighbours: colours are drawn by them too
@@ -31,7 +31,7 @@ UNEQUAL = 1e-6  # that no four points lie on a circle, where any diagonal would 
 Size = Callable[[Array], Array]
 
 
-def patch_mesh(patch: MongePatch, domain: Domain, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
+def patch_mesh(surface: HeightField, domain: Domain, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
     """Points (n, 3) on the patch over its domain, and counterclockwise triangles (m, 3).
 
     As many as it takes to be off the patch by the tolerance at most, as long as that asks for no less
@@ -42,11 +42,11 @@ def patch_mesh(patch: MongePatch, domain: Domain, tolerance: float) -> tuple[Arr
     def size(points: Array) -> Array:
         """The distance of neighbours that the second derivatives allow, (n,)."""
         flattest = CHORD * tolerance / (COARSEST * mean_radius) ** 2
-        wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(patch, points), flattest))
+        wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(surface, points), flattest))
         return np.maximum(wanted, FINEST * mean_radius)
 
     plane, triangles = triangulate(domain, size, VISIBLE * mean_radius)
-    return np.column_stack([plane, patch.height(*plane.T)]), triangles
+    return np.column_stack([plane, surface.height(*plane.T)]), triangles
 
 
 def triangulate(domain: Domain, size: Size, off: float) -> tuple[Array, NDArray[np.intp]]:
@@ -62,9 +62,9 @@ def triangulate(domain: Domain, size: Size, off: float) -> tuple[Array, NDArray[
     return _smoothed(points, triangles, len(inner)), triangles
 
 
-def _bend(patch: MongePatch, points: Array) -> Array:
+def _bend(surface: HeightField, points: Array) -> Array:
     """8 times the chord error of an equilateral triangle of side 1 at most, (n,), by second derivatives."""
-    d = patch.derivatives(*points.T)
+    d = surface.derivatives(*points.T)
     mean, half = 0.5 * np.abs(d.xx + d.yy), np.hypot(0.5 * (d.xx - d.yy), d.xy)
     return mean + half + np.maximum(mean - half, 0.0) / 3.0
 

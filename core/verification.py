@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a patch is from contacts and from a mesh (paper, equation (6) and section V)."""
-
-from __future__ import annotations
+"""How far a patch is from its contacts and from a mesh (paper, section V)."""
 
 import heapq
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,12 +12,9 @@ from .arguments import Array, finite_array
 from .contour import SamplingPlane, Vector
 from .domain import Domain
 from .fitting import GRID
-from .local_geometry import Frame
-from .monge import MongePatch
+from .geometry import Geometry, distances, fit_error, overlapped
+from .result import Reconstruction
 from .tracking import Surface, track
-
-if TYPE_CHECKING:
-    from .result import Reconstruction
 
 EXTRA = 9  # contours, as in the paper's Fig. 3
 STEPS = 12  # of such a contour in a radius
@@ -28,49 +22,14 @@ REACHES = (0.01, 0.1, 1.0)  # of the radius, in which the mesh is looked for at 
 HAIR = 1e-3  # of a reach: a layer nearer than this is the vertex's own
 
 
-def fit_error(patch: MongePatch, points: ArrayLike) -> float:
-    """Equation (6): the mean of |z(x_k, y_k) - z_k| over local points (n, 3), in their length."""
-    x, y, z = np.asarray(points, dtype=float).T
-    return float(np.mean(np.abs(patch.height(x, y) - z)))
-
-
-def distances(patch: MongePatch, points: ArrayLike) -> Array:
-    """Euclidean distances (n,) of local points (n, 3) to the patch."""
-    local = finite_array("points", points, (None, 3))
-    return np.linalg.norm(patch.closest_point(local) - local, axis=1)
-
-
-def total_absolute_curvature(patch: MongePatch, domain: Domain) -> float:
-    """(8), the integral of |K| over the patch."""
-    points, h = domain.grid(GRID)
-    d = patch.derivatives(*points.T)
-    w = 1.0 + d.x**2 + d.y**2
-    return h**2 * float(np.sum(np.abs(d.xx * d.yy - d.xy**2) * w**-1.5))
-
-
-def overlapped(
-    frame: Frame, domain: Domain, radius: float, vertices: ArrayLike, normals: ArrayLike
-) -> NDArray[np.intp]:
-    """Which of the world vertices (n, 3) lie over the domain: indices (m,).
-
-    A closed object has another side above the same domain: a vertex counts only where its normal
-    faces the patch's and it is within the radius of the tangent plane. Whether another layer of the
-    object hides it from a finger, `reachable` tells.
-    """
-    local = frame.to_local(vertices)
-    near = np.flatnonzero((np.abs(local) <= 2.0 * radius).all(axis=1) & (np.abs(local[:, 2]) <= radius))
-    facing = near[np.asarray(normals, dtype=float)[near] @ frame.axes[:, 2] > 0.0]
-    return facing[domain.contains(local[facing, 0], local[facing, 1])]
-
-
 def reachable(
-    r: Reconstruction, surface: Surface, vertices: ArrayLike, normals: ArrayLike
+    geometry: Geometry, surface: Surface, vertices: ArrayLike, normals: ArrayLike
 ) -> NDArray[np.intp]:
     """Those of the overlapped world vertices (n, 3) of `surface` that nothing hides from above: indices."""
     points = np.asarray(vertices, dtype=float)
-    over = overlapped(r.frame, r.domain, r.radius, points, normals)
-    up = _vector(r.frame.axes[:, 2])
-    seen = [not is_hidden(surface, _vector(point), up, 2.0 * r.radius) for point in points[over]]
+    over = overlapped(geometry, points, normals)
+    up = _vector(geometry.frame.axes[:, 2])
+    seen = [not is_hidden(surface, _vector(point), up, 2.0 * geometry.radius) for point in points[over]]
     return over[np.array(seen, dtype=bool)]
 
 
@@ -79,7 +38,6 @@ def verify(
 ) -> dict[str, float]:
     """All that tells how good a patch is, as plain numbers, lengths in the caller's unit.
 
-    r : a Reconstruction, or what else has its frame, radius, patch, domain and contacts, such as one moved
     vertices : (n, 3), in the world, of the mesh, those that are `reachable`
     extra : how many contours are tracked on the surface between those that were fitted
 
@@ -98,16 +56,16 @@ def verify(
     contours = _extra_contours(r, surface, extra)
     points = np.concatenate([np.empty((0, 3)), *contours])
     found = {
-        **_spread("contact", distances(r.patch, r.contacts)),
-        **_spread("vertex", distances(r.patch, local)),
-        "fit_error": fit_error(r.patch, r.contacts),
+        **_spread("contact", distances(r.geometry, r.contacts)),
+        **_spread("vertex", distances(r.geometry, local)),
+        "fit_error": r.fit_error,
         "extra_contours": sum(len(contour) > 0 for contour in contours),
         "extra_points": len(points),
-        "total_absolute_curvature": total_absolute_curvature(r.patch, r.domain),
+        "total_absolute_curvature": r.total_absolute_curvature,
         "overlap": _overlap(r, surface),
     }
     if len(points):
-        found["extra_fit_error"] = fit_error(r.patch, points)
+        found["extra_fit_error"] = fit_error(r.geometry, points)
     return {"contacts": len(r.contacts), "vertices": len(local)} | found
 
 
@@ -160,7 +118,7 @@ def _start(r: Reconstruction, surface: Surface) -> Vector | None:
 def _overlap(r: Reconstruction, surface: Surface) -> float:
     """See `verify`: rays from above onto a grid over the domain."""
     points, _ = r.domain.grid(GRID)
-    d = r.patch.derivatives(*points.T)
+    d = r.geometry.derivatives(*points.T)
     area = np.sqrt(1.0 + d.x**2 + d.y**2)
     below = [_below(r, surface, (x, y, r.radius), 2.0 * r.radius) is not None for x, y in points.tolist()]
     return float(area[below].sum() / area.sum())

@@ -4,6 +4,7 @@
 
 import argparse
 import csv
+import io
 import json
 import math
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import bpy
 
-from . import contact_file, map_object, measured, mesh_file, patch_object
+from . import contact_file, map_object, measured, mesh_file, patch_object, whole_file
 from .map_report import map_readable
 from .registration import register_patch
 from .report import readable, verification_columns
@@ -21,8 +22,8 @@ from .verification import verify_patch
 
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 # What the operators take as it is given.
-PLAIN = {"location", "normal", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
-PLAIN |= {"tolerance", "unit", "point", "outward", "flip", "sensor_std"}
+PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
+PLAIN |= {"tolerance", "unit", "point", "flip"}
 
 
 def main(args):
@@ -34,6 +35,9 @@ def main(args):
         _write(report, options)
     except (RuntimeError, OSError, ValueError) as error:
         print(f"tactile: {_sentence(error)}", file=sys.stderr)
+        return 1
+    except MemoryError:
+        print("tactile: there is not enough memory for this: take a smaller file", file=sys.stderr)
         return 1
     return 0
 
@@ -55,7 +59,7 @@ def _parser():
 def _add_reconstruct(command):
     add = command.add_argument
     add("--location", **VECTOR, help="where to touch (default: the 3D cursor)")
-    add("--normal", **VECTOR, help="outward direction there (default: the surface's)")
+    add("--outward", **VECTOR, help="outward direction there (default: the surface's own)")
     help = "add planes until the height is good to this in the mean, or no plane would help (0: that alone)"
     add("--tolerance", type=float, help=help)
     add("--contacts", type=Path, metavar="CSV", help="write the simulated contacts")
@@ -71,7 +75,7 @@ def _add_fit(command):
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
     add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
     add("--flip", action="store_true", default=None, help="the other side is the outer one")
-    add("--sensor-std", type=float, help="standard deviation of a contact, at least")
+    add("--noise", type=float, help="standard deviation of a contact, at least")
     add("--normal-std", type=float, metavar="DEGREES", help="of measured normals, to fit them too")
     help = "put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts"
     add("--onto", type=Path, metavar="MESH", help=help)
@@ -147,9 +151,7 @@ def _run(options):
     """Opens the file, runs the operator, saves; returns the report."""
     if "files" in options and options.verify is not None and options.onto is None:
         options.fail("--verify: wanted --onto MESH too, to compare with")
-    for path in (options.json, options.output, options.contacts, options.verify):
-        if path not in (None, "-") and not Path(path).absolute().parent.is_dir():
-            raise OSError(f'there is no folder "{Path(path).parent}" to write "{Path(path).name}" to')
+    _require_outputs(options)
     if options.file is not None:
         mesh_file.open_file(options.file)
     arguments = _arguments(options)
@@ -161,10 +163,31 @@ def _run(options):
         _compare(made, options)
     report = made[options.record].to_dict()
     if options.contacts is not None:
-        contact_file.write(options.contacts, patch_object.contacts_of(made))
+        r = patch_object.reconstruction_of(made)
+        contact_file.write(options.contacts, contact_file.contacts_of(r))
     if options.output is not None:
         _save(options.output, made)
     return report
+
+
+def _require_outputs(options):
+    """Ends the command where a file to write is one to read, or cannot be one, before anything is done."""
+    given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify")}
+    outputs = {name: Path(path) for name, path in given.items() if path not in (None, "-")}
+    scene = bpy.data.filepath and Path(bpy.data.filepath)
+    inputs = [*vars(options).get("files", []), *filter(None, (options.file, options.onto, scene))]
+    taken = {path.resolve(): "reads" for path in inputs}
+    for name, path in outputs.items():
+        if path.exists() and not path.is_file():
+            options.fail(f"--{name}: wanted the name of a file, got {path}")
+        if path.resolve() in taken:
+            options.fail(f"--{name}: wanted another file than one that this {taken[path.resolve()]}: {path}")
+        taken[path.resolve()] = "writes"
+        if not path.absolute().parent.is_dir():
+            raise OSError(f'there is no folder "{path.parent}" to write "{path.name}" to')
+    kinds = [".blend", ".ply", *([".json"] if options.record == patch_object.RECORD else [])]
+    if "output" in outputs and options.output.suffix.lower() not in kinds:
+        options.fail(f"--output: wanted a file {' or '.join(kinds)}, got {options.output}")
 
 
 def _compare(patch, options):
@@ -181,7 +204,7 @@ def _open_contacts(options):
     """The files as arguments; where no .blend is open, in an empty scene of their unit, so numbers stay."""
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
-        _, unit = measured.read(options.files, options.unit or "FILE", 1.0)
+        unit = measured.read(options.files, options.unit or "FILE", 1.0).unit
         settings = bpy.context.scene.unit_settings
         name = {symbol: name for name, (symbol, _) in METRES.items()}.get(unit)
         settings.system = "METRIC" if unit else "NONE"
@@ -201,12 +224,12 @@ def _open_contacts(options):
 def _save(path, made):
     """The scene; where the path says so, the map or patch alone: .ply with its attributes, or .json."""
     kind = path.suffix.lower()
-    if kind == ".json" and patch_object.RECORD in made:
-        path.write_text(patch_object.reconstruction_of(made) + "\n", encoding="utf-8")
+    if kind == ".json":
+        contact_file.write_patch(path, patch_object.reconstruction_of(made))
     elif kind == ".ply":
         mesh_file.write(path, made)
     else:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()))
+        mesh_file.save_scene(path)
 
 
 def _default_target():
@@ -219,13 +242,14 @@ def _default_target():
 
 def _write(report, options):
     if options.verify is not None:
-        with options.verify.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(zip(*verification_columns(report), strict=True))
+        table = io.StringIO()
+        csv.writer(table).writerows(zip(*verification_columns(report), strict=True))
+        whole_file.write_text(options.verify, table.getvalue())
     if options.json == "-":
         print(json.dumps(report, allow_nan=False))
         return
     if options.json is not None:
-        Path(options.json).write_text(json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        whole_file.write_text(options.json, json.dumps(report, indent=2, allow_nan=False) + "\n")
     print(options.words(report))
 
 

@@ -65,8 +65,8 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         options={"SKIP_PRESET"},
     )
     flip: BoolProperty(name="Flip", description="The other side is the outer one")
-    sensor_std: FloatProperty(
-        name="Sensor Deviation",
+    noise: FloatProperty(
+        name="Noise",
         subtype="DISTANCE",
         description="Standard deviation of a contact, in units of the scene; 0 where it is not known",
         min=0.0,
@@ -90,14 +90,14 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     def execute(self, context):
         paths = [str(Path(self.directory) / file.name) for file in self.files if file.name] or [self.filepath]
         try:
-            contours, unit = measured.read(paths, self.unit, context.scene.unit_settings.scale_length)
+            contacts = measured.read(paths, self.unit, context.scene.unit_settings.scale_length)
             touched = measured.fit(
                 Path(paths[0]).name,
-                contours,
+                contacts,
                 point=self._given("point"),
                 outward=self._given("outward"),
                 flip=self.flip,
-                sensor_std=self.sensor_std,
+                noise=self.noise,
                 normal_std=self.normal_std,
                 method=self.method,
                 degree=self.degree or "auto",
@@ -106,7 +106,6 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
             )
         except (OSError, ValueError) as error:
             return report_error(self, error)
-        touched.report["unit"] = unit
         make_active(context, patch_object.insert(context.scene, touched))
         result, report = touched.result, touched.report
         summary = (
@@ -136,7 +135,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
             layout.prop(self, f"use_{name}")
             if getattr(self, f"use_{name}"):
                 layout.prop(self, name)
-        for name in ("flip", "sensor_std", "normal_std"):
+        for name in ("flip", "noise", "normal_std"):
             layout.prop(self, name)
         draw_solver(layout, self)
 
@@ -175,7 +174,8 @@ class TACTILE_OT_export_contacts(_PatchExport, bpy.types.Operator):
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
     def write(self, patch):
-        contact_file.write(self.filepath, patch_object.contacts_of(patch))
+        r = patch_object.reconstruction_of(patch)
+        contact_file.write(self.filepath, contact_file.contacts_of(r))
 
 
 class TACTILE_OT_export_patch(_PatchExport, bpy.types.Operator):
@@ -187,7 +187,7 @@ class TACTILE_OT_export_patch(_PatchExport, bpy.types.Operator):
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def write(self, patch):
-        Path(self.filepath).write_text(patch_object.reconstruction_of(patch) + "\n", encoding="utf-8")
+        contact_file.write_patch(self.filepath, patch_object.reconstruction_of(patch))
 
 
 class TACTILE_FH_contacts(bpy.types.FileHandler):

@@ -11,12 +11,12 @@ def fill_contours(mesh, touched):
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
     Point attributes tell them apart: `contour` counts the contours, `contact` the contacts along
-    one, and is -1 on the tubes; `contact_normal` is there where all contours have normals.
+    one, and is -1 on the tubes. They show what the patch keeps in its reconstruction.
     """
     frame, thickness = touched.result.frame, 0.009 * touched.result.radius
     points, triangles, contour_index, contact_index = [], [], [], []
     count = 0
-    for number, contour in enumerate(touched.contours):
+    for number, contour in enumerate(touched.result.contours):
         path = frame.to_local(contour.points)
         across = frame.axes.T @ contour.plane_normal if contour.plane_normal is not None else _across(path)
         for mesh_points, mesh_triangles, contact in (
@@ -32,18 +32,12 @@ def fill_contours(mesh, touched):
         ("contour", "INT", np.concatenate(contour_index)),
         ("contact", "INT", np.concatenate(contact_index)),
     ]
-    if all(contour.normals is not None for contour in touched.contours):
-        each = [
-            np.vstack([np.zeros((4 * len(c.points), 3)), np.repeat(c.normals @ frame.axes, 6, axis=0)])
-            for c in touched.contours
-        ]
-        attributes.append(("contact_normal", "FLOAT_VECTOR", np.vstack(each)))
     fill(mesh, np.vstack(points), np.vstack(triangles), attributes)
 
 
 def _tube(path, across, thickness):
     """A square tube along a path (n, 3) in the plane normal to `across`: points (4n, 3) and triangles."""
-    ahead = np.gradient(path, axis=0)
+    ahead = np.vstack([path[1:], path[-1:]]) - np.vstack([path[:1], path[:-1]])
     up = np.cross(across, ahead)
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-30)
     corners = [path + thickness * (a * up + b * across) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]

@@ -48,7 +48,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return probe.is_probe(context.object)
+        return probe.is_probe(context.object) and probe.lock_of(context.object) is None
 
     def invoke(self, context, event):
         settings = context.object.tactile_probe
@@ -162,7 +162,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
     def poll(cls, context):
         obj = context.object
         shown = context.mode == "OBJECT" and probe.is_probe(obj) and obj.visible_get()
-        return shown and probe.record_of(obj) is not None
+        return shown and probe.record_of(obj) is not None and probe.lock_of(obj) is None
 
     def setup(self, context):
         self.extent = self._handle("GIZMO_GT_dial_3d", EXTENT, 0, (1.0, 1.0, 1.0))

@@ -53,8 +53,8 @@ def values(mesh, name):
 
 
 def own_mesh(obj):
-    """A linked copy shows something else than the others from now on."""
-    if obj.data.users > 1:
+    """A linked copy, or the override of a library's object, shows something of its own from now on."""
+    if obj.data.users > 1 or not obj.data.is_editable:
         obj.data = obj.data.copy()
 
 

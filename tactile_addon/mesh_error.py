@@ -13,7 +13,7 @@ def height_error(surface, result):
     points, weights = result.domain.nodes
     some = slice(None, None, len(points) // SAMPLES | 1)
     points, weights = points[some], weights[some]
-    heights = result.patch.height(*points.T)
+    heights = result.height(*points.T)
     up = result.frame.axes[:, 2].tolist()
     starts = result.frame.to_world(np.column_stack([points, heights])).tolist()
     offs = [_height_off(surface, start, up, result.radius) for start in starts]

@@ -2,7 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes and meshes in files, by Blender's own importers and exporter, without a window."""
 
+import sys
+
 import bpy
+import numpy as np
+
+from . import contact_file, whole_file
+
+HEADER = 1 << 16  # bytes in which that of a .ply comes to its end
+INCOMPLETE = "Blender has not written all of it"
 
 
 def open_file(path):
@@ -48,15 +56,60 @@ def add(path, empty=False):
 def _has_header(path):
     """Whether the header of a .ply file comes to its end; where it does not, the importer ends Blender."""
     with path.open("rb") as file:
-        return b"end_header" in file.read(1 << 16)
+        return b"end_header" in file.read(HEADER)
 
 
 def write(path, obj):
-    """The mesh of an object with its attributes, as .ply."""
-    with bpy.context.temp_override(selected_objects=[obj], window=bpy.context.window_manager.windows[0]):
-        bpy.ops.wm.ply_export(
-            filepath=str(path.absolute()),
-            export_selected_objects=True,
-            export_attributes=True,
-            export_uv=False,  # whose seams would split vertices
-        )
+    """The mesh of an object without modifiers, with its attributes, as .ply.
+
+    Raises OSError, as save_scene does, with a sentence and the old file as it was.
+    """
+    with whole_file.replacing(path) as temporary:
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(selected_objects=[obj], window=window):
+            bpy.ops.wm.ply_export(
+                filepath=str(temporary),
+                export_selected_objects=True,
+                export_attributes=True,
+                export_uv=False,  # whose seams would split vertices
+            )
+        # On a full disk the exporter says that all is well.
+        if temporary.stat().st_size < _size_of_ply(temporary, obj.data):
+            raise OSError(INCOMPLETE)
+
+
+def save_scene(path):
+    """The open scene as .blend."""
+    with whole_file.replacing(path) as temporary:
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
+        except RuntimeError as error:  # of a full disk it says that there is no such file
+            raise OSError(INCOMPLETE) from error
+        if not _is_whole_blend(temporary):  # Blender 5.2 says of a full disk that all is well
+            raise OSError(INCOMPLETE)
+
+
+def _is_whole_blend(path):
+    """Whether the file ends as one: compressed with the magic number of its frames' table, else with ENDB."""
+    with path.open("rb") as file:
+        start = file.read(4)
+        file.seek(max(0, path.stat().st_size - 64))
+        end = file.read()
+    return end.endswith(b"\xb1\xea\x92\x8f") if start == b"\x28\xb5\x2f\xfd" else b"ENDB" in end
+
+
+def _size_of_ply(path, mesh):
+    """How many bytes its header promises, of the faces of `mesh`; more than any file has without one."""
+    with path.open("rb") as file:
+        head, end, _ = file.read(HEADER).partition(b"end_header\n")
+    if not end:
+        return sys.maxsize
+    size, count = len(head) + len(end), 0
+    for words in map(str.split, head.decode("latin-1").splitlines()):
+        if words[0] == "element":
+            count = int(words[2])
+        elif words[:2] == ["property", "list"]:
+            size += count + 4 * len(mesh.loops)
+        elif words[0] == "property":
+            size += count * np.dtype(contact_file.PLY_TYPES[words[1]]).itemsize
+    return size

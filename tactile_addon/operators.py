@@ -6,7 +6,7 @@ import bpy
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 
 from . import map_object, patch_object
-from .probe import record_of
+from .probe import lock_of, record_of
 from .report import sentence
 from .settings import TouchSettings, draw_all, touch_arguments
 from .touch import touch, verify
@@ -30,8 +30,8 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         description="Where to touch; the 3D cursor where it is not set",
         options={"SKIP_PRESET"},
     )
-    normal: FloatVectorProperty(
-        name="Normal",
+    outward: FloatVectorProperty(
+        name="Outward",
         subtype="XYZ",
         description="The outward direction there; the surface's own where it is not set",
         options={"SKIP_PRESET"},
@@ -58,13 +58,13 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
                 obj,
                 depsgraph,
                 list(self.location) if given("location") else list(context.scene.cursor.location),
-                normal=list(self.normal) if given("normal") else None,
+                outward=list(self.outward) if given("outward") else None,
                 tolerance=self.tolerance if given("tolerance") else None,
                 **touch_arguments(self),
             )
         except ValueError as error:
             return report_error(self, error)
-        verify(touched)
+        touched = verify(touched)
         patch = patch_object.insert(context.scene, touched)
         make_active(context, patch)
         result, report = touched.result, touched.report
@@ -80,7 +80,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         layout.use_property_split = True
         layout.prop(self, "target")
         # Where they are not set, the cursor and the surface decide: zeros would say otherwise.
-        for name in filter(self.properties.is_property_set, ("location", "normal")):
+        for name in filter(self.properties.is_property_set, ("location", "outward")):
             layout.prop(self, name)
         draw_all(layout, self)
         given = self.properties.is_property_set("tolerance")
@@ -107,6 +107,14 @@ def target_object(context, name):
             else "No object is active: select the mesh object to touch"
         )
     return obj
+
+
+def is_unlocked(operator, context):
+    """For its poll: whether the probe or patch near the active object can be changed; says so where not."""
+    lock = lock_of(context.view_layer.objects.active)
+    if lock is not None:
+        operator.poll_message_set(lock)
+    return lock is None
 
 
 def make_active(context, obj):

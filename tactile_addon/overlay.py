@@ -83,8 +83,9 @@ def draw_legend():
     context = bpy.context
     obj = _active(context)
     patch = probe.patch_near(obj)
-    if patch is not None and patch.visible_get():
-        record, shown = patch[patch_object.RECORD], patch.tactile_colours
+    record = probe.record_of(obj)
+    if record is not None and "colour_limit" in record and patch.visible_get():
+        shown = patch.tactile_colours
         low = 0.0 if shown in patch_object.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colours"].enum_items[shown].name
         bar = _scale(context, title, record, record["radius"], patch_object.POWERS[shown], low)

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from . import map_object, patch_object, probe, units
+from . import map_object, probe, units
 from .map_operator import TACTILE_OT_stability_map
 from .map_report import map_rows, median_rows
 from .operators import TACTILE_OT_reconstruct
@@ -51,7 +51,9 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
             layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
             return
         row = layout.row(align=True)
-        row.operator(TACTILE_OT_pick.bl_idname, text="Move", icon="EYEDROPPER")
+        move = row.row(align=True)
+        move.enabled = probe.lock_of(found) is None
+        move.operator(TACTILE_OT_pick.bl_idname, text="Move", icon="EYEDROPPER")
         row.operator(TACTILE_OT_pick.bl_idname, text="New", icon="ADD").new = True
         row.operator(TACTILE_OT_delete.bl_idname, text="", icon="TRASH")
         settings = found.tactile_probe
@@ -97,11 +99,14 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             _draw_sentence(context, layout, found.tactile_probe.message, "ERROR")
         if patch is None:
             return
-        record = patch[patch_object.RECORD]
+        record = probe.record_of(patch)
+        if record is None:
+            layout.label(text="This patch was edited: touch again", icon="ERROR")
+            return
         _draw_colours(context, layout, patch, "tactile_colours")
         box, unit = layout.box(), units.unit_of(context.scene, record["radius"])
         _draw_rows(box, patch_rows(record, unit))
-        _draw_sentence(context, box, record["message"], ICONS[record["status"]])
+        _draw_sentence(context, box, record["message"], ICONS.get(record["status"], "ERROR"))
         box.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
         if found is None:
             box.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")

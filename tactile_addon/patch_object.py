@@ -11,7 +11,8 @@ from mathutils import Matrix
 from .. import core
 from . import colours
 from .contour_mesh import fill_contours
-from .mesh_data import emission, fill, own_mesh, values
+from .family import add, children_of
+from .mesh_data import emission, fill, own_mesh, values, write
 
 COLLECTION = "Tactile Patches"
 RECORD = "tactile"  # the patch object's custom property that holds the report,
@@ -27,6 +28,8 @@ QUANTITIES = [
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
 ]
 POWERS = {name: power for name, _, _, power in QUANTITIES}
+QUANTITIES_OF_A_FIT = ("gaussian_curvature", "mean_curvature", "height_std")  # these need no mesh
+NORMAL, PLACE = "custom_normal", "domain_place"  # attributes: as shaded; on the unit disk, see core.Domain
 POSITIVE = ("height_std",)  # never below zero: half a scale says it all
 FLOOR = 1e-3  # of the colours' range, in unit radius: a plane is white
 
@@ -40,6 +43,7 @@ def insert(scene, touched, parent=None):
     )
     patch.parent, lines.parent, lines[CONTOURS] = parent, patch, True
     for obj in (patch, lines):
+        add(obj)
         obj.show_in_front = True  # it lies in the surface it describes
         collection(scene).objects.link(obj)
     patch.data.materials.append(emission("Tactile Curvature", attribute=COLOUR))
@@ -53,7 +57,10 @@ def rewrite(patch, touched):
     lines = contours_of(patch)
     for obj in filter(None, (patch, lines)):
         own_mesh(obj)
-    _fill_patch(patch.data, touched)
+    if touched.report["is_verified"] or PLACE not in patch.data.attributes:
+        _fill_patch(patch, touched)
+    else:
+        _follow(patch, touched)
     names = {"patch": patch.name}
     if lines is not None:
         fill_contours(lines.data, touched)
@@ -61,47 +68,88 @@ def rewrite(patch, touched):
     _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
-    if touched.is_complete:
+    if touched.report["is_verified"]:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolour(patch)
 
 
+def report_of(patch):
+    """The report of a patch object; None where somebody has made something else of it."""
+    report = patch.get(RECORD)
+    try:
+        frame = np.array([report["frame"][name] for name in ("origin", "d1", "d2", "normal")], dtype=float)
+        numbers = [float(report[name]) for name in ("radius", "height_std", "k1", "k2")]
+        words = [report[name] for name in ("source", "status", "message", "ended")]
+        report["is_verified"]
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return None
+    good = frame.shape == (4, 3) and np.isfinite(frame).all() and np.isfinite(numbers).all()
+    return report if good and numbers[0] > 0.0 and all(isinstance(word, str) for word in words) else None
+
+
+def require_whole(patch):
+    """Raises ValueError where the patch object has been edited into what is none."""
+    if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
+        raise ValueError(f'"{patch.name}" was edited, and is no whole patch any more: touch again')
+
+
+def _is_whole(mesh):
+    kinds = {name: "FLOAT" for name in POWERS} | {COLOUR: "FLOAT_COLOR"}
+    found = {name: mesh.attributes.get(name) for name in kinds}
+    return len(mesh.vertices) > 0 and all(
+        attribute is not None and (attribute.data_type, attribute.domain) == (kinds[name], "POINT")
+        for name, attribute in found.items()
+    )
+
+
+def mark_failed(patch, why):
+    """The patch is that of an earlier touch, for the last one failed."""
+    report = report_of(patch)
+    if report is not None:
+        verdict = {
+            "status": "outdated",
+            "message": f"This is the patch of an earlier touch, for the last one failed. {why}",
+        }
+        report.update(verdict)
+
+
 def reconstruction_of(patch):
-    """core.to_dict of what the patch shows, as JSON. Raises ValueError while a gesture goes on."""
+    """The core.Reconstruction of a patch object, in the world, where the object is now.
+
+    Unmoved it is what was fitted, to the last bit. Raises ValueError while a gesture goes on, where what the
+    object keeps was edited, and where it is no longer of its shape.
+    """
+    require_whole(patch)
     if RECONSTRUCTION not in patch:
         raise ValueError(f'"{patch.name}" is not complete: end the gesture, or touch again')
-    return patch[RECONSTRUCTION]
-
-
-def contacts_of(patch):
-    """The contacts of a patch object as contours in the world. Raises ValueError where there are none."""
-    lines = contours_of(patch)
-    if lines is None or not {"contour", "contact"} <= set(lines.data.attributes.keys()):
-        raise ValueError(f'"{patch.name}" has no contours any more: touch again')
-    frame = patch[RECORD]["frame"]
-    axes = np.transpose([frame[name] for name in ("d1", "d2", "normal")])
-    curve, contact, points = (values(lines.data, name) for name in ("contour", "contact", "position"))
-    normals = values(lines.data, "contact_normal") if "contact_normal" in lines.data.attributes else None
-    contours = []
-    for number in range(int(curve.max()) + 1):
-        # An octahedron each, whose six tips are one after the other.
-        tips = np.flatnonzero((curve == number) & (contact >= 0))
-        centres = points[tips].reshape(-1, 6, 3).mean(axis=1)
-        up = None if normals is None else normals[tips[::6]] @ axes.T
-        contours.append(core.Contour(frame["origin"] + centres @ axes.T, normals=up))
-    return contours
+    try:
+        r = core.from_dict(json.loads(patch[RECONSTRUCTION]))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f'"{patch.name}" cannot be read any more: touch again ({error})') from error
+    if is_at(patch, r.frame.axes, r.frame.origin):  # where it is, that is in double precision
+        return r
+    placed = np.array(patch.matrix_world, dtype=float)
+    try:
+        return r.moved(placed @ np.linalg.inv(_matrix(r.frame.axes, r.frame.origin)))
+    except ValueError as error:
+        raise ValueError(
+            f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
+        ) from error
 
 
 def _place(patch, matrix):
     """Puts the patch there in the world, under its probe or not; it stays where the probe is deleted."""
     if patch.parent is not None:
         patch.matrix_parent_inverse = patch.parent.matrix_world.inverted_safe()
+    matrix = Matrix(matrix.tolist())
     patch.matrix_world = matrix  # known before the next evaluation
     patch.matrix_basis = matrix
 
 
 def hold(patch):
     """Keeps the patch where it was touched while its probe moves on without it."""
+    if report_of(patch) is None:
+        return
     axes, origin = touched_frame(patch)
     if not is_at(patch, axes, origin):
         _place(patch, _matrix(axes, origin))
@@ -126,17 +174,16 @@ def meshes(patch):
 
 def contours_of(patch):
     """The contours of a patch object, or None."""
-    return next((child for child in patch.children if CONTOURS in child), None)
+    return next((child for child in children_of(patch) if CONTOURS in child), None)
 
 
 def recolour(patch):
     """Colours the patch by what it is set to show, and keeps their range in its record."""
+    own_mesh(patch)
     shown, mesh = patch.tactile_colours, patch.data
-    values = np.empty(len(mesh.vertices), dtype=np.float32)
-    mesh.attributes[shown].data.foreach_get("value", values)
-    record = patch[RECORD]
-    limit = colours.symmetric_range(values, floor=FLOOR * record["radius"] ** POWERS[shown])
-    mesh.attributes[COLOUR].data.foreach_set("color", colours.diverging(values, limit).ravel())
+    shades, record = values(mesh, shown), patch[RECORD]
+    limit = colours.symmetric_range(shades, floor=FLOOR * record["radius"] ** POWERS[shown])
+    mesh.attributes[COLOUR].data.foreach_set("color", colours.diverging(shades, limit).ravel())
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOUR
     mesh.update()
     record["colour_limit"] = limit
@@ -145,12 +192,17 @@ def recolour(patch):
 def _matrix(axes, origin):
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = axes, origin
-    return Matrix(matrix.tolist())
+    return matrix
 
 
 def collection(scene):
     # In a second scene of the file it is "Tactile Patches.001".
-    named = (c for c in scene.collection.children_recursive if c.name.partition(".")[0] == COLLECTION)
+    # To a library's, or its override, nothing can be added.
+    named = (
+        c
+        for c in scene.collection.children_recursive
+        if c.name.partition(".")[0] == COLLECTION and c.is_editable and c.override_library is None
+    )
     found = next(named, None)
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
@@ -158,23 +210,41 @@ def collection(scene):
     return found
 
 
-def _fill_patch(mesh, touched):
+def _fill_patch(obj, touched):
     """The patch in the Darboux frame, with its attributes; deviations are 0 until the touch is verified."""
-    result = touched.result
-    patch, frame = result.patch, result.frame
+    result, frame, mesh = touched.result, touched.result.frame, obj.data
     points, triangles = result.mesh()
-    x, y, _ = points.T
-    normals = patch.normal(x, y)
+    d = result.geometry.derivatives(*points[:, :2].T)
     deviation = np.zeros(len(points))
-    if touched.is_verified:
-        world = frame.to_world(points), normals @ frame.axes.T
+    if touched.report["is_verified"] and touched.surface is not None:
+        world = frame.to_world(points), d.normal @ frame.axes.T
         deviation = touched.surface.deviations(*world, result.radius)
+    places = np.column_stack([result.domain.places(points[:, :2]), np.zeros(len(points))])
     attributes = [
-        ("gaussian_curvature", "FLOAT", patch.gaussian_curvature(x, y)),
-        ("mean_curvature", "FLOAT", patch.mean_curvature(x, y)),
-        ("height_std", "FLOAT", result.height_std(x, y)),
+        *((name, "FLOAT", _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
         ("deviation", "FLOAT", deviation),
-        ("custom_normal", "FLOAT_VECTOR", normals),
+        (NORMAL, "FLOAT_VECTOR", d.normal),
+        (PLACE, "FLOAT_VECTOR", places),
         (COLOUR, "FLOAT_COLOR", np.ones((len(points), 4))),
     ]
     fill(mesh, points, triangles, attributes)
+
+
+def _follow(obj, touched):
+    """Moves the vertices that are there, each at its place in the domain, to the patch of another touch.
+
+    What is shown is up to date, what is not is left as it was: in a gesture that is all that is seen.
+    """
+    result, mesh = touched.result, obj.data
+    plane = result.domain.points_at(values(mesh, PLACE)[:, :2])
+    d = result.geometry.derivatives(*plane.T)
+    points = np.column_stack([plane, d.z])
+    write(mesh, "position", "FLOAT_VECTOR", points)
+    write(mesh, NORMAL, "FLOAT_VECTOR", d.normal)
+    if obj.tactile_colours in QUANTITIES_OF_A_FIT:
+        write(mesh, obj.tactile_colours, "FLOAT", _shown(obj.tactile_colours, result, points))
+
+
+def _shown(name, result, points):
+    """What the colors can show at points (n, 3) of a surface, (n,); curvatures are those of (1)."""
+    return getattr(result if name == "height_std" else result.patch, name)(*points[:, :2].T)

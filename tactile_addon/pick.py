@@ -42,8 +42,8 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         description="Where to touch; the 3D cursor where it is not set",
         options=UNSAVED,
     )
-    normal: FloatVectorProperty(
-        name="Normal",
+    outward: FloatVectorProperty(
+        name="Outward",
         subtype="XYZ",
         description="To the side to touch from; the surface's own normal where it is not set",
         options=UNSAVED,
@@ -67,7 +67,10 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             return {"CANCELLED"}
         for name in NAMES:  # those of the last pick are remembered, but suited another object
             self.properties.property_unset(name)
-        self._inherit(context)
+        try:
+            self._inherit(context)
+        except ValueError as error:
+            return report_error(self, error)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
         self._seen = {"touched": None}
         self._drawing = bpy.types.SpaceView3D.draw_handler_add(
@@ -94,7 +97,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             if touched is not None:
                 self.target = touched.report["source"]
                 self.location = touched.result.frame.origin
-                self.normal = touched.result.frame.axes[:, 2]
+                self.outward = touched.result.frame.axes[:, 2]
                 self.cancel(context)
                 return self.execute(context)
         return {"RUNNING_MODAL"}
@@ -109,8 +112,8 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
 
     def execute(self, context):
         depsgraph = context.evaluated_depsgraph_get()
-        moved = self._inherit(context)
         try:
+            moved = self._inherit(context)
             target = self._target(context, moved)
             touched = self._touch(context, target, depsgraph)
         except ValueError as error:
@@ -139,7 +142,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             target,
             depsgraph,
             list(self.location) if given("location") else list(context.scene.cursor.location),
-            toward=list(self.normal) if given("normal") else None,
+            toward=list(self.outward) if given("outward") else None,
             **touch_arguments(self),
         )
 
@@ -151,9 +154,13 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         draw_all(layout, self)
 
     def _inherit(self, context):
-        """The probe that is to be moved, if any; what is not set becomes what it has."""
+        """The probe that is to be moved, if any; what is not set becomes what it has.
+
+        Raises ValueError where it cannot be changed.
+        """
         moved = None if self.new else probe.probe_of(context.view_layer.objects.active)
         if moved is not None:
+            probe.require_unlocked(moved)
             for name in NAMES:
                 if not self.properties.is_property_set(name):
                     setattr(self, name, getattr(moved.tactile_probe, name))

@@ -17,12 +17,14 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, 
 from mathutils import Matrix, Vector
 
 from . import map_object, patch_object
+from .family import children_of
 from .report import sentence
-from .settings import TouchSettings, changed, touch_arguments
+from .settings import OVERRIDABLE, TouchSettings, changed, touch_arguments
 from .surface import MeshSurface
 from .touch import touch, verify
 
 DIGEST = "tactile_digest"
+NO_SHAPE = " 00000000"  # the checksum of a mesh that cannot be touched, as settings.shape ends
 VERTICES = 8000  # of the mesh around, compared with the patch at most; a quarter of them lies over it
 
 
@@ -33,27 +35,57 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
         name="Is a Probe",
         description="Whether this Empty touches its target",
         options={"HIDDEN"},
-        update=changed,
+        update=lambda settings, context: _appointed(settings, context),
+        override=OVERRIDABLE,
     )
     target: PointerProperty(
         name="Target",
         description="The mesh object to touch",
         type=bpy.types.Object,
         poll=lambda _, obj: obj.type == "MESH" and not is_result(obj),
-        update=changed,
+        update=lambda settings, context: _appointed(settings, context),
+        override=OVERRIDABLE,
     )
     live: BoolProperty(
         name="Live",
         description="Touch again whenever the probe, its target or a number changes",
         default=True,
         update=changed,
+        override=OVERRIDABLE,
     )
     active_plane: IntProperty(
-        name="Active Plane", description="The one with a handle to tilt it", min=0, options={"HIDDEN"}
+        name="Active Plane",
+        description="The one with a handle to tilt it",
+        min=0,
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
     )
     message: StringProperty(description="Why there is no patch; empty where there is one", options={"HIDDEN"})
     digest: StringProperty(options={"HIDDEN"})
     shape: StringProperty(options={"HIDDEN"})
+
+
+_targets = None  # session_uids of what there are probes on, 0 for none; None where it is to be looked up
+
+
+def targets():
+    """Of what there are probes on in this file; empty where there is no probe, and 0 for one without."""
+    global _targets
+    if _targets is None:
+        of = (obj.tactile_probe.target for obj in bpy.data.objects if is_probe(obj))
+        _targets = {0 if target is None else target.session_uid for target in of}
+    return _targets
+
+
+def forget_targets():
+    """To be called where probes may have come or gone, or changed their targets."""
+    global _targets
+    _targets = None
+
+
+def _appointed(settings, context):
+    forget_targets()
+    changed(settings, context)
 
 
 def is_probe(obj):
@@ -66,7 +98,12 @@ def is_result(obj):
 
 
 def patch_of(probe):
-    return next((child for child in probe.children if patch_object.RECORD in child), None)
+    return next((child for child in children_of(probe) if _is_patch(child)), None)
+
+
+def _is_patch(obj):
+    """Not what somebody has converted to something else than a mesh."""
+    return patch_object.RECORD in obj and obj.type == "MESH"
 
 
 def patch_near(obj):
@@ -75,7 +112,15 @@ def patch_near(obj):
         return patch_of(obj)
     if obj is not None and patch_object.CONTOURS in obj:
         obj = obj.parent
-    return obj if obj is not None and patch_object.RECORD in obj else None
+    return obj if obj is not None and _is_patch(obj) else None
+
+
+def reconstruction_of(obj):
+    """That of the patch near `obj`, where it is now. Raises ValueError where there is none."""
+    patch = patch_near(obj)
+    if patch is None:
+        raise ValueError("Wanted a patch, its probe or its contours, got another object or none")
+    return patch_object.reconstruction_of(patch)
 
 
 def probe_of(obj):
@@ -89,14 +134,34 @@ def probe_of(obj):
 def record_of(obj):
     """The report, an ID property, of the patch near `obj`, or None."""
     patch = patch_near(obj)
-    return None if patch is None else patch[patch_object.RECORD]
+    return None if patch is None else patch_object.report_of(patch)
+
+
+def require_unlocked(obj):
+    """Raises ValueError where what belongs to the probe or patch near `obj` cannot be changed."""
+    patch = patch_near(obj)
+    lines = None if patch is None else patch_object.contours_of(patch)
+    for each in (probe_of(obj), patch, lines):
+        if each is not None and not each.is_editable:
+            raise ValueError(
+                f'"{each.name}" comes from a library: make it local, or override it, to change it'
+            )
+        if each is not None and each.type == "MESH" and each.data.is_editmode:
+            raise ValueError(f'"{each.name}" is being edited: leave its Edit Mode first')
+
+
+def lock_of(obj):
+    """Why that cannot be changed, a sentence; None where it can."""
+    try:
+        require_unlocked(obj)
+    except ValueError as error:
+        return str(error)
+    return None
 
 
 def is_free(probe):
-    """Whether it can be kept up to date: it is not a library's, and nobody edits its patch."""
-    return probe.library is None and not any(
-        mesh.is_editmode for mesh in patch_object.meshes(patch_of(probe))
-    )
+    """Whether it can be kept up to date: nothing of it is a library's, and nobody edits its patch."""
+    return lock_of(probe) is None
 
 
 def make(context, target):
@@ -138,6 +203,7 @@ def update(probe, depsgraph, complete):
         settings.message = sentence(error)
         if patch is not None:
             patch_object.hold(patch)
+            patch_object.mark_failed(patch, settings.message)
         _sign(probe, depsgraph)
     else:
         adopt(probe, touched, depsgraph, complete)
@@ -147,7 +213,7 @@ def adopt(probe, touched, depsgraph, complete):
     """Makes the probe's patch that of `touched`; `complete` as in update."""
     probe.tactile_probe.message = ""
     if complete:
-        verify(touched, most=VERTICES)
+        touched = verify(touched, most=VERTICES)
         _put(probe, touched)
     probe.empty_display_size = 0.6 * touched.report["extent"]
     patch = patch_of(probe)
@@ -171,7 +237,9 @@ def touch_at(probe, depsgraph, complete, **more):
         raise ValueError("the probe is scaled to nothing, or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)
     if not complete and record is not None:  # to find out how far a patch can be trusted is dear
-        arguments |= {name: arguments[name] or record[name] for name in ("extent", "step")}
+        kept = {"extent": 0.0, "step": 0.0, "degree": "auto"}
+        arguments |= {name: record.get(name, own) for name, own in kept.items() if arguments[name] == own}
+        arguments["sound"] = not settings.shape.endswith(NO_SHAPE)
     return touch(
         settings.target,
         depsgraph,
@@ -185,6 +253,17 @@ def touch_at(probe, depsgraph, complete, **more):
 
 def _is_there(target, depsgraph):
     return depsgraph.view_layer.objects.get(target.name) == target
+
+
+def may_be_outdated(probe, there):
+    """Whether something it belongs to has been taken away or back; `there`: what is in the view layer."""
+    settings, made = probe.tactile_probe, _made(probe)
+    return (
+        bool(settings.message)
+        or not made
+        or settings.target not in there
+        or any(block.get(DIGEST) != settings.digest for block in made)
+    )
 
 
 def is_outdated(probe, depsgraph):
@@ -223,15 +302,22 @@ def _digest(probe, depsgraph):
     return hashlib.sha1(repr(inputs).encode()).hexdigest()
 
 
-def measure_shape(settings, depsgraph, reshaped=()):
-    """Keeps the checksum of the target, taken anew where it is among the `reshaped` objects."""
-    target = settings.target
+def measure_shape(settings, depsgraph, reshaped=None):
+    """Keeps the checksum of the target, taken anew where it is one of the `reshaped` objects.
+
+    reshaped : a dict, which gets the checksum of each that is asked for, so that it is taken once
+    """
+    target, reshaped = settings.target, {} if reshaped is None else reshaped
     if target is None or (settings.shape.startswith(f"{target.name} ") and target not in reshaped):
         return
-    try:
-        checksum = MeshSurface(target, depsgraph).checksum
-    except ValueError:  # the touch will say what is wrong
-        checksum = 0
+    checksum = reshaped.get(target)
+    if checksum is None:
+        try:
+            checksum = MeshSurface(target, depsgraph).checksum
+        except ValueError:  # the touch will say what is wrong
+            checksum = 0
+        if target in reshaped:
+            reshaped[target] = checksum
     settings.shape = f"{target.name} {checksum:08x}"
 
 
@@ -240,14 +326,25 @@ def refresh(probe, context):
     update(probe, context.evaluated_depsgraph_get(), complete=True)
 
 
+def _recolour(obj):
+    if patch_object.RECORD not in obj or not obj.is_editable:
+        return
+    try:
+        patch_object.require_whole(obj)
+    except ValueError:  # which verifying and exporting it say
+        return
+    patch_object.recolour(obj)
+
+
 def register():
     bpy.utils.register_class(TactileProbe)
-    bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe)
+    bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
     bpy.types.Object.tactile_colours = EnumProperty(
         name="Colours",
         description="What the colours of the patch show",
         items=[item[:3] for item in patch_object.QUANTITIES],
-        update=lambda obj, _: patch_object.recolour(obj) if patch_object.RECORD in obj else None,
+        override=OVERRIDABLE,
+        update=lambda obj, _: _recolour(obj),
     )
 
 

@@ -8,7 +8,7 @@ import bpy
 from bpy.props import FloatProperty, IntProperty
 
 from . import patch_object, probe, units
-from .operators import report_error
+from .operators import is_unlocked, report_error
 from .report import added_planes
 from .settings import MOST_PLANES
 
@@ -26,7 +26,7 @@ class _ProbeOperator:
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave this mode: probes are changed in Object Mode")
             return False
-        return True
+        return is_unlocked(cls, context)
 
 
 class _PlaneOperator(_ProbeOperator):

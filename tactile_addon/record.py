@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a patch keeps of its touch: a dict of plain values, its message included."""
+"""What is said of a touch: a dict of plain values, its message included."""
 
 import math
 from collections import Counter
@@ -8,6 +8,7 @@ from collections import Counter
 from .. import core
 
 BEYOND = 3.0  # times its own deviation, that a patch may be off the mesh in the mean
+CURVATURES = ("k1", "k2", "gaussian_curvature", "mean_curvature")
 ENDS = {
     core.UNEXPLAINED: "where the patch could not be trusted any more",
     core.EXTENT: "at the greatest extent allowed",
@@ -27,14 +28,14 @@ def ends(contours):
     return f" Of {2 * len(contours)} half curves {', '.join(words)}."
 
 
-def judgement(report, mean, scale=1.0):
+def judgement(result, mean, ended):
     """Status and message: the fit's own, unless it has no doubt and the mesh contradicts it.
 
-    mean : distance of the mesh; scale : of a patch that was scaled since its report
+    mean : distance of the mesh; ended : what is added to the fit's own message
     """
-    std, percent = scale * report["height_std"], 100.0 / (scale * report["radius"])
-    if report["fit"]["status"] != "ok" or mean <= BEYOND * std:
-        return report["fit"]
+    std, percent = result.mean_height_std, 100.0 / result.radius
+    if result.status != "ok" or mean <= BEYOND * std:
+        return {"status": result.status, "message": result.message + ended}
     return {
         "status": "uncertain",
         "message": f"The mesh is {percent * mean:.3g} % of the radius off the patch in the mean, which "
@@ -55,28 +56,34 @@ def suggestion_report(result, reference):
     }
 
 
+def measures(result):
+    """What else there is to say of a fit, which is dear, or of interest only once a gesture has ended."""
+    return {
+        "area": result.domain.area,
+        "total_absolute_curvature": result.total_absolute_curvature,
+        "condition_number": result.condition_number,
+        "is_verified": True,
+    }
+
+
 def reconstruction_report(result, ended=""):
-    """Of a fit; `ended` is added to its message."""
-    message = result.message + ended
+    """Of a fit; `ended` is added to its message. Nothing of a mesh is known yet."""
     d1, d2, n = result.frame.axes.T.tolist()
     return {
-        "status": result.status,
-        "message": message,
-        "fit": {"status": result.status, "message": message},  # a mesh may say otherwise
+        **judgement(result, 0.0, ended),
+        "ended": ended,
+        "is_verified": False,
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
         "k1": result.patch.k1,
         "k2": result.patch.k2,
         "gaussian_curvature": float(result.patch.gaussian_curvature(0.0, 0.0)),
         "mean_curvature": float(result.patch.mean_curvature(0.0, 0.0)),
+        **{f"{name}_std": getattr(result, f"{name}_std") for name in CURVATURES},
+        "residual": 0.0 if result.residual is None else result.radius * result.residual.size,
         "coefficients": result.patch.coefficients.tolist(),
         "radius": result.radius,
-        "ends": result.domain.ends.tolist(),
-        "points": result.contacts.tolist(),
-        "area": result.domain.area,
         "contacts": len(result.contacts),
         "fit_error": result.fit_error,
         "height_std": result.mean_height_std,
         "blind": result.blind,
-        "total_absolute_curvature": result.total_absolute_curvature,
-        "condition_number": result.condition_number,
     }

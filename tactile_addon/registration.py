@@ -9,10 +9,10 @@ from mathutils import Matrix
 
 from .. import core
 from . import patch_object, probe
-from .operators import report_error, target_object
+from .operators import is_unlocked, report_error, target_object
 from .report import registration_summary
 from .surface import MeshSurface
-from .verification import placed, selected_mesh
+from .verification import selected_mesh
 
 POSES = 5
 
@@ -28,7 +28,7 @@ def register_patch(patch, target, depsgraph, pose=1):
     if probe.probe_of(patch) is not None:
         raise ValueError(f'The place of "{patch.name}" is that of its probe: it is known already')
     vertices, faces = MeshSurface(target, depsgraph).triangles()
-    poses = core.register(placed(patch), vertices, faces, best=POSES)
+    poses = core.register(patch_object.reconstruction_of(patch), vertices, faces, best=POSES)
     if pose > len(poses):
         raise ValueError(f'There are {len(poses)} poses on "{target.name}": take one of them')
     chosen, matrix = poses[pose - 1], np.eye(4)
@@ -70,7 +70,7 @@ class TACTILE_OT_register(bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave this mode: patches are registered in Object Mode")
             return False
-        return True
+        return is_unlocked(cls, context)
 
     def execute(self, context):
         patch = probe.patch_near(context.view_layer.objects.active)

@@ -31,9 +31,10 @@ def readable(report):
         ("point", _vector(report["frame"]["origin"])),
         ("normal", _vector(report["frame"]["normal"])),
         ("direction d1", _vector(report["frame"]["d1"])),
-        ("kappa1, kappa2", f"{report['k1']:.5g}, {report['k2']:.5g} per unit of length"),
-        ("Gaussian curvature", f"{report['gaussian_curvature']:.5g} per unit of area"),
-        ("mean curvature", f"{report['mean_curvature']:.5g} per unit of length"),
+        ("kappa1, kappa2", f"{_measured(report, 'k1')}, {_measured(report, 'k2')} per unit of length"),
+        ("Gaussian curvature", f"{_measured(report, 'gaussian_curvature')} per unit of area"),
+        ("mean curvature", f"{_measured(report, 'mean_curvature')} per unit of length"),
+        ("residual", f"{report['residual']:.4g}, {_share(report, 'residual')} of the radius"),
         ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
         ("height std", f"{report['height_std']:.4g}, {_share(report, 'height_std')} of the radius"),
         ("mesh to patch", _verification(report)),
@@ -157,15 +158,18 @@ def patch_rows(record, unit):
     def row(label, key, power=1):
         return label, units.say(record[key], power, unit)
 
+    def measured(label, key, power):
+        return label, units.say(record[key], power, unit, record[f"{key}_std"])
+
     rows = [
-        row("Curvature κ1", "k1", -1),
-        row("Curvature κ2", "k2", -1),
-        row("Gaussian K", "gaussian_curvature", -2),
-        row("Mean H", "mean_curvature", -1),
+        measured("Curvature κ1", "k1", -1),
+        measured("Curvature κ2", "k2", -1),
+        measured("Gaussian K", "gaussian_curvature", -2),
+        measured("Mean H", "mean_curvature", -1),
         row("Fit Error", "fit_error"),
         ("Standard Deviation", "± " + units.say(record["height_std"], 1, unit)),
     ]
-    if "vertices" not in record:
+    if not record["is_verified"]:
         return [*rows, ("Mesh to Patch", "…")]
     if record["vertices"] and "verification" not in record:
         rows += [row("Mesh to Patch", "vertex_distance_mean"), row("… at Most", "vertex_distance_max")]
@@ -214,6 +218,10 @@ def _suggestion(plane):
 
 def _vector(v):
     return " ".join(f"{x:.5g}" for x in v)
+
+
+def _measured(report, key):
+    return f"{report[key]:.5g} ± {report[key + '_std']:.2g}"
 
 
 def _share(report, key):

@@ -43,6 +43,7 @@ AUTO = {  # literals, to be translated
 }
 MOST_PLANES = 6
 STEEPEST = math.radians(60)  # of a tilt, by mouse
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # what the override of a library's probe keeps as its own
 
 
 def changed(settings, context):
@@ -55,7 +56,13 @@ def changed(settings, context):
 class FitSettings:
     """Mixed into operators and property groups."""
 
-    method: EnumProperty(name="Method", description="How to fit the patch", items=METHODS, update=changed)
+    method: EnumProperty(
+        name="Method",
+        description="How to fit the patch",
+        items=METHODS,
+        update=changed,
+        override=OVERRIDABLE,
+    )
     degree: IntProperty(
         name="Degree",
         description="Of the polynomial that describes the patch, 2 to 6; 0 for the least that says what "
@@ -64,6 +71,7 @@ class FitSettings:
         min=0,
         max=6,
         update=changed,
+        override=OVERRIDABLE,
     )
     weight: FloatProperty(
         name="Weight",
@@ -72,9 +80,14 @@ class FitSettings:
         soft_min=1.0,
         soft_max=1e5,
         update=changed,
+        override=OVERRIDABLE,
     )
     solver: EnumProperty(
-        name="Solver", description="How to minimise the curvature", items=SOLVERS, update=changed
+        name="Solver",
+        description="How to minimise the curvature",
+        items=SOLVERS,
+        update=changed,
+        override=OVERRIDABLE,
     )
 
 
@@ -88,6 +101,7 @@ class TouchSettings(FitSettings):
         min=3,
         max=MOST_PLANES,
         update=changed,
+        override=OVERRIDABLE,
     )
     azimuths: FloatVectorProperty(
         name="Azimuths",
@@ -96,6 +110,7 @@ class TouchSettings(FitSettings):
         unit="ROTATION",
         default=[math.radians(a) for a in (0, 60, 120, 30, 90, 150)],
         update=changed,
+        override=OVERRIDABLE,
     )
     tilts: FloatVectorProperty(
         name="Tilts",
@@ -105,6 +120,7 @@ class TouchSettings(FitSettings):
         soft_min=-STEEPEST,
         soft_max=STEEPEST,
         update=changed,
+        override=OVERRIDABLE,
     )
     extent: FloatProperty(
         name="Extent",
@@ -113,6 +129,7 @@ class TouchSettings(FitSettings):
         subtype="DISTANCE",
         soft_min=0.0,
         update=changed,
+        override=OVERRIDABLE,
     )
     step: FloatProperty(
         name="Step",
@@ -120,6 +137,7 @@ class TouchSettings(FitSettings):
         subtype="DISTANCE",
         soft_min=0.0,
         update=changed,
+        override=OVERRIDABLE,
     )
     noise: FloatProperty(
         name="Noise",
@@ -128,12 +146,14 @@ class TouchSettings(FitSettings):
         soft_min=0.0,
         precision=4,
         update=changed,
+        override=OVERRIDABLE,
     )
     seed: IntProperty(
         name="Seed",
         description="Of the noise: the same seed gives the same contacts",
         min=0,
         update=changed,
+        override=OVERRIDABLE,
     )
 
 

@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from .surface import disabled, evaluated_mesh, product, size_of
+from .surface import coordinates, disabled, evaluated_object, product, size_of
 
 
 class MeshSnapshot:
@@ -23,7 +23,8 @@ class MeshSnapshot:
 
     def __init__(self, obj, depsgraph):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
-        evaluated, co, linear, _ = evaluated_mesh(obj, depsgraph)
+        evaluated, linear, _ = evaluated_object(obj, depsgraph)
+        co = coordinates(obj.name, evaluated)
         mesh = evaluated.data
         self.checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
         self.size = size_of(evaluated, linear)

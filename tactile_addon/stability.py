@@ -11,7 +11,7 @@ import numpy as np
 from .. import core
 from .mesh_error import height_error
 from .snapshot import MeshSnapshot
-from .surface import evaluated_mesh
+from .surface import coordinates, evaluated_object
 from .touch import STEPS, require_fine, require_lengths
 
 EXTENT_SHARE = 1.0 / 8.0  # of the object's size, where no extent is given
@@ -111,11 +111,11 @@ class StabilityMap:
             outward=self.surface.normals[chosen],
             **self.fit,
         )
-        core.mean_height_stds([r for r in found if isinstance(r, core.Reconstruction)])
+        patches = iter(core.with_height_stds([r for r in found if isinstance(r, core.Reconstruction)]))
         yield
         for (number, contours), result in zip(touched, found, strict=True):
             if isinstance(result, core.Reconstruction):
-                self._note(number, result)
+                self._note(number, next(patches))
             else:
                 shortest = min(contours, key=lambda contour: len(contour.points))
                 self.reason[number] = _reason_of(shortest.stops)
@@ -147,8 +147,8 @@ class StabilityMap:
 
     def require_same(self, obj, depsgraph):
         """Raises ValueError where the mesh has another shape than the one touched."""
-        _, co, _, _ = evaluated_mesh(obj, depsgraph)
-        if zlib.crc32(co) != self.surface.checksum:
+        evaluated, _, _ = evaluated_object(obj, depsgraph)
+        if zlib.crc32(coordinates(obj.name, evaluated)) != self.surface.checksum:
             raise ValueError(f'"{obj.name}" was changed while it was touched: start again')
 
     def report(self):

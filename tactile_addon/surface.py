@@ -4,6 +4,7 @@
 
 import math
 import zlib
+from functools import cached_property
 
 import numpy as np
 
@@ -14,16 +15,19 @@ WALK = 8  # steps at most to the nearest point of a stretched object; two or thr
 class MeshSurface:
     """The evaluated mesh of an object; core.track touches it through `ray_cast`.
 
+    sound : whether all its vertices are known to be at finite places, which takes time to see
     size : the longest edge of its bounding box, in the world
 
     The transform runs in Python floats: mathutils rounds to float32, which far from the world's
     origin is coarser than the mesh.
     """
 
-    def __init__(self, obj, depsgraph):
+    def __init__(self, obj, depsgraph, sound=False):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
         try:
-            evaluated, self._co, self._linear, self._origin = evaluated_mesh(obj, depsgraph)
+            evaluated, self._linear, self._origin = evaluated_object(obj, depsgraph)
+            if not sound:
+                self._co = coordinates(obj.name, evaluated)
             evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
         except RuntimeError as error:
             raise disabled(obj) from error
@@ -37,6 +41,10 @@ class MeshSurface:
         # Scans mostly are neither moved, turned nor scaled.
         self._is_in_place = np.array_equal(self._linear, np.eye(3)) and not self._origin.any()
         self.size = size_of(evaluated, self._linear)
+
+    @cached_property
+    def _co(self):
+        return coordinates(self._object.name, self._object)
 
     @property
     def checksum(self):
@@ -180,8 +188,8 @@ def disabled(obj):
     )
 
 
-def evaluated_mesh(obj, depsgraph):
-    """The evaluated object, its mesh's coordinates in it, and its transform: linear part and origin.
+def evaluated_object(obj, depsgraph):
+    """The evaluated object and its transform: linear part and origin.
 
     Raises ValueError, with a sentence, where it cannot be touched; but for disabled objects.
     """
@@ -196,14 +204,22 @@ def evaluated_mesh(obj, depsgraph):
     _require_invertible(obj.name, matrix[:3, :3])
     if not len(evaluated.data.polygons):
         raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
-    co = _coordinates(evaluated.data)
+    return evaluated, matrix[:3, :3], matrix[:3, 3]
+
+
+def coordinates(name, evaluated):
+    """Of all vertices of an evaluated object, in it, (n, 3) float32.
+
+    Raises ValueError, with a sentence, where they are not all at a place that can be touched.
+    """
+    co, matrix = _coordinates(evaluated.data), np.array(evaluated.matrix_world, dtype=float)
     largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
     if not math.isfinite(largest):
-        raise ValueError(f'"{obj.name}" has vertices at no finite place: delete them, or mend its modifiers')
+        raise ValueError(f'"{name}" has vertices at no finite place: delete them, or mend its modifiers')
     reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
     if not reach <= FARTHEST:  # NaN is nowhere
-        raise ValueError(f'"{obj.name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
-    return evaluated, co, matrix[:3, :3], matrix[:3, 3]
+        raise ValueError(f'"{name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
+    return co
 
 
 def size_of(evaluated, linear):

@@ -3,15 +3,17 @@
 """One touch, from an object of the scene to a reconstruction and its report; nothing in the scene changes."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
 from .. import core
+from ..core.arguments import unit_vector
 from .mesh_error import height_error
-from .record import ends, judgement, reconstruction_report, suggestion_report
+from .record import ends, judgement, measures, reconstruction_report, suggestion_report
 from .settings import MOST_PLANES, STEEPEST
+from .single_precision import require_single
 from .surface import MeshSurface
 
 FARTHEST = 1.0 / 2.0  # of the object's largest dimension: of a half contour that ends by itself
@@ -22,25 +24,16 @@ HELPS = 0.1  # of the mean deviation of the height, that one more plane is to ta
 COARSE = 1.0 / 20.0  # of a step: contacts rounded by more say nothing about curvature
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Touch:
-    """What a touch gave; `report` is a dict of plain values, which `verify` completes.
+    """What a touch gave; `report` is a dict of plain values.
 
     surface : None where the contours were measured elsewhere
     """
 
     surface: MeshSurface | None
     result: core.Reconstruction
-    contours: list[core.Contour]
     report: dict
-
-    @property
-    def is_complete(self):
-        return "vertices" in self.report
-
-    @property
-    def is_verified(self):
-        return self.surface is not None and self.is_complete
 
 
 def touch(obj, depsgraph, location, planes, *, tolerance=None, **inputs):
@@ -64,8 +57,7 @@ def touch(obj, depsgraph, location, planes, *, tolerance=None, **inputs):
         planes = more
         after = touched.result.mean_height_std
         added.append({"azimuth": plane["azimuth"], "height_std_before": std, "height_std": after})
-    touched.report["added_planes"] = added
-    return touched
+    return replace(touched, report=touched.report | {"added_planes": added})
 
 
 def touch_along(
@@ -74,7 +66,7 @@ def touch_along(
     location,
     planes,
     *,
-    normal=None,
+    outward=None,
     toward=None,
     tangent=None,
     extent,
@@ -82,24 +74,26 @@ def touch_along(
     noise,
     seed,
     farthest=None,
+    sound=False,
     **fit,
 ):
     """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
 
     location : world coordinates, projected onto the object
-    normal : outward, or None for the surface's; on the side of it that `toward` points to, where given
+    outward : or None for the surface's; on the side of it that `toward` points to, where given
     tangent : azimuth 0 of the planes, see core.SamplingPlane.axes; None for its choice
     extent, step : 0 for what the surface there asks for, see core.explore
     farthest : of an extent that is chosen, half the object's size where it is None
+    sound : see MeshSurface
     fit : what core.reconstruct takes
 
     Raises ValueError with a sentence for the user.
     """
     clock = [perf_counter()]
-    surface = MeshSurface(obj, depsgraph)
+    surface = MeshSurface(obj, depsgraph, sound)
     require_lengths(obj.name, surface.size, extent, step, noise)
     point, surface_normal = _reference_point(obj.name, surface, location, extent, step)
-    outward = surface_normal if normal is None else normal
+    outward = unit_vector("outward", surface_normal if outward is None else outward)
     if toward is not None and np.dot(outward, toward) < 0.0:
         outward = [-v for v in outward]
     axes = reference_axes(outward, tangent)
@@ -112,7 +106,8 @@ def touch_along(
     sensor = {"noise": noise, "rng": seed, "tangent": axes[:, 0]}
     found = core.explore(surface, point, outward, planes, **size, **sensor, **fit)
     clock.append(perf_counter())
-    result, contours = found.result, found.contours
+    result = found.result
+    require_single(result)
     report = {
         "source": obj.name,
         "method": fit["method"],
@@ -121,29 +116,31 @@ def touch_along(
         "step": found.step,
         "noise": noise,
         "seed": seed,
-        **reconstruction_report(result, "" if extent else ends(contours)),
+        **reconstruction_report(result, "" if extent else ends(result.contours)),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
         "axes": axes.tolist(),
-        "stops": [list(contour.stops) for contour in contours],
+        "stops": [list(contour.stops) for contour in result.contours],
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
-    return Touch(surface, result, contours, report)
+    return Touch(surface, result, report)
 
 
 def verify(touched, most=None):
-    """Completes the report by what is dear: where to touch next, and distances to the mesh.
+    """The touch with what is dear in its report too: where to touch next, and distances to the mesh.
 
     most : of the vertices around, where not all are to be compared
     """
-    clock = [perf_counter()]
-    touched.report.update(_verification_report(touched.surface, touched.result, most))
+    clock, result, report = [perf_counter()], touched.result, touched.report
+    found = _verification_report(touched.surface, result, most)
     # Where faces are large a pocket between the curves may have no vertex that lies over the patch.
-    offs = touched.report.get("vertex_distance_mean"), height_error(touched.surface, touched.result)
-    touched.report.update(judgement(touched.report, max(off or 0.0 for off in offs)))
+    offs = found.get("vertex_distance_mean"), height_error(touched.surface, result)
+    found |= judgement(result, max(off or 0.0 for off in offs), report["ended"])
     clock.append(perf_counter())
-    touched.report["suggested_plane"] = suggestion_report(touched.result, np.array(touched.report["axes"]))
+    plane = suggestion_report(result, np.array(report["axes"]))
     clock.append(perf_counter())
-    touched.report["seconds"] |= dict(zip(("verify", "suggest"), np.diff(clock).tolist(), strict=True))
+    seconds = report["seconds"] | dict(zip(("verify", "suggest"), np.diff(clock).tolist(), strict=True))
+    found |= {"suggested_plane": plane, "seconds": seconds, **measures(result)}
+    return replace(touched, report=report | found)
 
 
 def require_lengths(name, size, extent, step, noise):
@@ -207,7 +204,7 @@ def plane_axes(matrix, settings, number):
 def _verification_report(surface, result, most):
     """Distances to the patch of the vertices over it that a finger can reach; none where there are none."""
     _, over = reachable(surface, result, most)
-    misses = core.distances(result.patch, result.frame.to_local(over))
+    misses = core.distances(result.geometry, result.frame.to_local(over))
     if not len(misses):
         return {"vertices": 0}
     return {
@@ -220,5 +217,5 @@ def _verification_report(surface, result, most):
 def reachable(surface, r, most=None):
     """The vertices over a patch that a finger can reach: indices in the evaluated mesh, world coordinates."""
     near, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius, most)
-    over = core.reachable(r, surface, vertices, normals)
+    over = core.reachable(r.geometry, surface, vertices, normals)
     return near[over], vertices[over]

@@ -36,9 +36,10 @@ def unit_of(scene, size):
     return symbol, metres / settings.scale_length
 
 
-def say(value, power, unit):
-    """A value in length^power, as in "0.0123 mm" or "-4.2 1/mm²"."""
-    return f"{value / unit[1] ** power:.3g} {symbol(power, unit)}".strip()
+def say(value, power, unit, std=None):
+    """A value in length^power, as in "0.0123 mm" or "-4.2 ± 0.3 1/mm²"; the panel has room for one digit."""
+    spread = "" if std is None else f" ± {float(f'{std / unit[1] ** power:.1g}'):g}"
+    return f"{value / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
 
 
 def symbol(power, unit):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A patch, where it is now, against any mesh: the operator, and what it does."""
 
-from typing import NamedTuple
-
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, StringProperty
@@ -11,7 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 from .. import core
 from . import mesh_data, patch_object, probe
 from .live import is_pending
-from .operators import report_error, target_object
+from .operators import is_unlocked, report_error, target_object
 from .record import judgement
 from .report import verification_summary
 from .surface import MeshSurface
@@ -19,42 +17,6 @@ from .touch import reachable
 
 DISTANCE, OVERLAP = "patch_distance", "patch_overlap"  # attributes of the mesh
 NOTHING = -1.0  # the distance of a vertex that does not count
-EVEN = 1e-4  # that the scales of a patch may differ by
-
-
-class Placed(NamedTuple):
-    """A patch object as core.verify takes it, in the world, and how many times its report's size it is."""
-
-    frame: core.Frame
-    radius: float
-    patch: core.MongePatch
-    domain: core.Domain
-    contacts: np.ndarray
-    scale: float
-
-
-def placed(patch):
-    """The patch object where it is now. Raises ValueError where it is no longer of its shape."""
-    record, scale = patch[patch_object.RECORD], 1.0
-    if not {"ends", "points", "fit"} <= set(record.keys()):
-        raise ValueError(f'"{patch.name}" does not say what it was fitted to: touch again to verify it')
-    axes, origin = patch_object.touched_frame(patch)
-    if not patch_object.is_at(patch, axes, origin):  # where it is, that is in double precision
-        matrix = np.array(patch.matrix_world, dtype=float)
-        scale, origin = np.linalg.norm(matrix[:3, :3]) / 3.0**0.5, matrix[:3, 3]
-        axes = matrix[:3, :3] / max(scale, 1e-30)
-        if not (np.allclose(axes.T @ axes, np.eye(3), atol=EVEN) and np.linalg.det(axes) > 0.0):
-            raise ValueError(
-                f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
-            )
-    return Placed(
-        core.Frame(origin, axes),
-        scale * record["radius"],
-        core.MongePatch(record["k1"], record["k2"], np.array(record["coefficients"])).scaled(scale),
-        core.Domain(scale * np.array(record["ends"])),
-        scale * np.array(record["points"]),
-        scale,
-    )
 
 
 def verify_patch(patch, target, depsgraph, write=False):
@@ -64,36 +26,36 @@ def verify_patch(patch, target, depsgraph, write=False):
 
     Raises ValueError, with a sentence and nothing changed, where that cannot be done.
     """
-    if not (patch.is_editable and patch.data.is_editable):
-        raise ValueError(f'"{patch.name}" comes from a library: make it local to verify it')
-    r, surface = placed(patch), MeshSurface(target, depsgraph)
+    probe.require_unlocked(patch)
+    patch_object.require_whole(patch)
+    r, surface = patch_object.reconstruction_of(patch), MeshSurface(target, depsgraph)
     if write:
         _require_writable(target, depsgraph)
     indices, vertices = reachable(surface, r)
     found = core.verify(r, surface, vertices)
-    points, normals = _vertices(patch.data, r)
+    record = patch[patch_object.RECORD]
+    points, normals = _vertices(patch.data, r, r.radius / record["radius"])
     deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
     mesh_data.own_mesh(patch)
     mesh_data.write(patch.data, "deviation", "FLOAT", deviations)
     patch_object.recolour(patch)
-    record = patch[patch_object.RECORD]
     record["verification"] = {"target": target.name, **found}
-    verdict = judgement(record.to_dict(), found.get("vertex_distance_mean", 0.0), r.scale)
-    record["status"], record["message"] = verdict["status"], verdict["message"]
+    if record["status"] != "outdated":
+        record.update(judgement(r, found.get("vertex_distance_mean", 0.0), record["ended"]))
     if write:
         distances = np.full(len(target.data.vertices), NOTHING)
-        distances[indices] = core.distances(r.patch, r.frame.to_local(vertices))
+        distances[indices] = core.distances(r.geometry, r.frame.to_local(vertices))
         mesh_data.write(target.data, DISTANCE, "FLOAT", distances)
         mesh_data.write(target.data, OVERLAP, "BOOLEAN", distances != NOTHING)
         target.data.update()
 
 
-def _vertices(mesh, r):
-    """Points and unit normals of the patch's vertices, in its frame."""
+def _vertices(mesh, r, scale):
+    """Points and unit normals of the patch's vertices, in its frame, and so many times the mesh's size."""
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.attributes["position"].data.foreach_get("vector", points.ravel())
-    points = r.scale * points.astype(float)
-    return points, r.patch.normal(points[:, 0], points[:, 1])
+    points = scale * points.astype(float)
+    return points, r.geometry.normal(points[:, 0], points[:, 1])
 
 
 def _require_writable(target, depsgraph):
@@ -133,7 +95,7 @@ class TACTILE_OT_verify(bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave this mode: patches are verified in Object Mode")
             return False
-        return True
+        return is_unlocked(cls, context)
 
     def execute(self, context):
         obj = context.view_layer.objects.active

@@ -24,7 +24,7 @@ def test_a_patch_from_every_kind_of_file(command, files):
 
 
 def test_every_option_arrives(command, files):
-    options = ["--target", "Sphere", "--normal", "0.1", "-0.1", "1", "--step", "0.05", "--noise", "1e-3"]
+    options = ["--target", "Sphere", "--outward", "0.1", "-0.1", "1", "--step", "0.05", "--noise", "1e-3"]
     options += ["--seed", "4", "--azimuths", "-10", "40", "85", "130", "--tilts", "5", "0", "-5", "0"]
     options += ["--method", "quadratic-variation", "--degree", "5", "--weight", "500", "--solver", "fast"]
     path, output = files / "report.json", files / "out.blend"

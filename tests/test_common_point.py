@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The point where measured curves meet, when nobody says where that is."""
 
+import importlib
+
 import numpy as np
 import pytest
 import surfaces
@@ -121,3 +123,28 @@ ACROSS = LINE[:, [1, 0, 2]]
 def test_curves_without_a_common_point_are_refused_with_a_sentence(given, words):
     with pytest.raises(DegenerateCurvesError, match=words):
         meet(given)
+
+
+def bent(angle, count):
+    s = np.linspace(-1.0, 1.0, count)
+    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    return Contour(np.outer(s, direction) - np.outer(0.25 * s**2, [0.0, 0.0, 1.0]))
+
+
+def test_of_many_contacts_as_many_are_looked_at_as_tell_something(monkeypatch):
+    module = importlib.import_module("core.common_point")
+    seen = []
+    stacked = module.stacked
+    monkeypatch.setattr(module, "stacked", lambda *given: seen.append(stacked(*given)) or seen[-1])
+    point, misses = common_point([bent(angle, 30_001) for angle in (0.0, 1.0, 2.0)])
+    assert point == pytest.approx(np.zeros(3), abs=1e-6)
+    assert misses == pytest.approx(np.zeros(3), abs=1e-6)
+    assert max(r.shape[2] for r, _, _ in seen) == module.NEAREST
+    assert len(module._starts([bent(angle, 30_001) for angle in (0.0, 1.0, 2.0)])) <= module.STARTS
+
+
+def test_a_long_curve_among_many_short_ones():
+    contours = [bent(0.0, 40_000), *(bent(angle, 5) for angle in np.linspace(0.01, 3.13, 300))]
+    point, misses = common_point(contours)
+    assert point == pytest.approx(np.zeros(3), abs=1e-6)
+    assert misses.max() < 1e-6

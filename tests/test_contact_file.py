@@ -3,17 +3,22 @@
 """Contact data in files, as people's machines write them."""
 
 import struct
+import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import surfaces
+from fuzzing import in_time
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+import core
 from core import Contour
 
 WANTED = np.array([[[0.0, 0, 0], [1, 2, 3], [2, 4, 6.5]], [[0, 0, 0], [-1, 0.5, 1e-3], [0, 1, 0]]])
+TITLE = "# Tactile Patch contacts, version {}, lengths in no unit\n"
 PLAIN = "curve,x,y,z\n1,0,0,0\n1,1,2,3\n1,2,4,6.5\n2,0,0,0\n2,-1,0.5,1e-3\n2,0,1,0\n"
 
 
@@ -26,7 +31,7 @@ def contact_file(extension):
 def read(contact_file, tmp_path):
     def read(data, name="contacts.csv"):
         (tmp_path / name).write_bytes(data if isinstance(data, bytes) else data.encode())
-        return contact_file.read(tmp_path / name)
+        return contact_file.read(tmp_path / name)[:2]
 
     return read
 
@@ -115,6 +120,12 @@ def test_without_a_curve_column_a_file_is_one_curve(read):
         ("curve,x_mm,y_cm,z_mm\n", "line 1: wanted x, y and z in one unit, got cm and mm"),
         ("curve,x [furlong],y,z\n", 'line 1: wanted a unit out of km, m, cm, mm.* got "furlong"'),
         (PLAIN.replace("3", "three"), '"contacts.csv", line 3, column "z": wanted a number, got "three"'),
+        (TITLE.format(3) + PLAIN, "line 1: wanted version 2 or less, got 3: this was written by a later"),
+        (TITLE.format("x") + PLAIN, "line 1: wanted version 2 or less, got x"),
+        (TITLE.format(2) + "# point 1 2\n" + PLAIN, "line 2: wanted 3 numbers for point, got 2"),
+        (TITLE.format(2) + "# noise few\n" + PLAIN, 'line 2, "noise": wanted a number, got "few"'),
+        (TITLE.format(2) + "# noise -1\n" + PLAIN, 'line 2, "noise": wanted a number of 0 or more, got -1'),
+        (TITLE.format(2) + "# noise 1 2 3\n" + PLAIN, "wanted one noise or 2, one a curve, got 3"),
         (PLAIN.replace("6.5", "nan"), 'line 4, column "z": wanted a number, got "nan"'),
         (PLAIN.replace("6.5", "1e999"), 'line 4, column "z": wanted a number'),
         (PLAIN.replace("6.5", "1_0"), 'line 4, column "z": wanted a number, got "1_0"'),
@@ -144,15 +155,56 @@ def test_files_that_are_none(contact_file, read, tmp_path):
 def test_what_the_tracker_made_comes_back_as_it_was(contact_file, tmp_path):
     s = surfaces.pear()
     contours = s.track(surfaces.planes((0, 60, 120)), noise=0.05, rng=1)
-    contact_file.write(tmp_path / "out.csv", contours, "mm")
-    found, unit = contact_file.read(tmp_path / "out.csv")
-    assert unit == "mm"
-    for one, other in zip(contours, found, strict=True):
+    given = contact_file.Contacts(contours, "mm", [0.1, 1 / 3, 2e-17], [0.6, 0.0, -0.8])
+    contact_file.write(tmp_path / "out.csv", given)
+    found = contact_file.read(tmp_path / "out.csv")
+    assert found[1:] == given[1:]
+    for one, other in zip(contours, found.contours, strict=True):
         assert np.array_equal(one.points, other.points)
         assert np.array_equal(one.normals, other.normals)
+        assert (other.noise, other.normal_std) == (0.05, None)
     head = (tmp_path / "out.csv").read_text(encoding="utf-8").splitlines()
-    assert head[0] == "# Tactile Patch contacts, version 1, lengths in mm"
-    assert head[1] == "curve,x [mm],y [mm],z [mm],nx,ny,nz"
+    assert head[:5] == [
+        "# Tactile Patch contacts, version 2, lengths in mm",
+        "# point 0.1 0.3333333333333333 2e-17",
+        "# outward 0.6 0.0 -0.8",
+        "# noise 0.05",
+        "curve,x [mm],y [mm],z [mm],nx,ny,nz",
+    ]
+
+
+@pytest.mark.parametrize("normal_stds", [(None,) * 3, (0.02,) * 3, (0.01, 0.3, 0.3), (0.01, 0.01, None)])
+@pytest.mark.parametrize("noise", [None, 0.02])
+@pytest.mark.parametrize("shape", ["alike", "one dense", "one with normals"])
+def test_what_was_exported_and_is_read_gives_the_same_patch(
+    extension, contact_file, tmp_path, normal_stds, noise, shape
+):
+    s = surfaces.pear()
+    contours = s.track(surfaces.planes((0, 60, 120)), noise=0.05, rng=1)
+    if shape == "one dense":
+        contours[0] = s.track(surfaces.planes((0,)), step=0.05, noise=0.05, rng=1)[0]
+    contours = [replace(c, normal_std=std) for c, std in zip(contours, normal_stds, strict=True)]
+    if shape == "one with normals":
+        contours[1:] = [replace(c, normals=None, normal_std=None) for c in contours[1:]]
+    r = core.reconstruct(s.point, contours, outward=s.normal, noise=noise)
+    contact_file.write(tmp_path / "out.csv", contact_file.contacts_of(r))
+    found, _, point, outward = contact_file.read(tmp_path / "out.csv")
+    again = extension.core.reconstruct(point, found, outward=outward)
+    near = {"rel": 1e-9, "abs": 1e-12}
+    assert again.patch.coefficients == pytest.approx(r.patch.coefficients, **near)
+    assert (again.patch.k1, again.patch.k2) == pytest.approx((r.patch.k1, r.patch.k2), **near)
+    assert again.frame.axes == pytest.approx(r.frame.axes, **near)
+    assert again.mean_height_std == pytest.approx(r.mean_height_std, **near)
+
+
+def test_comments_that_are_not_ours_say_nothing(contact_file, tmp_path):
+    """Neither those of other programs, nor those of version 1, nor those below the header."""
+    told = "# point 1 2 3\n# noise 5\n"
+    titles = "# made by a robot\n", "# Tactile Patch contacts, version 1, lengths in no unit\n", ""
+    for text in (titles[0] + told + PLAIN, titles[1] + PLAIN, titles[2] + told + PLAIN, PLAIN + told):
+        (tmp_path / "other.csv").write_text(text)
+        contours, unit, point, outward = contact_file.read(tmp_path / "other.csv")
+        assert (unit, point, outward, contours[0].noise) == ("", None, None, None)
 
 
 @given(
@@ -161,8 +213,9 @@ def test_what_the_tracker_made_comes_back_as_it_was(contact_file, tmp_path):
 )
 def test_any_numbers_come_back_as_they_were(contact_file, tmp_path_factory, coordinates, unit):
     path = tmp_path_factory.getbasetemp() / "any.csv"
-    contact_file.write(path, [Contour(coordinates[:2]), Contour(coordinates[2:])], unit)
-    contours, found = contact_file.read(path)
+    contours = [Contour(coordinates[:2]), Contour(coordinates[2:])]
+    contact_file.write(path, contact_file.Contacts(contours, unit))
+    contours, found, _, _ = contact_file.read(path)
     assert found == unit
     assert np.array_equal(np.vstack([c.points for c in contours]), coordinates)
 
@@ -257,8 +310,103 @@ def test_whatever_happens_to_a_file_it_is_read_or_refused_with_a_sentence(
     path = tmp_path_factory.getbasetemp() / ("any.csv" if data is WHOLE[0] else "any.ply")
     path.write_bytes(data[:at] + put + data[at + lost :])
     try:
-        contours, _ = contact_file.read(path)
+        contours = contact_file.read(path).contours
     except ValueError as error:
         assert ": wanted " in str(error)
     else:
         assert all(np.isfinite(c.points).all() and len(c.points) for c in contours)
+
+
+@in_time
+@pytest.mark.parametrize("mark", ["[", "(", "_", "[" * 300, ""])
+@pytest.mark.parametrize("end", ["", "]", "mm", "mm ]"])
+def test_a_long_header_is_read_in_one_pass(read, mark, end):
+    title = f"x {mark}{' ' * 100_000}{end}"
+    try:
+        read(f"{title},y,z\n1,2,3\n")
+    except ValueError as error:
+        assert '"contacts.csv", line 1: wanted ' in str(error)
+
+
+def rows_of(count, digits=17):
+    points = np.random.default_rng(0).random((count, 3))
+    return points, "".join("c,{:.{d}},{:.{d}},{:.{d}}\n".format(*p, d=digits) for p in points.tolist())
+
+
+@pytest.mark.parametrize("change", [("c,", "c,"), ("c,", '"c",'), ("c,", " c , "), (".", ",")])
+def test_rows_are_read_many_at_a_time_and_take_little_memory(read, contact_file, monkeypatch, change):
+    """One by one, only where something is to be said of one."""
+    count = 50_000
+    points, text = rows_of(count)
+    text = text.replace(",", ";").replace(".", ",") if change[0] == "." else text.replace(*change)
+    looked = []
+    monkeypatch.setattr(contact_file.contact_rows.Rows, "_row", lambda *_: looked.append(1))
+    header = "curve;x;y;z\n" if change[0] == "." else "curve,x,y,z\n"
+    tracemalloc.start()
+    try:
+        (contour,), _ = read(header + text)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert np.array_equal(contour.points, points)
+    assert not looked
+    assert peak < 300 * count
+
+
+def test_one_bad_row_costs_no_more_than_its_neighbors(read, contact_file, monkeypatch):
+    count, looked = 50_000, []
+    row = contact_file.contact_rows.Rows._row
+    monkeypatch.setattr(
+        contact_file.contact_rows.Rows, "_row", lambda *given: looked.append(1) or row(*given)
+    )
+    _, text = rows_of(count)
+    with pytest.raises(ValueError, match=f'line {count + 2}, column "y": wanted a number, got "three"'):
+        read("curve,x,y,z\n" + text + "c,2,three,4\n")
+    assert len(looked) < 3000
+
+
+def test_empty_lines_are_not_looked_at_one_by_one(read, contact_file, monkeypatch):
+    rows, seen = contact_file.contact_rows, []
+    says = rows._says
+    monkeypatch.setattr(rows, "_says", lambda line: seen.append(1) or says(line))
+    for blank in ("\n", " \n", "\r\n"):
+        (contour,), _ = read(f"{blank * 300_000}x,y,z\n{blank * 300_000}0,0,0\n#\n{blank * 300_000}1,2,3\n")
+        assert contour.points.tolist() == [[0, 0, 0], [1, 2, 3]]
+    assert len(seen) < 600_000
+    with pytest.raises(ValueError, match=r'line 700001, column "z": wanted a number, got "c"'):
+        read("\n" * 200_000 + "x,y,z\n" + "\n" * 499_999 + "a,b,c\n".replace("a", "1").replace("b", "2"))
+
+
+@pytest.mark.parametrize(
+    ("data", "name", "words"),
+    [
+        (
+            "x,y,z\n0,0,0\n1e60,0,1\n",
+            "contacts.csv",
+            '"contacts.csv", line 3, column "x": wanted numbers up to',
+        ),
+        (
+            ply("binary_little_endian") + packed("<", "dddi", [*ROWS[:-1], (1e60, 0, 0, 1)]),
+            "contacts.ply",
+            r'"contacts.ply", contact 6: wanted finite coordinates up to 1e\+50',
+        ),
+        (
+            ply("binary_little_endian", 2, "".join(f"property float {v}\n" for v in ("x", "y", "z")))
+            + packed("<", "3f", [(1e7, 0, 0), (1e7 + 2, 0, 0)]),
+            "contacts.ply",
+            r'"contacts.ply", curve "1.0": points: numbers of single precision are',
+        ),
+    ],
+)
+def test_numbers_that_no_curve_can_have_are_refused_with_their_place(read, data, name, words):
+    with pytest.raises(ValueError, match=words):
+        read(data, name)
+
+
+def test_a_file_beyond_memory_is_a_sentence(read, contact_file, monkeypatch):
+    def exhausted(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(contact_file.contact_rows, "contours", exhausted)
+    with pytest.raises(ValueError, match=r'"contacts.csv": wanted contacts that fit into memory, got more'):
+        read(PLAIN)

@@ -38,7 +38,7 @@ from core import (
 
 NAMES = (
     "azimuth|contours|contours_list|degree|extent|farthest|method|noise|normal|normal_std|normals|outward|plane_normal|planes|point|"
-    "points|rng|sensor_std|solver|step|stops|surface|tangent|tilt|weight"
+    "points|rng|noise|solver|step|stops|surface|tangent|tilt|weight"
 )
 SHAPES = (
     surfaces.sphere(25), surfaces.plane(), surfaces.cylinder(20), surfaces.torus(40, 20, 0.6),
@@ -277,7 +277,7 @@ def contour_option(draw, touch):
 def option(draw, touch):
     """An argument of reconstruct that is no good, or as good as."""
     name = draw(
-        st.sampled_from(["outward", "point", "method", "solver", "degree", "sensor_std", "weight", "curves"])
+        st.sampled_from(["outward", "point", "method", "solver", "degree", "noise", "weight", "curves"])
     )
     values = {
         "outward": ODD_VECTORS,
@@ -286,7 +286,7 @@ def option(draw, touch):
         "degree": st.one_of(
             st.integers(-2, 9), st.sampled_from([2.0, True, np.int64(4), "4", "auto "]), ODD_VECTORS
         ),
-        "sensor_std": st.one_of(ODD_NUMBERS, st.floats(0, 1e60)),
+        "noise": st.one_of(ODD_NUMBERS, st.floats(0, 1e60)),
         "weight": st.one_of(ODD_NUMBERS, st.floats(0, 1e60)),
     }
     touch[name] = draw(values.get(name, st.one_of(ODD_VECTORS, st.sampled_from(["", "BAYES", ("bayes",)]))))
@@ -310,7 +310,7 @@ def touches(draw):
         "contour": {},
         "method": draw(st.sampled_from(METHODS)),
         "degree": draw(st.sampled_from([2, 3, 4, 5, 6, "auto"])),
-        "sensor_std": draw(st.sampled_from([None, 0.0, 0.05, 10.0])),
+        "noise": draw(st.sampled_from([None, 0.0, 0.05, 10.0])),
         "weight": draw(st.sampled_from([None, 1e-9, 1.0, 1e5, 1e12])),
         "solver": draw(st.sampled_from([SOLVERS[0]] * 9 + [SOLVERS[1]])),
     }
@@ -351,7 +351,7 @@ def test_many_touches_with_one_of_them_broken(touch):
     point, outward, curves = tracked(0, 0, 0.0)
     good, options = (
         [Contour(c) for c in curves],
-        {name: touch[name] for name in ("method", "degree", "sensor_std", "weight", "solver")},
+        {name: touch[name] for name in ("method", "degree", "noise", "weight", "solver")},
     )
     many = refused(
         reconstruct_many,
@@ -478,7 +478,7 @@ def test_a_surface_that_answers_oddly(data, shape, rarely, hits):
 
 TRACKING = {
     "point": ODD_VECTORS,
-    "normal": ODD_VECTORS,
+    "outward": ODD_VECTORS,
     "tangent": ODD_VECTORS,
     "planes": st.one_of(
         st.builds(lambda a, b: [SamplingPlane(a, b)], ODD_NUMBERS, ODD_NUMBERS),
@@ -496,7 +496,7 @@ TRACKING = {
 @in_time
 def test_tracking_with_odd_arguments(names, data):
     s = SHAPES[1]
-    arguments = {"point": s.point, "normal": s.normal, "planes": PLANES[0], "extent": 8.0, "step": 1.5}
+    arguments = {"point": s.point, "outward": s.normal, "planes": PLANES[0], "extent": 8.0, "step": 1.5}
     arguments |= {name: data.draw(TRACKING[name]) for name in sorted(names)}
     contours = refused(track, s, **arguments)
     if contours is not None:
@@ -518,7 +518,7 @@ EXPLORING = TRACKING | {
 @in_time
 def test_exploring_with_odd_arguments(names, data):
     s = SHAPES[1]
-    arguments = {"point": s.point, "normal": s.normal, "planes": PLANES[0], "farthest": 16.0}
+    arguments = {"point": s.point, "outward": s.normal, "planes": PLANES[0], "farthest": 16.0}
     arguments |= {name: data.draw(EXPLORING[name]) for name in sorted(names)}
     found = refused(explore, s, **arguments)
     if found is not None:

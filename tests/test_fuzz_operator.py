@@ -300,7 +300,7 @@ VECTORS = st.one_of(st.tuples(FLOATS, FLOATS, FLOATS), st.tuples(TINY, TINY, TIN
 SIXES = st.lists(FLOATS, min_size=6, max_size=6)
 INPUTS = {
     "location": VECTORS,
-    "normal": VECTORS,
+    "outward": VECTORS,
     "plane_count": st.integers(-1, 7),
     "azimuths": SIXES,
     "tilts": SIXES,
@@ -317,7 +317,7 @@ INPUTS = {
 
 TOUCH = {"location": (0.3, -0.2, 1.9), "extent": 0.6}
 MAP = {"extent": 0.6, "spacing": 1.5}
-MAP_INPUTS = {n: v for n, v in INPUTS.items() if n not in ("location", "normal")} | {"spacing": FLOATS}
+MAP_INPUTS = {n: v for n, v in INPUTS.items() if n not in ("location", "outward")} | {"spacing": FLOATS}
 
 
 def inputs(draw, good=TOUCH, odd=INPUTS):
@@ -547,7 +547,7 @@ WORDS = st.one_of(
     st.text(max_size=5).filter(lambda t: "\0" not in t),
 )  # fmt: skip
 OPTIONS = (
-    "--target", "--location", "--normal", "--azimuths", "--tilts", "--extent", "--step", "--noise", "--seed",
+    "--target", "--location", "--outward", "--azimuths", "--tilts", "--extent", "--step", "--noise", "--seed",
     "--method", "--degree", "--weight", "--solver", "--nonsense",
 )  # fmt: skip
 

@@ -3,6 +3,7 @@
 """Measured contours in and patches out, in a real Blender; windows and dropped files are in tests/gui."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,7 +34,9 @@ def measured(extension, empty, tmp_path):
             object.__setattr__(c, "normals", np.delete(c.normals, 12, axis=0) if normals else None)
             if shuffle:
                 object.__setattr__(c, "points", np.random.default_rng(0).permutation(c.points))
-        extension.tactile_addon.contact_file.write(tmp_path / name, contours, unit)
+            object.__setattr__(c, "noise", None)
+        contact_file = extension.tactile_addon.contact_file
+        contact_file.write(tmp_path / name, contact_file.Contacts(contours, unit))
         return str(tmp_path / name)
 
     return write
@@ -122,6 +125,35 @@ def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):
         assert steps.max() < 2.3  # the point is no contact
 
 
+def test_what_a_file_says_of_its_patch_counts_unless_something_else_is_given(empty, measured, tmp_path):
+    """The other side than the bulge tells, and a point beside where the curves meet."""
+    path = Path(measured(normals=False))
+    point, down = SURFACE.point + 0.01 * SURFACE.normal, -SURFACE.normal
+    told = "".join(
+        f"# {key} {' '.join(map(repr, values.tolist()))}\n"
+        for key, values in (("point", point), ("outward", down))
+    )
+    title, *rows = path.read_text().splitlines(keepends=True)
+    path.write_text(title + told + "# noise 0.5\n" + "".join(rows))
+    _, report = imported(empty, str(path))
+    assert report["frame"]["origin"] == pytest.approx(point, rel=1e-12)
+    assert np.dot(report["frame"]["normal"], down) > 0.99
+    assert "misses" not in report
+    _, other = imported(empty, str(path), point=list(SURFACE.point), outward=list(SURFACE.normal))
+    assert other["frame"]["origin"] == pytest.approx(SURFACE.point, rel=1e-6)
+    assert np.dot(other["frame"]["normal"], SURFACE.normal) > 0.99
+    _, sharp = imported(empty, str(path), noise=0.01)
+    assert sharp["height_std"] < report["height_std"]
+    _, scaled = imported(empty, str(path), unit="cm")
+    assert scaled["frame"]["origin"] == pytest.approx(0.01 * point, rel=1e-12)
+    assert scaled["height_std"] == pytest.approx(0.01 * report["height_std"], rel=1e-9)
+    copy = tmp_path / "copy.csv"
+    copy.write_text(path.read_text().replace("# point ", "# point 1"))
+    words = "The files name different reference points: import each of them by itself"
+    with pytest.raises(RuntimeError, match=words):
+        imported(empty, str(path), directory=str(tmp_path), files=[{"name": path.name}, {"name": copy.name}])
+
+
 def test_one_file_a_curve(extension, empty, tmp_path):
     names = []
     for number, contour in enumerate(contours_of(SURFACE)):
@@ -187,7 +219,7 @@ def test_contacts_go_out_and_come_back(extension, empty, measured, tmp_path):
     _, report = imported(empty, measured())
     out = tmp_path / "out.csv"
     assert empty.ops.tactile.export_contacts(filepath=str(out)) == {"FINISHED"}
-    contours, _ = extension.tactile_addon.contact_file.read(out)
+    contours = extension.tactile_addon.contact_file.read(out).contours
     given = contours_of(SURFACE)
     for one, other in zip(given, contours, strict=True):
         assert other.points == pytest.approx(np.delete(one.points, 12, axis=0), abs=1e-5)
@@ -214,7 +246,7 @@ def test_a_probes_patch_goes_out_too(extension, empty, tmp_path):
     ):
         assert operator(filepath=str(tmp_path / name)) == {"FINISHED"}
     r = from_dict(json.loads((tmp_path / "p.json").read_text()))
-    contours, _ = extension.tactile_addon.contact_file.read(tmp_path / "c.csv")
+    contours = extension.tactile_addon.contact_file.read(tmp_path / "c.csv").contours
     assert len(r.contacts) == sum(len(c.points) for c in contours) - 3
     assert np.linalg.norm(np.vstack([c.points for c in contours]), axis=1) == pytest.approx(2.0, abs=2e-3)
 
@@ -226,12 +258,32 @@ def test_nothing_goes_out_without_a_patch(empty, measured, tmp_path):
     patch, _ = imported(empty, measured())
     with pytest.raises(RuntimeError, match="No such file or directory"):
         empty.ops.tactile.export_contacts(filepath=str(tmp_path / "no" / "out.csv"))
-    empty.data.objects.remove(patch.children[0])
-    with pytest.raises(RuntimeError, match="has no contours any more: touch again"):
-        empty.ops.tactile.export_contacts(filepath=str(tmp_path / "out.csv"))
     del patch["tactile_reconstruction"]
-    with pytest.raises(RuntimeError, match="is not complete: end the gesture, or touch again"):
-        empty.ops.tactile.export_patch(filepath=str(tmp_path / "out.json"))
+    for export in (empty.ops.tactile.export_contacts, empty.ops.tactile.export_patch):
+        with pytest.raises(RuntimeError, match="is not complete: end the gesture, or touch again"):
+            export(filepath=str(tmp_path / "out"))
+
+
+def test_what_is_shown_is_not_what_is_kept(extension, empty, measured, tmp_path):
+    """Editing the contours or the patch changes nothing of what goes out; moving the patch moves it."""
+    patch, report = imported(empty, measured())
+    before = extension.reconstruction_of(patch)
+    for mesh in (patch.data, patch.children[0].data):
+        mesh.vertices[7].co.z += 5.0
+    empty.data.objects.remove(patch.children[0])
+    assert empty.ops.tactile.export_patch(filepath=str(tmp_path / "out.json")) == {"FINISHED"}
+    r = from_dict(json.loads((tmp_path / "out.json").read_text()))
+    assert np.array_equal(r.contacts, before.contacts)
+    assert (r.patch.k1, r.patch.k2) == (report["k1"], report["k2"])
+    patch.location.x += 0.25
+    patch.scale *= 2.0
+    empty.context.view_layer.update()
+    moved = extension.reconstruction_of(patch)
+    assert moved.frame.origin == pytest.approx(np.add(r.frame.origin, (0.25, 0.0, 0.0)), abs=1e-5)
+    assert moved.contacts == pytest.approx(2.0 * r.contacts, rel=1e-5, abs=1e-5)
+    assert moved.patch.k1 == pytest.approx(0.5 * r.patch.k1, rel=1e-5)
+    with pytest.raises(ValueError, match="Wanted a patch, its probe or its contours"):
+        extension.reconstruction_of(None)
 
 
 def test_blenders_own_exporters_keep_vertices_and_colours(empty, measured, tmp_path):
@@ -292,7 +344,7 @@ def test_every_option_of_fit_arrives(command, empty, measured):
     empty.ops.wm.read_homefile(use_empty=True)
     path, point = measured(), [str(x) for x in SURFACE.point]
     options = ["--unit", "cm", "--point", *point, "--outward", *(str(-x) for x in SURFACE.normal)]
-    options += ["--method", "quadratic-variation", "--degree", "5", "--weight", "500", "--sensor-std", "0.05"]
+    options += ["--method", "quadratic-variation", "--degree", "5", "--weight", "500", "--noise", "0.05"]
     code, out, _ = command("fit", path, *options, *FIT)
     assert code == 0
     report = report_in(out)
@@ -339,9 +391,23 @@ def test_simulated_contacts_from_the_shell_are_a_data_set(command, files):
     assert code == 0
     report = report_in(out)
     point = [str(x) for x in report["frame"]["origin"]]
-    code, out, _ = command("fit", csv, "--point", *point, "--sensor-std", "1e-3", *FIT)
+    code, out, _ = command("fit", csv, "--point", *point, "--noise", "1e-3", *FIT)
     assert code == 0
     again = report_in(out)
     assert again["contacts"] == report["contacts"]
     for key in ("k1", "k2", "height_std"):
         assert again[key] == pytest.approx(report[key], rel=0.02)
+
+
+def test_contacts_beyond_memory_are_a_sentence(empty, extension, tmp_path, monkeypatch):
+    def exhausted(*_, **__):
+        raise MemoryError
+
+    (tmp_path / "contacts.csv").write_text("x,y,z\n0,0,0\n")
+    monkeypatch.setattr(extension.tactile_addon.measured.core, "common_point", exhausted)
+    before = datablocks(empty)
+    with pytest.raises(
+        RuntimeError, match="There are more contacts than fit into memory: take fewer of them"
+    ):
+        empty.ops.tactile.import_contacts(filepath=str(tmp_path / "contacts.csv"))
+    assert datablocks(empty) == before

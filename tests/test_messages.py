@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
+STATUS = re.compile(r"\| (ok|any|uncertain|outdated|not_)")
 ROWS = [
     cell.strip().replace("\\|", "|")
     for line in (ROOT / "docs" / "messages.md").read_text().splitlines()
     if line.startswith("|") and not line.startswith("|--")
-    for cell in line.split(" | ")[slice(1, 2) if re.match(r"\| (ok|any|uncertain|not_)", line) else slice(1)]
+    for cell in line.split(" | ")[slice(1, 2) if STATUS.match(line) else slice(1)]
 ]
 ROWS = [row.strip("| ") for row in ROWS if row.strip("| ") not in ("message", "status")]
 ERRORS = {"ValueError", "DegenerateCurvesError"}

@@ -84,7 +84,9 @@ def test_the_patch_object_holds_what_it_says(extension, empty, ball):
     terms = [(i, d - i) for d in (3, 4) for i in range(d, -1, -1)]
     expected = 0.5 * (report["k1"] * x**2 + report["k2"] * y**2)
     expected += sum(c * x**i * y**j for c, (i, j) in zip(report["coefficients"], terms, strict=True))
-    assert z == pytest.approx(expected, abs=1e-6)
+    r = extension.core.from_dict(json.loads(patch["tactile_reconstruction"]))
+    assert z == pytest.approx(r.height(x, y), abs=1e-6)
+    assert r.patch.height(x, y) == pytest.approx(expected, rel=1e-12)
     assert values(mesh, "gaussian_curvature")[0] == pytest.approx(report["gaussian_curvature"], rel=1e-5)
     assert values(mesh, "mean_curvature")[0] == pytest.approx(report["mean_curvature"], rel=1e-5)
     # Deviation: how far the patch is outside the ball, but for the ball's facets.
@@ -97,7 +99,6 @@ def test_the_patch_object_holds_what_it_says(extension, empty, ball):
     mean_std = np.average(std[faces].mean(axis=1), weights=[face.area for face in mesh.polygons])
     assert report["height_std"] == pytest.approx(mean_std, rel=0.2)
     # The vertices are those that the reconstruction asks for.
-    r = extension.core.from_dict(json.loads(patch["tactile_reconstruction"]))
     points, triangles = r.mesh()
     assert np.column_stack([x, y, z]) == pytest.approx(points, abs=1e-6)
     assert len(faces) == len(triangles)
@@ -178,10 +179,10 @@ def test_a_mesh_without_vertices_over_the_patch_says_so(empty, extension):
 
 
 def test_the_same_seed_gives_the_same_patch_and_another_does_not(empty, ball):
-    reports = [reconstruct(empty, target="Sphere", **TOUCH, noise=0.01, seed=seed)[1] for seed in (1, 1, 2)]
-    assert reports[0]["points"] == reports[1]["points"]
-    assert reports[0]["points"] != reports[2]["points"]
-    assert [report["k1"] for report in reports[:2]] == [reports[0]["k1"]] * 2
+    made = [reconstruct(empty, target="Sphere", **TOUCH, noise=0.01, seed=seed) for seed in (1, 1, 2)]
+    one, again, other = (json.loads(patch["tactile_reconstruction"])["contours"] for patch, _ in made)
+    assert one == again != other
+    assert made[0][1]["k1"] == made[1][1]["k1"]
 
 
 def test_several_patches_share_collection_and_materials(empty, ball):
@@ -237,7 +238,7 @@ def test_all_inputs_reach_the_core(empty, ball):
     _, report = reconstruct(
         empty,
         **TOUCH,
-        normal=(0.1, 0.0, 1.0),
+        outward=(0.1, 0.0, 1.0),
         plane_count=4,
         azimuths=[math.radians(a) for a in (5, 50, 95, 140, 0, 0)],
         tilts=[math.radians(a) for a in (5, -5, 10, 0, 0, 0)],
@@ -281,7 +282,7 @@ def test_the_suggested_plane_can_be_added(empty):
     mesh.to_mesh(saddle)
     mesh.free()
     empty.context.scene.collection.objects.link(empty.data.objects.new("Saddle", saddle))
-    place = {"target": "Saddle", "location": (0.0, 0.0, 0.0), "extent": 13.0, "normal": (0.0, 0.0, 1.0)}
+    place = {"target": "Saddle", "location": (0.0, 0.0, 0.0), "extent": 13.0, "outward": (0.0, 0.0, 1.0)}
     _, before = reconstruct(empty, **place)
     suggested = before["suggested_plane"]
     assert np.linalg.norm(suggested["tangent"]) == pytest.approx(1.0)
@@ -473,8 +474,8 @@ def nothing(bpy):
         (nothing, {"location": (0.0, 0.0, 9.0)}, "The location is 7 away"),
         (nothing, {"location": (float("nan"), 0.0, 0.0)}, "coordinates that are not finite"),
         (nothing, {"location": (float("inf"), 0.0, 0.0)}, "too far away to be measured"),
-        (nothing, {"normal": (0.0, 0.0, 0.0)}, "Normal: wanted a vector with a direction"),
-        (nothing, {"normal": (float("nan"), 0.0, 0.0)}, "Normal: wanted finite numbers"),
+        (nothing, {"outward": (0.0, 0.0, 0.0)}, "Outward: wanted a vector with a direction"),
+        (nothing, {"outward": (float("nan"), 0.0, 0.0)}, "Outward: wanted finite numbers"),
         (nothing, {"extent": 50.0}, 'The extent 50 is longer than "Sphere"'),
         (nothing, {"step": 1e-5}, "Step: wanted at least a 10000th of the extent 0.6"),
         (nothing, {"step": 0.9}, "The step 0.9 is longer than the extent 0.6"),
@@ -520,7 +521,7 @@ def test_all_curves_ending_at_once_leave_nothing(empty):
     with pytest.raises(
         RuntimeError, match=r"of the 3 contacts it needs besides the reference point \(it ended by"
     ):
-        empty.ops.tactile.reconstruct(location=(0.0, 0.0, 2.0), extent=0.5, normal=(0.0, 0.0, 1.0))
+        empty.ops.tactile.reconstruct(location=(0.0, 0.0, 2.0), extent=0.5, outward=(0.0, 0.0, 1.0))
     assert datablocks(empty) == before
 
 

@@ -121,12 +121,15 @@ def test_height_std_is_zero_at_the_point_and_grows_with_noise_and_between_the_cu
     assert between > 1.5 * fine.height_std(x, y)
 
 
-def test_a_lower_degree_is_less_certain_by_what_it_leaves_out():
+def test_height_and_its_deviation_are_those_of_the_surface_whatever_the_degree_of_the_patch():
     s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
     two, six = touched(s, degree=2), touched(s, degree=6)
     assert [two.patch.k1, two.patch.k2] == [six.patch.k1, six.patch.k2]
     assert surfaces.off_data(s, two) > 2 * surfaces.off_data(s, six)
-    assert two.mean_height_std > 2 * six.mean_height_std
+    assert two.mean_height_std == six.mean_height_std
+    x, y = two.domain.grid(50)[0].T
+    assert two.height(x, y) == pytest.approx(six.patch.height(x, y), abs=1e-9)
+    assert np.array_equal(two.height(x, y), six.height(x, y))
 
 
 @pytest.mark.parametrize(
@@ -148,10 +151,11 @@ def test_blind_directions_are_counted_and_named(planes, degree, blind, terms):
     assert (named in r.message) == (blind > 0)
 
 
-def test_sensor_std_is_a_floor_of_the_noise():
+def test_the_noise_given_is_the_least_that_is_found():
     s = surfaces.pear()
     r = touched(s, noise=0.02)
-    rough = touched(s, noise=0.02, sensor_std=0.2)
+    contours = s.track(THREE, extent=EXTENT, step=EXTENT / 12, noise=0.02, rng=0)
+    rough = s.fit(contours, noise=0.2)
     assert r.posterior.noise * r.radius < 0.05
     assert rough.posterior.noise * rough.radius == pytest.approx(0.2, rel=0.05)
 
@@ -194,7 +198,7 @@ def test_thousands_of_contacts_suggest_a_plane():
     s = surfaces.pear()
     contours = track(s, s.point, s.normal, THREE, extent=12, step=0.005)
     r = reconstruct(s.point, contours, outward=s.normal)
-    assert len(r.contacts) > 14_000
+    assert 200 < len(r.contacts) <= 300  # means of 14,000
     assert 0.0 < suggest_plane(r)[1] < r.mean_height_std
 
 
@@ -255,12 +259,12 @@ def test_one_contact_in_twenty_off_by_a_millimetre_does_not_double_the_error(sur
 def test_umbilics_turn_and_scale_with_the_data(surface, noise):
     contours = surface.track(THREE, extent=9, step=1, noise=noise, rng=2)
     turn, scale = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix(), 1e3
-    one = surface.fit(contours, sensor_std=noise)
+    one = surface.fit(contours, noise=noise)
     other = reconstruct(
         scale * turn @ surface.point,
         [Contour(scale * c.points @ turn.T) for c in contours],
         outward=turn @ surface.normal,
-        sensor_std=scale * noise,
+        noise=scale * noise,
     )
     assert other.frame.axes == pytest.approx(turn @ one.frame.axes, abs=1e-7)
     x, y = one.domain.grid(50)[0].T

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The whole way from contours to a patch: exactness, equivariance, and what is refused."""
 
+import importlib
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -145,7 +147,7 @@ def test_distances_of_mesh_vertices_over_the_domain():
     directions = np.random.default_rng(0).normal(size=(20000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     vertices, normals = np.vstack([25 * directions, 22 * directions]), np.vstack([directions, -directions])
-    over = overlapped(r.frame, r.domain, r.radius, vertices, normals)
+    over = overlapped(r.geometry, vertices, normals)
     expected = 20000 * (1 - np.cos(8 / 25)) / 2
     assert len(over) == pytest.approx(expected, rel=0.15)
     assert np.linalg.norm(vertices[over], axis=1) == pytest.approx(25.0)
@@ -183,7 +185,7 @@ GOOD = track(
         ({"degree": 3.5}, 'degree: wanted a whole number from 2 to 6 or "auto", got 3.5'),
         ({"degree": "high"}, 'degree: wanted a whole number from 2 to 6 or "auto", got .high'),
         ({"weight": 0}, "weight: wanted a finite number above 0, got 0"),
-        ({"sensor_std": -1}, "sensor_std: wanted a finite number of 0 or more, got -1"),
+        ({"noise": -1}, "noise: wanted a finite number of 0 or more, got -1"),
         ({"outward": (0, 0, 0)}, "outward: wanted a vector with a direction"),
         ({"point": (np.nan, 0, 0)}, "point: wanted finite numbers"),
         ({"point": (0, 0, 1e60)}, r"point: wanted numbers up to 1e\+50, got larger ones"),
@@ -214,7 +216,7 @@ def test_a_touch_without_curves_and_whole_numbers_of_numpy():
 
 def test_a_sensor_that_knows_nothing_leaves_a_patch_in_doubt():
     ball = surfaces.sphere(25)
-    r = ball.fit(GOOD, sensor_std=1e20)
+    r = ball.fit(GOOD, noise=1e20)
     assert r.status == "uncertain"
     assert np.isfinite([r.mean_height_std, r.patch.k1, r.patch.k2]).all()
 
@@ -254,7 +256,7 @@ MANY = [
 ]
 
 
-@pytest.mark.parametrize("options", [{}, {"degree": "auto"}, {"method": "tagc"}, {"sensor_std": 0.3}])
+@pytest.mark.parametrize("options", [{}, {"degree": "auto"}, {"method": "tagc"}, {"noise": 0.3}])
 def test_many_at_once_are_what_they_are_one_by_one(options):
     """Touches that differ in curves, contacts and outliers, so that their stacks have gaps."""
     rng = np.random.default_rng(7)
@@ -350,3 +352,33 @@ def test_importing_core_imports_neither_blender_nor_scipy():
     code = "import sys, core; sys.exit(bool({'bpy', 'mathutils', 'scipy'} & set(sys.modules)))"
     root = Path(__file__).resolve().parents[1]
     assert subprocess.run([sys.executable, "-c", code], cwd=root).returncode == 0
+
+
+def test_short_curves_beside_a_long_one_cost_the_fit_what_they_have(monkeypatch):
+    module = importlib.import_module("core.reconstruction")
+    seen, fit = [], module.joint_fit
+    monkeypatch.setattr(module, "joint_fit", lambda c, *rest: seen.append(c.shape) or fit(c, *rest))
+    s = surfaces.pear()
+    contours = s.track(surfaces.planes((0, 60, 120)))
+    short = [replace(c, points=c.points[len(c.points) // 2 - 4 :][:8], normals=None) for c in contours[1:]]
+    reconstruct(s.point, [contours[0], *short, *short], outward=s.normal)
+    assert seen == [(1, sum(len(c.points) - 1 for c in (contours[0], *short, *short)), 3)]
+
+
+def test_masked_contacts_are_refused():
+    points = np.ma.masked_array(np.arange(12.0).reshape(4, 3), mask=False)
+    assert Contour(points).points.shape == (4, 3)
+    points[1] = np.ma.masked
+    with pytest.raises(ValueError, match="points: wanted numbers, got masked ones among them: take them out"):
+        Contour(points)
+
+
+@pytest.mark.parametrize("method", ["bayes", "tagc", "quadratic-variation", "least-squares"])
+def test_a_caller_who_has_numpy_raise_gets_the_same_fit(method):
+    s = surfaces.monkey_saddle()
+    contours = s.track(surfaces.planes((0, 60, 120)), noise=1e-3, rng=1)
+    wanted = reconstruct(s.point, contours, outward=s.normal, method=method)
+    with np.errstate(all="raise"):
+        found = reconstruct(s.point, contours, outward=s.normal, method=method)
+        assert (found.status, found.mean_height_std) == (wanted.status, wanted.mean_height_std)
+    assert np.array_equal(found.patch.coefficients, wanted.patch.coefficients)

@@ -112,7 +112,8 @@ def test_what_cannot_be_registered_gets_a_sentence_and_stays(empty, suzanne):
 
 
 def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
-    assert empty.ops.tactile.pick(target=suzanne.name, location=forehead(suzanne, empty)) == {"FINISHED"}
+    place = forehead(suzanne, empty)
+    assert empty.ops.tactile.pick(target=suzanne.name, location=place, extent=0.3) == {"FINISHED"}
     with pytest.raises(RuntimeError, match="is that of its probe: it is known already"):
         empty.ops.tactile.register(target=suzanne.name)
     patch = extension.tactile_addon.probe.patch_near(empty.context.object)

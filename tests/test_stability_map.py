@@ -60,7 +60,7 @@ def test_what_a_map_says_is_what_a_touch_says(empty, ball):
     for vertex in (700, 1200):
         place = ball.data.vertices[vertex].co
         normal = ball.data.vertices[vertex].normal
-        empty.ops.tactile.reconstruct(target=ball.name, location=place, normal=normal, **inputs)
+        empty.ops.tactile.reconstruct(target=ball.name, location=place, outward=normal, **inputs)
         report = empty.context.object["tactile"].to_dict()
         for name in ("height_std", "condition_number"):
             assert values(painted.data, name)[vertex] == pytest.approx(report[name], rel=1e-4), name

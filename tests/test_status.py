@@ -79,7 +79,7 @@ def test_misses_are_distances_across_the_curve_with_their_scatter():
         contours = [Contour(noisy), Contour(noisy[:, [1, 0, 2]]), Contour(noisy[:2])]
         curves = curves_through(*stacked(np.zeros((1, 3)), [contours])).at(0)
         found.append(misses(curves))
-    distances, stds = np.mean(found, axis=0)
+    distances, stds = np.mean(found, axis=0).T
     assert distances[0] == pytest.approx(0.05, abs=0.002)
     assert np.std(np.array(found)[:, 0, 0]) == pytest.approx(stds[0], rel=0.2)
     assert (distances[2], stds[2]) == (0.0, 0.0)  # too few to tell

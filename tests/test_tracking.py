@@ -139,7 +139,7 @@ def test_a_ball_ends_where_one_height_no_longer_describes_it():
         ({"point": (0, 0)}, r"point: wanted shape \(3\), got \(2,\)"),
         ({"point": (0, 0, np.inf)}, "point: wanted finite numbers"),
         ({"point": (0, 0, 3)}, "point: wanted one on the surface"),
-        ({"normal": (0, 0, 0)}, "normal: wanted a vector with a direction"),
+        ({"outward": (0, 0, 0)}, "outward: wanted a vector with a direction"),
         ({"tangent": (0, 0, 1)}, "tangent: wanted a direction across the normal"),
         ({"planes": [SamplingPlane(0.0, 1.6)]}, "tilt: wanted less than 90 degrees"),
         ({"planes": [SamplingPlane(float("nan"))]}, "azimuth: wanted a finite number, got nan"),
@@ -151,12 +151,12 @@ def test_a_ball_ends_where_one_height_no_longer_describes_it():
     ],
 )
 def test_bad_arguments_are_named(change, message):
-    arguments = {"point": (0, 0, 0), "normal": (0, 0, 1), "planes": PLANES, "extent": 10, "step": 1} | change
+    arguments = {"point": (0, 0, 0), "outward": (0, 0, 1), "planes": PLANES, "extent": 10, "step": 1} | change
     with pytest.raises(ValueError, match=message):
         track(
             surfaces.plane(),
             arguments.pop("point"),
-            arguments.pop("normal"),
+            arguments.pop("outward"),
             arguments.pop("planes"),
             **arguments,
         )

@@ -164,7 +164,7 @@ def test_a_touch_has_a_mesh_as_fine_as_what_is_known_of_it(surface, noise, metho
     )
     r = reconstruct(surface.point, contours, outward=surface.normal, method=method)
     points, triangles = r.mesh()
-    assert deviations(r.patch, points, triangles).max() <= 0.5 * r.mean_height_std
+    assert deviations(r.geometry, points, triangles).max() <= 0.5 * r.mean_height_std
     assert angles(points, triangles).min() > LEAST_ANGLE
     assert points[0].tolist() == [0.0, 0.0, 0.0]  # the reference point
     assert len(points) < 2000

@@ -3,14 +3,13 @@
 """Patches against surfaces and meshes that are known exactly: distances, further contours, overlap."""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import Domain, Frame, MongePatch, reachable, verify
+from core import Contour, Domain, Frame, Geometry, MongePatch, reachable, verify
 from core.verification import _azimuths_between
 
 EXTENT = 10.0
@@ -22,25 +21,20 @@ SURFACES = {
 }
 
 
-class Placed(NamedTuple):
-    """What verify takes besides a Reconstruction."""
-
-    frame: Frame
-    radius: float
-    patch: MongePatch
-    domain: Domain
-    contacts: np.ndarray
-
-
 def touched(surface, degrees=(0, 60, 120), noise=0.0, degree=6):
     contours = surface.track(surfaces.planes(degrees), extent=EXTENT, noise=noise, rng=0)
     return surface.fit(contours, degree=degree)
 
 
+def similarity(scale=1.0, turn=((1, 0, 0), (0, 1, 0), (0, 0, 1)), shift=(0.0, 0.0, 0.0)):
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = scale * np.asarray(turn), shift
+    return matrix
+
+
 def shifted(r, length):
     """The patch, lifted off the surface by a length."""
-    frame = Frame(r.frame.origin + length * r.frame.axes[:, 2], r.frame.axes)
-    return Placed(frame, r.radius, r.patch, r.domain, r.contacts)
+    return r.moved(similarity(shift=length * r.frame.axes[:, 2]))
 
 
 def vertices_of(surface, r, count=400):
@@ -52,7 +46,7 @@ def vertices_of(surface, r, count=400):
 
 
 def seen(r, surface, vertices, normals):
-    return vertices[reachable(r, surface, vertices, normals)]
+    return vertices[reachable(r.geometry, surface, vertices, normals)]
 
 
 class Cut:
@@ -117,11 +111,11 @@ def test_a_patch_off_its_surface_by_a_known_length(length):
 def test_further_contours_see_what_the_contours_do_not():
     """3 x^2 y - y^3 is zero along 0, 60 and 120 degrees: all of it is between the curves."""
     flat = surfaces.plane()
-    r = replace(touched(flat), frame=Frame(np.zeros(3), np.eye(3)))
     a = 1e-3
     monkey = MongePatch(0.0, 0.0, np.array([0.0, 3.0 * a, 0.0, -a, *[0.0] * 5]))
     ends = [(EXTENT * np.cos(t), EXTENT * np.sin(t)) for t in np.radians(np.arange(0, 360, 60))]
-    r = Placed(r.frame, EXTENT, monkey, Domain(np.array(ends)), _line_points())
+    geometry = Geometry(Frame(np.zeros(3), np.eye(3)), EXTENT, monkey, Domain(np.array(ends)))
+    r = replace(touched(flat), geometry=geometry, contours=(Contour(_line_points()),))
     found = verify(r, flat, np.empty((0, 3)))
     assert found["fit_error"] == pytest.approx(0.0, abs=1e-12)
     # |z| is a r^3 |sin 3t|, at 15, 30 and 45 degrees between the curves, at a twelfth of the radius and on.
@@ -199,7 +193,7 @@ def test_no_mesh_below():
     found = verify(r, surface, seen(r, surface, *vertices_of(surface, touched(surface))))
     assert [found[key] for key in ("vertices", "extra_contours", "extra_points", "overlap")] == [0, 0, 0, 0.0]
     assert not {"vertex_distance_mean", "extra_fit_error"} & set(found)
-    turned = Placed(Frame(np.zeros(3), np.diag([1.0, -1.0, -1.0])), *shifted(touched(surface), 0.0)[1:])
+    turned = touched(surface).moved(similarity(turn=np.diag([1.0, -1.0, -1.0])))
     assert verify(turned, surface, np.empty((0, 3)))["overlap"] == 0.0  # the mesh faces away
 
 
@@ -225,9 +219,7 @@ def test_lengths_scale_and_ratios_stay(scale):
     turn, shift = Rotation.from_rotvec([0.4, -0.9, 0.3]).as_matrix(), scale * np.array([20.0, -7.0, 3.0])
     vertices = seen(r, surface, *vertices_of(surface, r))
     one = verify(r, surface, vertices)
-    frame = Frame(scale * turn @ r.frame.origin + shift, turn @ r.frame.axes)
-    domain = Domain(scale * r.domain.ends)
-    moved = Placed(frame, scale * r.radius, r.patch.scaled(scale), domain, scale * r.contacts)
+    moved = r.moved(similarity(scale, turn, shift))
     other = verify(moved, Moved(surface, turn, scale, shift), scale * vertices @ turn.T + shift)
     assert set(one) == set(other)
     for key, value in one.items():

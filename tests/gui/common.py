@@ -122,7 +122,7 @@ def same(a, b):
 def is_complete():
     """Whether no gesture goes on, and the patch has what is filled in after one."""
     return not any(window.modal_operators for window in bpy.context.window_manager.windows) and (
-        patch() is not None and "vertices" in patch()["tactile"]
+        patch() is not None and patch()["tactile"]["is_verified"]
     )
 
 
@@ -152,8 +152,10 @@ def consistent(when, owner=None):
     check(f"{when}: and lies at the probe", off < 1e-4 * record["radius"], off)
 
 
-def undo_redo(what, before, after):
-    """One step back and one forth, by keyboard."""
+def undo_redo(what, before):
+    """One step back and one forth, by keyboard, once the gesture that was made has settled."""
+    yield from until(is_complete)
+    after = state()
     gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
     yield 1
     yield from until(lambda: before is None or is_complete())

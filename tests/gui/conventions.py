@@ -22,8 +22,8 @@ from common import (
     consistent,
     data_blocks,
     handle,
+    is_complete,
     look,
-    patch,
     picture,
     probe,
     same,
@@ -100,8 +100,7 @@ def adjust(place):
     check("a preset has the numbers, and no place", good, text)
     gui.click(*HUD[:1], 285)
     yield 0.5
-    after = state()
-    yield from undo_redo("adjusted", None, after)
+    yield from undo_redo("adjusted", None)
     check("... with all its data", data_blocks() == full and data_blocks() != before, data_blocks())
 
 
@@ -113,30 +112,33 @@ def gestures(place):
     yield from click_on(place)
     check("Move puts the probe elsewhere", (probe().location - place).length < 0.02, probe().location)
     check("... and makes no other", sum(obj.type == "EMPTY" for obj in bpy.data.objects) == 1)
-    yield from undo_redo("moved by a pick", before, state())
+    yield from undo_redo("moved by a pick", before)
     before = state()
     gui.drag(AZIMUTH, (AZIMUTH[0] + 40, AZIMUTH[1]))
     yield 1
+    yield from until(is_complete)
     check("a number is dragged", probe().tactile_probe.azimuths[0] > 0.05, state())
     consistent("a number dragged")
-    yield from undo_redo("a number dragged", before, state())
+    yield from undo_redo("a number dragged", before)
     before = state()
     at = [round(v) for v in gui.view_point(probe().location)]
     gui.xdo("mousemove", at[0] + 80, at[1], "sleep", 0.3, "key", "r", "sleep", 0.3)
     gui.xdo(
         "mousemove", at[0] + 70, at[1] + 40, "sleep", 0.5, "mousemove", at[0] + 60, at[1] + 60, "click", 1
     )
-    yield from until(lambda: "vertices" in patch()["tactile"], 5)
+    yield 1
+    yield from until(is_complete)
     check("R turns the whole probe", not same(state(), before), state())
     consistent("the probe turned")
-    yield from undo_redo("the probe turned", before, state())
+    yield from undo_redo("the probe turned", before)
     before = state()
     gui.click(*ADD_BUTTON)
     yield 1
+    yield from until(is_complete)
     check("a button adds the suggested plane", probe().tactile_probe.plane_count == 4)
     consistent("a plane more")
     picture("four")
-    yield from undo_redo("a plane more", before, state())
+    yield from undo_redo("a plane more", before)
     gui.click(*REMOVE_BUTTON)
     yield 1
     check("... and one takes a plane away", probe().tactile_probe.plane_count == 3)

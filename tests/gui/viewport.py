@@ -110,6 +110,7 @@ def drag_handles():
     end = handle(azimuth)
     gui.drag(start, end)
     yield 1
+    yield from until(is_complete)
     settings = probe().tactile_probe
     turned = settings.azimuths[0]
     check("dragging a handle turns its plane", abs(turned - azimuth) < 0.05, turned)
@@ -118,7 +119,7 @@ def drag_handles():
     check("... in place", data_blocks() == blocks, data_blocks())
     check("... completed at the end", "vertices" in patch()["tactile"], "")
     picture("turned")
-    yield from undo_redo("a plane turned", before, state())
+    yield from undo_redo("a plane turned", before)
 
     before = state()
     azimuth = probe().tactile_probe.azimuths[1]
@@ -130,6 +131,7 @@ def drag_handles():
     picture("turning")
     gui.xdo("key", "Escape", "sleep", 0.2, "mouseup", 1)
     yield 1
+    yield from until(is_complete)
     check("Esc in the middle of a turn takes it back", same(state(), before), (state(), before))
 
     direction = gui.find()[1].spaces.active.region_3d.view_rotation.copy()
@@ -139,6 +141,7 @@ def drag_handles():
     yield 0.5
     gui.drag(handle(azimuth), [v + 20 for v in handle(azimuth)])
     yield 1
+    yield from until(is_complete)
     check("a handle in a plane seen edge on stays where it is", same(state(), before), (state(), before))
     gui.find()[1].spaces.active.region_3d.view_rotation = direction
     yield 0.5
@@ -148,21 +151,23 @@ def drag_handles():
     top = axes.translation + 0.75 * reach * axes.col[2].xyz
     gui.drag(gui.view_point(top), [v + 35 for v in gui.view_point(top)])
     yield 1
+    yield from until(is_complete)
     tilt = probe().tactile_probe.tilts[number]
     check("dragging the handle above tilts the active plane", abs(tilt) > 0.03, math.degrees(tilt))
     consistent("a plane tilted")
     picture("tilted")
-    yield from undo_redo("a plane tilted", before, state())
+    yield from undo_redo("a plane tilted", before)
 
     before = state()
     free = 0.5 * (probe().tactile_probe.azimuths[0] + probe().tactile_probe.azimuths[1]) + math.pi
     gui.drag(handle(free, 1.0), handle(free, 0.7))
     yield 1
+    yield from until(is_complete)
     ratio = probe().tactile_probe.extent / reach
     check("dragging the ring changes the extent", abs(ratio - 0.7) < 0.05, ratio)
     consistent("another extent")
     picture("extent")
-    yield from undo_redo("another extent", before, state())
+    yield from undo_redo("another extent", before)
 
 
 def move_probe():
@@ -176,6 +181,7 @@ def move_probe():
     picture("moving")
     gui.xdo("key", "Escape")
     yield 1
+    yield from until(is_complete)
     check("Esc in the middle of a move takes it back", same(state(), before), (state(), before))
     gui.xdo("mousemove", *at, "sleep", 0.2, "key", "g", "sleep", 0.3)
     for i in range(1, 6):
@@ -186,7 +192,7 @@ def move_probe():
     check("a dragged probe moves", (probe().location - place).length > 0.02, probe().location)
     consistent("the probe moved")
     check("... completed at the end", "vertices" in patch()["tactile"], "")
-    yield from undo_redo("the probe moved", before, state())
+    yield from undo_redo("the probe moved", before)
 
 
 def type_a_number():
@@ -198,7 +204,7 @@ def type_a_number():
     yield from until(is_complete)
     check("a number typed in the panel counts", abs(probe().tactile_probe.extent - 0.2) < 1e-5, state())
     consistent("a number typed")
-    yield from undo_redo("a number typed", before, state())
+    yield from undo_redo("a number typed", before)
 
 
 def add_planes():
@@ -217,7 +223,7 @@ def add_planes():
     gui.xdo("mousemove", *PLANES_BUTTON, "sleep", 0.3, *("click", 4, "sleep", 0.1) * 15)
     yield 1
     picture("planes_added")
-    yield from undo_redo("more planes", before, state())
+    yield from undo_redo("more planes", before)
 
 
 def save_and_reload():

@@ -1,0 +1,366 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How near the fits come to real surfaces, and whether their intervals are true there.
+
+`python -m benchmarks.real [--points N] [--only fixed | automatic | choose]`, from the root of a checkout; bpy
+to read the scans and to cast rays, scikit-learn for the Gaussian process. Prints Markdown tables:
+
+(a) scans touched without noise at random points (seeded, by area) with three to six planes, half curves of
+1/32, 1/16 and 1/8 of the object in twelve steps: the mean |dz| over some 90 points of the mesh above the
+domain in permille of the radius, the share of them within the 90 % interval, and the interval's mean
+score (its width, and twenty times what is beyond it);
+(b) the same error against the time of a fit and 300 heights;
+(c) touches that choose extent and step by themselves, with three planes: how many are sure, in doubt and
+refused, how many doubts are right, and how many of the sure are off.
+
+All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
+With `choose` the residual's constants are chosen on all scans but one, for each, and judged on that one.
+"""
+
+import argparse
+import math
+import sys
+from collections import defaultdict
+from contextlib import contextmanager
+from functools import partial
+from statistics import median
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from core import SamplingPlane, explore, reconstruct, residual, residual_evidence, track
+from core.monge import exponents, monomials
+from tools import blender
+
+from . import SCANS_FOLDER, machine, table
+from .peers import Fit, quadric_process, radial_basis
+
+PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
+HOLD_OUT, LEAST = 90, 20  # points of the mesh above a domain
+LAYERS = 4
+WIDE, OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 0.02, 3.0, 5.0, 10.0, 0.05
+DENSE = 150  # points for the true frame
+
+
+class Scan:
+    """A mesh of size 1 in Blender's tree, centred."""
+
+    def __init__(self, path):
+        import bpy
+        from mathutils.bvhtree import BVHTree
+
+        bpy.ops.wm.read_homefile(use_empty=True)
+        (bpy.ops.wm.ply_import if path.suffix == ".ply" else bpy.ops.wm.stl_import)(filepath=str(path))
+        mesh = next(obj for obj in bpy.data.objects if obj.type == "MESH").data
+        mesh.calc_loop_triangles()
+        points = np.empty((len(mesh.vertices), 3))
+        faces = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+        mesh.vertices.foreach_get("co", points.ravel())
+        mesh.loop_triangles.foreach_get("vertices", faces.ravel())
+        points = (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()
+        a, b, c = (points[faces[:, i]] for i in range(3))
+        across = np.cross(b - a, c - a)
+        self.name, self.areas, self.centres = path.stem, np.linalg.norm(across, axis=1), (a + b + c) / 3.0
+        self.normals = across / np.maximum(self.areas, 1e-300)[:, None]
+        self.tree = BVHTree.FromPolygons(points.tolist(), faces.tolist(), all_triangles=True)
+
+    def ray_cast(self, origin, direction, distance):
+        hit, normal, _, _ = self.tree.ray_cast(origin, direction, distance)
+        return None if hit is None else (tuple(hit), tuple(normal))
+
+    def places(self, count, seed):
+        """Random points and normals, by area."""
+        faces = np.random.default_rng(seed).choice(len(self.areas), count, p=self.areas / self.areas.sum())
+        return zip(self.centres[faces], self.normals[faces], strict=True)
+
+    def above(self, r, flat):
+        """Where there are, points (m, 3) of the layers nearest to r along its normal above (n, 2)."""
+        up = r.frame.axes[:, 2]
+        starts = r.frame.to_world(np.column_stack([flat, r.height(*flat.T)]))
+        hits = [self._nearest(start, up, r.radius) for start in starts]
+        return np.array([hit for hit in hits if hit is not None]).reshape(-1, 3)
+
+    def _nearest(self, start, up, reach):
+        """The hit of the layer nearest to `start` along `up`, either way, whose outside is up."""
+        found = None
+        for direction in (up, -up):
+            gone = 0.0
+            for _ in range(LAYERS):
+                hit = self.ray_cast(start + gone * direction, direction, reach - gone)
+                if hit is None:
+                    break
+                gone = abs(np.dot(np.subtract(hit[0], start), up))
+                if np.dot(hit[1], up) > 0.0:
+                    found, reach = hit[0], gone
+                    break
+                gone += 1e-4 * reach
+                if gone >= reach:
+                    break
+        return found
+
+
+class Touch(NamedTuple):
+    """A case of benchmarks.accuracy, as far as the peers need it."""
+
+    point: np.ndarray
+    axes: np.ndarray  # whose last column is outward
+    contours: list
+    hold_out: np.ndarray  # (m, 3), relative to the point
+
+
+class Score(NamedTuple):
+    error: float  # permille of the radius
+    covered: float = np.nan
+    interval: float = np.nan  # score of the 90 % interval, permille
+
+
+@contextmanager
+def constants(**values):
+    """The residual's, for a while."""
+    modules = [m for m in (residual, residual_evidence) if any(hasattr(m, name) for name in values)]
+    before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
+    try:
+        for module, old in zip(modules, before, strict=True):
+            vars(module).update({name: values[name] for name in old})
+        yield
+    finally:
+        for module, old in zip(modules, before, strict=True):
+            vars(module).update(old)
+
+
+# Methods ---------------------------------------------------------------------------------------------
+
+
+def ours(touch, **values):
+    with constants(**values):
+        r = reconstruct(touch.point, touch.contours, outward=touch.axes[:, 2])
+    return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
+
+
+OURS, ALONE, PROCESS = "bayes", "without residual", "Matérn process on a quadric"
+# Settings that came out best on the scans.
+METHODS = {
+    OURS: ours,
+    ALONE: partial(ours, UNEXPLAINED=math.inf),
+    "RBF thin plate": partial(radial_basis, kernel="thin_plate_spline", smoothing=1e-3),
+    "RBF cubic": partial(radial_basis, kernel="cubic", degree=2, smoothing=1e-3),
+    PROCESS: quadric_process,
+}
+PEERS = tuple(METHODS)[2:]
+
+
+def touches(scan, count):
+    """((planes, extent), Touch) at as many points."""
+    for point, normal in scan.places(count, 0):
+        for extent in EXTENTS:
+            for planes in PLANES:
+                azimuths = [SamplingPlane(math.pi * i / planes) for i in range(planes)]
+                lengths = {"extent": 1.0 / extent, "step": 1.0 / extent / STEPS}
+                try:
+                    contours = track(scan, point, normal, azimuths, **lengths)
+                    paper = {"outward": normal, "method": "least-squares", "degree": 2}
+                    r = reconstruct(point, contours, **paper)
+                except ValueError:  # an edge or a hole: no touch
+                    continue
+                hold_out = scan.above(r, r.domain.grid(HOLD_OUT)[0]) - point
+                if len(hold_out) >= LEAST:
+                    axes = np.column_stack([np.zeros((3, 2)), normal])
+                    yield (planes, extent), Touch(point, axes, contours, hold_out), r.radius
+
+
+def score(fit, touch, radius):
+    x, y, z = (touch.hold_out @ fit.axes).T
+    miss = np.abs(fit.height(x, y) - z) / radius
+    if fit.height_std is None:
+        return Score(1e3 * miss.mean())
+    half = 1.645 * fit.height_std(x, y) / radius
+    beyond = np.maximum(miss - half, 0.0)
+    return Score(1e3 * miss.mean(), np.mean(miss <= half), 1e3 * np.mean(2.0 * half + 20.0 * beyond))
+
+
+def fixed_scores(scan, count, methods):
+    """{(planes, extent): {method: mean Score}} of a scan, and seconds {method: [...]}."""
+    scores, seconds = defaultdict(lambda: defaultdict(list)), defaultdict(list)
+    for cell, touch, radius in touches(scan, count):
+        for name, method in methods.items():
+            start = perf_counter()
+            fit = method(touch)
+            fit.height(*np.resize(touch.hold_out @ fit.axes, (300, 3))[:, :2].T)
+            seconds[name].append(perf_counter() - start)
+            scores[cell][name].append(score(fit, touch, radius))
+    means = {c: {m: Score(*np.mean(s, axis=0)) for m, s in of.items()} for c, of in scores.items()}
+    return means, seconds
+
+
+# Tables ----------------------------------------------------------------------------------------------
+
+
+def fixed_row(title, of):
+    """Of {method: Score}."""
+    best = min(of[peer].error for peer in PEERS)
+    return [
+        *title,
+        *(f"{of[method].error:.2f}" for method in METHODS),
+        f"{of[OURS].error / best:.2f}",
+        *(f"{of[m].covered:.2f}" for m in (OURS, ALONE, PROCESS)),
+        *(f"{of[m].interval:.1f}" for m in (OURS, ALONE, PROCESS)),
+    ]
+
+
+def fixed_tables(scores):
+    """scores : {scan: {cell: {method: Score}}}"""
+    intervals = [f"{what}, {m}" for what in ("within", "score") for m in ("bayes", "alone", "process")]
+    head = ["planes", "extent", *METHODS, "bayes / best peer", *intervals]
+    cells = [(planes, extent) for extent in EXTENTS for planes in PLANES]
+    rows = []
+    for cell in cells:
+        there = [of[cell] for of in scores.values() if cell in of]
+        means = {m: Score(*np.mean([of[m] for of in there], axis=0)) for m in METHODS}
+        rows.append(fixed_row([f"{cell[0]}", f"1/{cell[1]}"], means))
+    print("(a) Means over the scans.\n")
+    table(head, rows, left=2)
+    print("Each scan, the mean over the extents.\n")
+    rows = []
+    for scan, of in scores.items():
+        for planes in PLANES:
+            there = [of[planes, extent] for extent in EXTENTS if (planes, extent) in of]
+            means = {m: Score(*np.mean([each[m] for each in there], axis=0)) for m in METHODS}
+            rows.append(fixed_row([scan, f"{planes}"], means))
+    table(["scan", *head[:1], *head[2:]], rows, left=2)
+
+
+def time_table(scores, seconds):
+    print("(b) Error, the mean of all cells and scans, and the median time of a fit and 300 heights.\n")
+    rows = []
+    for method in METHODS:
+        error = np.mean([cell[method].error for of in scores.values() for cell in of.values()])
+        rows.append([method, f"{error:.2f}", f"{1e3 * median(seconds[method]):.2f}"])
+    table(["method", "error", "ms"], rows)
+
+
+def automatic_row(scan, count):
+    """A line of (c), in numbers."""
+    planes = [SamplingPlane(math.pi * i / 3) for i in range(3)]
+    sure, doubtful, refused, seconds = [], [], 0, []
+    for point, normal in scan.places(count, 1):
+        start = perf_counter()
+        try:
+            r = explore(scan, point, normal, planes, farthest=0.5, degree="auto").result
+        except ValueError:
+            refused += 1
+            continue
+        seconds.append(perf_counter() - start)
+        (sure if r.status == "ok" else doubtful).append((r, _off(scan, r)))
+    is_right = [
+        off > OFF * r.radius or off > TOO_FAR * r.mean_height_std or _turned(scan, r) for r, off in doubtful
+    ]
+    return [
+        *(len(sure), len(doubtful), refused, sum(is_right)),
+        sum(off > OFF * r.radius for r, off in sure),
+        sum(off > SILENT * r.mean_height_std for r, off in sure),
+        sum(_turned(scan, r) for r, _ in sure),
+        1e3 * sum(r.domain.area for r, _ in sure),
+        1e3 * median([r.radius for r, _ in sure] or [0.0]),
+        1e3 * median(seconds or [0.0]),
+    ]
+
+
+def _off(scan, r):
+    """The mean |dz| over the domain."""
+    local = r.frame.to_local(scan.above(r, r.domain.grid(HOLD_OUT)[0]))
+    return float(np.abs(r.height(*local[:, :2].T) - local[:, 2]).mean()) if len(local) else 0.0
+
+
+def _turned(scan, r):
+    """Whether the frame is off by TURNED degrees, where curvatures are not ALIKE; by a dense quartic fit."""
+    azimuths, reach = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(DENSE), 0.6 * r.radius
+    shares = np.sqrt((np.arange(DENSE) + 0.5) / DENSE)
+    flat = reach * np.column_stack([shares * np.cos(azimuths), shares * np.sin(azimuths)])
+    x, y, z = r.frame.to_local(scan.above(r, flat)).T / reach
+    if len(x) < DENSE / 2:
+        return False
+    sx, sy, xx, xy, yy = np.linalg.lstsq(monomials(x, y, exponents(1, 4)), z, rcond=None)[0][:5]
+    if 2.0 * math.hypot(xx - yy, xy) * r.radius / reach <= ALIKE:
+        return False
+    return math.hypot(0.5 * math.atan2(-xy, yy - xx), sx, sy) > math.radians(TURNED)
+
+
+def automatic_table(rows):
+    print(
+        "(c) Automatic touches. Right is a doubt where the heights are off by over 2 % of the radius or three"
+    )
+    print(
+        "deviations, or the frame by 10 degrees where curvatures differ. Areas in permille of size squared.\n"
+    )
+    head = "scan|sure|in doubt|refused|doubts right|sure, off > 2 %|> 5 deviations|turned|all areas|radius|ms"
+    total = [sum(row[i] for row in rows.values()) for i in range(8)]
+    lines = [[name, *(f"{v:.0f}" for v in row[:9]), f"{row[9]:.1f}"] for name, row in rows.items()]
+    table(head.split("|"), [*lines, ["all", *(f"{v:.0f}" for v in total), "", ""]])
+
+
+# Constants, each time without one scan ---------------------------------------------------------------
+
+
+SETTINGS = {
+    f"lengths {lengths}, amplitudes {amplitudes}": {
+        "LENGTHS": np.array(lengths),
+        "AMPLITUDES": np.array(amplitudes),
+    }
+    for lengths in ((0.3, 0.6), (0.4, 0.8), (0.4, 1.0))
+    for amplitudes in ((0.002, 0.008, 0.03), (0.004, 0.016, 0.064), (0.004, 0.022, 0.12))
+}
+
+
+def choose(scans, count):
+    """For each scan the setting of the least interval score on the others, relative to the process's."""
+    methods = {PROCESS: quadric_process} | {name: partial(ours, **v) for name, v in SETTINGS.items()}
+    scores = {scan.name: fixed_scores(scan, count, methods)[0] for scan in scans}
+
+    def share(name, setting):
+        return np.mean([of[setting].interval / of[PROCESS].interval for of in scores[name].values()])
+
+    rows = []
+    for name, of in scores.items():
+        others = {s: np.mean([share(other, s) for other in scores if other != name]) for s in SETTINGS}
+        best = min(others, key=others.__getitem__)
+        errors = np.mean([cell[best].error / cell[PROCESS].error for cell in of.values()])
+        covered = np.mean([cell[best].covered for cell in of.values()])
+        rows.append(
+            [name, best, f"{others[best]:.3f}", f"{share(name, best):.3f}", f"{errors:.3f}", f"{covered:.2f}"]
+        )
+    table(
+        ["left out", "chosen on the others", "score there", "score here", "error here", "within"],
+        rows,
+        left=2,
+    )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--points", type=int, default=100, help="of each scan (%(default)s)")
+    parser.add_argument("--only", choices=("fixed", "automatic", "choose"), help="a part")
+    parser.add_argument("--scan", default="", help="only those with this in their names")
+    options = parser.parse_args()
+    paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
+    if not paths:
+        sys.exit(f"real: there are no scans in {SCANS_FOLDER}")
+    with blender.quiet():
+        scans = [Scan(path) for path in paths]
+    if options.only == "choose":
+        return choose(scans, options.points)
+    if options.only != "automatic":
+        scores, seconds = {}, defaultdict(list)
+        for scan in scans:
+            scores[scan.name], times = fixed_scores(scan, options.points, METHODS)
+            for method, values in times.items():
+                seconds[method] += values
+        fixed_tables(scores)
+        time_table(scores, seconds)
+    if options.only != "fixed":
+        automatic_table({scan.name: automatic_row(scan, options.points) for scan in scans})
+    print(f"{options.points} points of each scan; {machine('bpy', 'numpy', 'scipy')}.")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,17 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's meshes, attributes and places are of single precision, whatever was measured."""
+
+import numpy as np
+
+LARGEST, SMALLEST = 1e15, 1e-15  # lengths whose squares, and those of their inverses, are numbers there
+
+
+def require_single(result):
+    """Raises ValueError for a patch too large, too small or too far away for Blender's numbers."""
+    reach = result.radius + float(np.abs(result.frame.origin).max())
+    if not (result.radius >= SMALLEST and reach <= LARGEST):
+        raise ValueError(
+            f"The patch has a radius of {result.radius:.3g} and reaches to {reach:.3g}, and Blender's "
+            f"numbers are good from {SMALLEST:g} to {LARGEST:g}: take another unit of length"
+        )
