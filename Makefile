@@ -46,7 +46,7 @@ test: $(ZIP)
 
 fuzz: $(ZIP)
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest --hypothesis-profile=long \
-		--hypothesis-show-statistics tests/test_fuzz_core.py tests/test_fuzz_operator.py
+		--hypothesis-show-statistics tests/core/reconstruction/test_fuzz_core.py tests/addon/test_fuzz_operator.py
 
 chart: $(ZIP) $(PEERS)
 	$(VENV_PY) -m benchmarks.chart $(if $(QUICK),--quick)

@@ -20,6 +20,6 @@ def reconstruction_of(obj):
 
     Raises ValueError, with a sentence, where there is none.
     """
-    from .tactile_addon import probe
+    from .tactile_addon.probe import probe
 
     return probe.reconstruction_of(obj)

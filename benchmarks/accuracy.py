@@ -9,7 +9,7 @@ is left out where it is missing. Prints Markdown tables:
 (b) random smooth closed shapes, a third of them touched at a hyperbolic point, six plane sets.
 
 The error is the mean |dz| over some 300 points of the true surface above the domain, each method in the
-frame it found itself (the peers in the paper's). Lengths are in mm, errors in micrometres.
+frame it found itself (the peers in the paper's). Lengths are in mm, errors in micrometers.
 """
 
 import argparse
@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from core import SamplingPlane, reconstruct, track
-from core.domain import closed_spline_domain
-from core.monge import exponents, monomials
+from core.patch.domain import closed_spline_domain
+from core.patch.monge import exponents, monomials
 from tests import surfaces
 
 from . import machine, table
@@ -62,7 +62,7 @@ PLANES = {  # azimuths and tilts in degrees
     "0/20/40": ((0, 20, 40), (0, 0, 0)),
 }
 EXACT_PLANES = tuple(PLANES)[:3]
-TURN = 23.0  # degrees of azimuth 0 against d1: a whole plane set may favour none of the directions
+TURN = 23.0  # degrees of azimuth 0 against d1: a whole plane set may favor none of the directions
 SHAPE_NOISE = 0.05
 STEPS = 12  # of a half curve: 75 contacts with the reference point in each curve
 HOLD_OUT = 300

@@ -10,7 +10,7 @@ The surfaces are those of benchmarks.accuracy and random shapes like its own. Ea
 contacts close together, of which evenly spread ones are taken: noise and extent stay as they are. Where
 core.explore chooses, it touches anew. The error is the mean |dz| over a hold-out, the same for all rows of
 a surface: some 300 points above the domain of the curves in three planes. Lengths are in mm, errors in
-micrometres.
+micrometers.
 """
 
 import argparse
@@ -25,8 +25,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from core import SamplingPlane, explore, track
-from core.domain import closed_spline_domain
-from core.monge import exponents, monomials
+from core.patch.domain import closed_spline_domain
+from core.patch.monge import exponents, monomials
 
 from . import accuracy, plot
 from .plot import plt
@@ -39,7 +39,7 @@ ENOUGH = 1.25
 BAYES, TAGC, BOUND = "Bayes, degree 4", "TAGC", "Cramér-Rao bound, degree 4"
 CHOSEN = "as many as core.explore takes"
 METHODS = {BAYES: accuracy.ours, TAGC: partial(accuracy.ours, method="tagc")}
-LOOKS = {  # by noise: colour, mark, and how the label stands to the line's end
+LOOKS = {  # by noise: color, mark, and how the label stands to the line's end
     0.0: (plot.BLUE, "o", "top"),
     0.02: (plot.GREEN, "s", "bottom"),
     0.1: (plot.VERMILION, "^", "center"),
@@ -169,7 +169,7 @@ def errors(key, seeds):
 
 
 def best_polynomial(over, degree):
-    """The least mean |dz| (um) of a polynomial through the reference point: a linear programme."""
+    """The least mean |dz| (um) of a polynomial through the reference point: a linear program."""
     from scipy.optimize import linprog
 
     radius = np.abs(over).max()
@@ -233,12 +233,12 @@ def print_tables(found):
 
 def draw_lines(axes, found, touches, at):
     """Medians and quartiles for each noise, TAGC's medians, and the limits."""
-    for noise, (colour, mark, _) in LOOKS.items():
-        axes.plot(at, medians(found, touches, noise, BAYES), color=colour, marker=mark, markersize=5)
+    for noise, (color, mark, _) in LOOKS.items():
+        axes.plot(at, medians(found, touches, noise, BAYES), color=color, marker=mark, markersize=5)
         quartiles = (medians(found, touches, noise, BAYES, q) for q in (0.25, 0.75))
-        axes.fill_between(at, *quartiles, color=colour, alpha=0.13, linewidth=0)
+        axes.fill_between(at, *quartiles, color=color, alpha=0.13, linewidth=0)
         if noise:
-            axes.plot(at, medians(found, touches, noise, BOUND), color=colour, linestyle=":", linewidth=1.3)
+            axes.plot(at, medians(found, touches, noise, BOUND), color=color, linestyle=":", linewidth=1.3)
     tagc = medians(found, touches, TAGC_NOISE, TAGC)
     axes.plot(at, tagc, color=plot.PURPLE, marker="x", markersize=4, linewidth=0.9)
     axes.axhline(np.median(found[None, None, BEST[4]]), color=plot.BLACK, linestyle="--", linewidth=1)
@@ -251,11 +251,11 @@ def draw(found):
     contacts = [touch.contacts for touch in BY_CONTACTS]
     draw_lines(left, found, BY_CONTACTS, contacts)
     draw_lines(right, found, SAME_TOTAL, PLANES)
-    for noise, (colour, *_) in LOOKS.items():
-        left.plot(*chosen(found, noise), "*", color=colour, mec="black", mew=0.8, markersize=14, zorder=3)
-    for noise, (colour, mark, _) in LOOKS.items():
+    for noise, (color, *_) in LOOKS.items():
+        left.plot(*chosen(found, noise), "*", color=color, mec="black", mew=0.8, markersize=14, zorder=3)
+    for noise, (color, mark, _) in LOOKS.items():
         each = medians(found, SAME_EACH, noise, BAYES)
-        right.plot(PLANES, each, "-.", color=colour, marker=mark, mfc="white", markersize=5, linewidth=1)
+        right.plot(PLANES, each, "-.", color=color, marker=mark, mfc="white", markersize=5, linewidth=1)
     left.set(title="Three planes, more contacts", xlabel="contacts", ylabel="mean |dz|, µm")
     left.set(xscale="log", yscale="log", xlim=(11, 400), ylim=(0.4, 400))
     left.set_xticks(contacts, contacts)
@@ -270,9 +270,9 @@ def label(left, right, found):
     """Names at the lines' ends, and what the line styles mean."""
     last = BY_CONTACTS[-1:]
     at = 1.07 * last[0].contacts
-    for noise, (colour, _, align) in LOOKS.items():
+    for noise, (color, _, align) in LOOKS.items():
         name = f"noise {noise:g} mm" if noise else "no noise"
-        left.text(at, *medians(found, last, noise, BAYES), name, color=colour, va=align, fontsize=8)
+        left.text(at, *medians(found, last, noise, BAYES), name, color=color, va=align, fontsize=8)
     tagc = medians(found, last, TAGC_NOISE, TAGC)
     left.text(at, *tagc, f"TAGC,\n{TAGC_NOISE:g} mm", color=plot.PURPLE, va="center", fontsize=8)
     four, six = (np.median(found[None, None, name]) for name in BEST.values())

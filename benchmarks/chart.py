@@ -5,7 +5,7 @@
 `python -m benchmarks.chart [--quick]`, from the root of a checkout; a peer whose package is missing is left
 out with a word. Writes to build/charts
 
-speed_accuracy.png, .csv        from contacts to the heights of the hold-out: milliseconds and micrometres
+speed_accuracy.png, .csv        from contacts to the heights of the hold-out: milliseconds and micrometers
 speed_accuracy_frame.png, .csv  normal and principal curvatures at the point: milliseconds, degrees and 1/mm
 
 for the exact surfaces, plane sets and noise levels of benchmarks.accuracy. The methods take turns, case by
@@ -292,18 +292,18 @@ def panel(axes, marks, noise, limits, off_scale=np.inf):
         ticks.set_major_formatter(lambda value, _: f"{value:g}" if value < off_scale else "")
     texts, places, beyond = [], [], 0
     for mark in marks:
-        colour, shape = LOOKS[mark.family]
+        color, shape = LOOKS[mark.family]
         x, y, text = mark.x[1], mark.y[1], mark.label
         if y > off_scale:
             text = f"{text} ↑ {y / 1e3:.1f} mm" if y < 1e4 else f"{text} ↑ {y / 1e3:.0f} mm"
             y, beyond = limits[1] * 0.84 * 0.7**beyond, beyond + 1
         else:
-            axes.plot([x, x], mark.y[::2], color=colour, lw=0.8, alpha=0.35, zorder=2)
-            axes.plot(mark.x[::2], [y, y], color=colour, lw=0.8, alpha=0.35, zorder=2)
-        face, edge = ("white", colour) if mark.more else (colour, "white")
+            axes.plot([x, x], mark.y[::2], color=color, lw=0.8, alpha=0.35, zorder=2)
+            axes.plot(mark.x[::2], [y, y], color=color, lw=0.8, alpha=0.35, zorder=2)
+        face, edge = ("white", color) if mark.more else (color, "white")
         axes.plot(x, y, shape, mfc=face, mec=edge, ms=7.0, mew=0.8, zorder=3)
         places.append((x, y))
-        texts.append((text, plot.dark(colour)))
+        texts.append((text, plot.dark(color)))
     if beyond:
         axes.axhspan(off_scale, limits[1], color="#f3f3f3", zorder=0)
     plot.label(axes, texts, np.array(places))
@@ -332,12 +332,12 @@ def key(axes, methods, columns=False):
             lines.append((i, line + j, family, f"{_listed([method.label for method in same])}: {says}"))
     height = 1.0 / (1 + max(line for _, line, _, _ in lines))
     for i, line, family, text in lines:
-        (colour, shape), heading = LOOKS[family], text == family
+        (color, shape), heading = LOOKS[family], text == family
         x, y = i / len(families) if columns else 0.0, 1.0 - (line + 0.5) * height
-        look = {"color": plot.dark(colour), "weight": "bold" if heading else "normal", "fontsize": 8}
+        look = {"color": plot.dark(color), "weight": "bold" if heading else "normal", "fontsize": 8}
         axes.text(x + 0.04, y, text, transform=axes.transAxes, va="center", **look)
         if heading:
-            axes.plot(x + 0.01, y, shape, color=colour, ms=7.0, transform=axes.transAxes, clip_on=False)
+            axes.plot(x + 0.01, y, shape, color=color, ms=7.0, transform=axes.transAxes, clip_on=False)
 
 
 def _listed(labels):
@@ -420,7 +420,7 @@ def captions(methods, quick):
     )
     heights = (
         f"Error: mean |dz| at some {accuracy.HOLD_OUT} points of the true surface. Time: from the contacts "
-        "to the heights there, with the frame. Dashed: Pareto front, given three curves. Grey: off scale. "
+        "to the heights there, with the frame. Dashed: Pareto front, given three curves. Gray: off scale. "
     )
     frame = (
         "Time: of meshes, for all vertices, and of pymeshlab for two calls, as it gives one kappa a call; "

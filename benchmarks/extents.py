@@ -71,12 +71,12 @@ def _rows(extension, name, count):
 
     file, least = SCANS[name]
     if file:
-        extension.tactile_addon.mesh_file.open_file(SCANS_FOLDER / file)
+        extension.tactile_addon.files.mesh_file.open_file(SCANS_FOLDER / file)
     else:
         bpy.ops.wm.read_homefile(use_empty=True)
         bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6)
     obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
-    size = extension.tactile_addon.surface.MeshSurface(obj, depsgraph).size
+    size = extension.tactile_addon.touch.surface.MeshSurface(obj, depsgraph).size
     places = (place for _, place in random_places(obj, 10 * count) if least is None or place.z > least)
     places = list(islice(places, count))
     for title, share in EXTENTS.items():
@@ -88,13 +88,13 @@ def _touched(extension, obj, depsgraph, place, extent):
     """The report of a touch and how far the patch is off the mesh; None where there is no patch."""
     add_on, fit = extension.tactile_addon, {"seed": 0, "method": "bayes", "degree": "auto"}
     try:
-        touched = add_on.touch.touch(
+        touched = add_on.touch.touch_object.touch(
             obj, depsgraph, place, sampling_planes(extension), extent=extent, step=0.0, noise=0.0, **fit
         )
     except ValueError:
         return None
-    touched = add_on.touch.verify(touched)
-    off = add_on.mesh_error.height_error(touched.surface, touched.result)
+    touched = add_on.touch.touch_object.verify(touched)
+    off = add_on.touch.mesh_error.height_error(touched.surface, touched.result)
     return touched.report | {"fit": touched.result.status}, off
 
 
@@ -121,7 +121,7 @@ def _draw(extension):
     from mathutils import Vector
 
     for name, (file, place, share) in PICTURES.items():
-        extension.tactile_addon.mesh_file.open_file(SCANS_FOLDER / file)
+        extension.tactile_addon.files.mesh_file.open_file(SCANS_FOLDER / file)
         (obj,) = bpy.context.scene.objects
         bpy.ops.tactile.reconstruct(target=obj.name, location=place)
         patch = bpy.context.view_layer.objects.active

@@ -8,7 +8,7 @@ A wavy sheet is touched once, so that Blender's tree of its faces is there; then
 turned by a degree again and again, as dragging its handle does. The Markdown table has medians in
 milliseconds on one thread, in one Blender without a window: `ray casts` are Blender's part of tracking,
 `fit` is the reconstruction with its report, `mesh write` rewrites patch and contours with normals and
-colours, `all` is the whole update with Blender's evaluation of what has changed, without the redraw.
+colors, `all` is the whole update with Blender's evaluation of what has changed, without the redraw.
 The last two columns happen once: building that tree, and at the end of a gesture the distances to the mesh.
 """
 
@@ -90,15 +90,17 @@ def main():
     extension = blender.start(parser.parse_args().zip)
     import bpy
 
-    addon, exploration, clock = extension.tactile_addon, extension.core.exploration, Clock()
-    clock.wrap(addon.surface.MeshSurface, "ray_cast", "ray casts")
+    addon, exploration, clock = extension.tactile_addon, extension.core.reconstruction.exploration, Clock()
+    clock.wrap(addon.touch.surface.MeshSurface, "ray_cast", "ray casts")
     clock.wrap(exploration, "track", "tracking")
     clock.wrap(exploration, "reconstruct", "fit")
-    clock.wrap(addon.touch, "reconstruction_report", "fit")
-    clock.wrap(addon.patch_object, "rewrite", "mesh write")
+    clock.wrap(addon.touch.touch_object, "reconstruction_report", "fit")
+    clock.wrap(addon.scene.patch_object, "rewrite", "mesh write")
     # As in a window, where what is dear waits for the end of the gesture.
-    update = addon.probe.update
-    addon.live.update = lambda probe, depsgraph, complete: update(probe, depsgraph, complete=False)
+    update = addon.probe.probe.update
+    addon.probe.change_handlers.update = lambda probe, depsgraph, complete: update(
+        probe, depsgraph, complete=False
+    )
     columns = ("faces", "patch vertices", *STAGES, "first touch", "end of a gesture")
     with blender.quiet():
         rows = [measure(bpy, update, clock, faces) for faces in FACES]

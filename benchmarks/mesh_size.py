@@ -38,7 +38,7 @@ FIT, TRACKING, CASTS, OURS = "tracking and fit", "tracking", "Blender's ray cast
 READ, FIRST = "read mesh", "first touch"
 BISECT, TO_BMESH = "bmesh.ops.bisect_plane", "to bmesh"
 SECTION, SEGMENTS, TO_TRIMESH = "trimesh section", "trimesh mesh_plane", "to trimesh"
-LOOKS = {  # of the lines: colour, mark, style and label
+LOOKS = {  # of the lines: color, mark, style and label
     FIRST: (plot.BLACK, "v", ":", "first touch, once"),
     BISECT: (plot.VERMILION, "D", "--", BISECT),
     SECTION: (plot.PURPLE, "x", "--", "trimesh: section (x),\nmesh_plane (+)"),
@@ -80,7 +80,7 @@ def touch(core, surface, point, normal, azimuth=0.0):
 
 def first_touch(extension, obj, depsgraph):
     """The surface, and where and how it was touched."""
-    surface = extension.tactile_addon.surface.MeshSurface(obj, depsgraph)
+    surface = extension.tactile_addon.touch.surface.MeshSurface(obj, depsgraph)
     point, normal, _ = surface.project(LOCATION)
     touch(extension.core, surface, point, normal)
     return surface, point, normal
@@ -106,7 +106,7 @@ def touches(extension, obj, depsgraph, surface, point, normal):
         runs[OURS].append(timed(cast_all, surface.ray_cast, rays[i - TOUCHES // 3])[0])
         runs[CASTS].append(timed(cast_bare, bare, rays[i - 2 * TOUCHES // 3])[0])
         if i % 10 == 0:
-            runs[READ].append(timed(extension.tactile_addon.surface.MeshSurface, obj, depsgraph)[0])
+            runs[READ].append(timed(extension.tactile_addon.touch.surface.MeshSurface, obj, depsgraph)[0])
     return {name: median(values) for name, values in runs.items()}, round(median(map(len, rays)))
 
 
@@ -192,11 +192,11 @@ def print_table(rows):
 def draw(rows):
     figure, axes = plt.subplots(figsize=(8.2, 4.8), layout="constrained")
     faces = [row["faces"] for row in rows]
-    for name, (colour, mark, style, label) in LOOKS.items():
+    for name, (color, mark, style, label) in LOOKS.items():
         if name in rows[0]:
             times = [1e3 * row[name] for row in rows]
-            axes.plot(faces, times, style, color=colour, marker=mark, markersize=5)
-            axes.text(1.12 * faces[-1], times[-1], label, color=colour, va="center", fontsize=8)
+            axes.plot(faces, times, style, color=color, marker=mark, markersize=5)
+            axes.text(1.12 * faces[-1], times[-1], label, color=color, va="center", fontsize=8)
     axes.set(xscale="log", yscale="log", xlabel="faces of the mesh", ylabel="time, ms")
     axes.set_xlim(0.85 * faces[0], faces[-1] * (faces[-1] / faces[0]) ** 0.3)
     axes.set_xticks(faces, [f"{n // 1_000_000}M" if n >= 1_000_000 else f"{n // 1000}k" for n in faces])

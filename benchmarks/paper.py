@@ -32,7 +32,7 @@ from .scans import AZIMUTHS, SCANS
 
 NOISE = 0.05  # of a contact; the paper's fits miss theirs by as much
 SEEDS = 9
-TURN = 60.0 / SEEDS  # degrees from seed to seed: no direction of the planes is a favoured one
+TURN = 60.0 / SEEDS  # degrees from seed to seed: no direction of the planes is a favored one
 NINE = (15.0, 30.0, 45.0, 75.0, 90.0, 105.0, 135.0, 150.0, 165.0)  # azimuths of the verifying curves
 LEAN = np.array([3.0, -2.0, 4.0])  # degrees from the normal to the planes, and multiples of it
 LEANS = (0.0, 1.0, 2.0, 4.0)
@@ -137,10 +137,12 @@ def scan_places(extension):
     from mathutils import Matrix
 
     for scan in SCANS[:4]:
-        extension.tactile_addon.mesh_file.open_file(SCANS_FOLDER / scan.file)
+        extension.tactile_addon.files.mesh_file.open_file(SCANS_FOLDER / scan.file)
         (obj,) = bpy.context.scene.objects
         obj.data.transform(Matrix.Scale(scan.scale, 4))
-        surface = extension.tactile_addon.surface.MeshSurface(obj, bpy.context.evaluated_depsgraph_get())
+        surface = extension.tactile_addon.touch.surface.MeshSurface(
+            obj, bpy.context.evaluated_depsgraph_get()
+        )
         point, outward, _ = surface.project(scan.scale * np.array(scan.location))
         name = "pebble" if "pebble" in scan.name else scan.name
         place = (name, surface, np.array(point), np.array(outward), scan.scale * scan.extent, scan.steps)

@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from core.triangulation import triangulate
-from core.verification import is_hidden
+from core.patch.triangulation import triangulate
+from core.scan.verification import is_hidden
 from tools import demo
 
 from . import ROOT
@@ -27,10 +27,10 @@ class Stage:
     """A scene to fill and to photograph."""
 
     def __init__(self, extension, scene):
-        self.mesh_data, self.scene = extension.tactile_addon.mesh_data, scene
+        self.mesh_data, self.scene = extension.tactile_addon.scene.mesh_data, scene
 
     def ink(self, name):
-        return self.mesh_data.emission(name, colour=INKS[name])
+        return self.mesh_data.emission(name, color=INKS[name])
 
     def add(self, name, data, material=None):
         import bpy
@@ -91,7 +91,7 @@ class Stage:
         bpy.context.object.data.materials.append(material)
         return [line, bpy.context.object]
 
-    def photograph(self, name, centre, view, up, width, overlays=()):
+    def photograph(self, name, center, view, up, width, overlays=()):
         """Renders to build/paper/NAME.png what is seen from `view`, with `up` upward.
 
         Overlays come nearer for that, which an orthographic camera does not show.
@@ -102,7 +102,7 @@ class Stage:
         view = Vector(view).normalized()
         right = Vector(up).cross(view).normalized()
         axes = Matrix((right, view.cross(right), view)).transposed()
-        place = Matrix.LocRotScale(Vector(centre) + 10.0 * width * view, axes, None)
+        place = Matrix.LocRotScale(Vector(center) + 10.0 * width * view, axes, None)
         camera = self.add("Camera", bpy.data.cameras.new("Camera"))
         sun = self.add("Sun", bpy.data.lights.new("Sun", "SUN"))
         self.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.35
@@ -144,7 +144,7 @@ def draw_row(extension, place, r, contours):
 
 
 def _cut(stage, obj, place, r):
-    """The mesh around the patch, each vertex coloured by its unit outward normal as R, G, B."""
+    """The mesh around the patch, each vertex colored by its unit outward normal as R, G, B."""
     mesh = obj.data
     mesh.calc_loop_triangles()
     points, normals = np.empty((2, len(mesh.vertices), 3), dtype=np.float32)
@@ -156,10 +156,10 @@ def _cut(stage, obj, place, r):
     near = (np.hypot(x, y) < CUT * r.radius) & (np.abs(z) < CUT * r.radius)
     for i in np.flatnonzero(near):  # what lies below another layer is in the way of the view from inside
         near[i] = not is_hidden(place.surface, points[i].tolist(), up, 2.0 * CUT * r.radius)
-    # Emission is in linear light, the colours meant are as seen.
-    colours = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
-    attributes = [("normal_colour", "FLOAT_COLOR", colours.astype(np.float32))]
-    material = stage.mesh_data.emission("Normals", attribute="normal_colour")
+    # Emission is in linear light, the colors meant are as seen.
+    colors = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
+    attributes = [("normal_color", "FLOAT_COLOR", colors.astype(np.float32))]
+    material = stage.mesh_data.emission("Normals", attribute="normal_color")
     stage.mesh("Mesh", points, triangles[near[triangles].all(axis=1)], material, attributes)
 
 

@@ -13,7 +13,7 @@ deviate as much at most inside the domain, whose boundary it follows by steps of
 import numpy as np
 
 from core import Reconstruction, SamplingPlane, reconstruct, track
-from core.result import MESH_SHARE
+from core.reconstruction.result import MESH_SHARE
 from tests import surfaces
 
 from . import machine

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from core import reconstruct
-from core.monge import exponents, monomials
+from core.patch.monge import exponents, monomials
 
 
 class Fit(NamedTuple):
@@ -169,10 +169,10 @@ def nurbs(case, samples=(25, 61)):
 # Meshes ----------------------------------------------------------------------------------------------
 
 
-def screened_poisson(case, true_normals, neighbours=40):
-    """With the surface's own normals at the contacts, which no curve tells, or with those of the neighbours.
+def screened_poisson(case, true_normals, neighbors=40):
+    """With the surface's own normals at the contacts, which no curve tells, or with those of the neighbors.
 
-    Fewer neighbours are all of one curve, which has no normal. A finer octree changes nothing but the time.
+    Fewer neighbors are all of one curve, which has no normal. A finer octree changes nothing but the time.
     Heights are linear between the vertices of the upper side.
     """
     import pymeshlab
@@ -187,7 +187,7 @@ def screened_poisson(case, true_normals, neighbours=40):
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=contacts, v_normals_matrix=normals))
     if not true_normals:
         meshes.compute_normal_for_point_clouds(
-            k=neighbours, flipflag=True, viewpos=np.array([0.0, 0.0, 100.0])
+            k=neighbors, flipflag=True, viewpos=np.array([0.0, 0.0, 100.0])
         )
     meshes.generate_surface_reconstruction_screened_poisson(depth=6, fulldepth=4, pointweight=50.0, threads=1)
     mesh = meshes.current_mesh()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the charts have in common: a look that fits a README column, colours for all eyes, labels, files."""
+"""What the charts have in common: a look that fits a README column, colors for all eyes, labels, files."""
 
 import csv
 
@@ -16,7 +16,7 @@ from . import ROOT
 
 OUTPUT = ROOT / "build" / "charts"
 LABEL_SIZE = 7.5
-# Okabe and Ito's colours, told apart by colour-blind readers; marks and labels tell the same again.
+# Okabe and Ito's colors, told apart by color-blind readers; marks and labels tell the same again.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
     "#000000", "#e69f00", "#56b4e9", "#009e73", "#0072b2", "#d55e00", "#cc79a7",
 )  # fmt: skip
@@ -37,9 +37,9 @@ def save(figure, name, caption, header, rows):
     print(f"{OUTPUT / name}.png and .csv")
 
 
-def dark(colour):
+def dark(color):
     """For text, which is thinner than a mark."""
-    return tuple(0.72 * part for part in to_rgb(colour))
+    return tuple(0.72 * part for part in to_rgb(color))
 
 
 def label(axes, texts, places):
@@ -48,13 +48,13 @@ def label(axes, texts, places):
     look = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": LABEL_SIZE}
     halo = [withStroke(linewidth=1.8, foreground="white")]
     moves = _moves(axes, [text for text, _ in texts], places)
-    for (text, colour), place, move in zip(texts, places, moves, strict=True):
-        arrow = {**line, "color": colour}
-        axes.annotate(text, place, move, color=colour, arrowprops=arrow, path_effects=halo, zorder=4, **look)
+    for (text, color), place, move in zip(texts, places, moves, strict=True):
+        arrow = {**line, "color": color}
+        axes.annotate(text, place, move, color=color, arrowprops=arrow, path_effects=halo, zorder=4, **look)
 
 
 def _moves(axes, texts, places):
-    """From the places to the centres of their texts, in points, so that these cover little else.
+    """From the places to the centers of their texts, in points, so that these cover little else.
 
     Each text in turn, four times over, takes the nearest of 80 positions that overlaps least.
     """
@@ -65,19 +65,19 @@ def _moves(axes, texts, places):
     turns = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     rings = np.array([[r, a] for r in (0.0, 5.0, 11.0, 18.0, 26.0) for a in turns])
     directions = np.column_stack([np.cos(rings[:, 1]), np.sin(rings[:, 1])])
-    centres = marks.copy()
+    centers = marks.copy()
     for _ in range(4):
         for i, size in enumerate(sizes):
             spots = marks[i] + directions * (size / 2.0 + 4.5 + rings[:, :1])
             others = np.arange(len(sizes)) != i
-            cost = 3.0 * _overlap(spots, size, centres[others], sizes[others])
+            cost = 3.0 * _overlap(spots, size, centers[others], sizes[others])
             cost += 2.0 * _overlap(spots, size, marks, np.full(marks.shape, 7.0)) + rings[:, 0]
             outside = np.maximum(frame[:2] - (spots - size / 2.0), spots + size / 2.0 - frame[2:])
-            centres[i] = spots[np.argmin(cost + 50.0 * np.maximum(outside, 0.0).sum(axis=1))]
-    return centres - marks
+            centers[i] = spots[np.argmin(cost + 50.0 * np.maximum(outside, 0.0).sum(axis=1))]
+    return centers - marks
 
 
-def _overlap(spots, size, centres, sizes):
+def _overlap(spots, size, centers, sizes):
     """The area of a box at each spot (m, 2) that other boxes cover."""
-    apart = np.abs(spots[:, None] - centres)
+    apart = np.abs(spots[:, None] - centers)
     return np.prod(np.maximum((size + sizes) / 2.0 - apart, 0.0), axis=2).sum(axis=1)

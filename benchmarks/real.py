@@ -29,8 +29,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from core import SamplingPlane, explore, reconstruct, residual, residual_evidence, track
-from core.monge import exponents, monomials
+from core import SamplingPlane, explore, reconstruct, track
+from core.bayes import residual_evidence
+from core.patch import residual
+from core.patch.monge import exponents, monomials
 from tools import blender
 
 from . import SCANS_FOLDER, machine, table
@@ -44,7 +46,7 @@ DENSE = 150  # points for the true frame
 
 
 class Scan:
-    """A mesh of size 1 in Blender's tree, centred."""
+    """A mesh of size 1 in Blender's tree, centered."""
 
     def __init__(self, path):
         import bpy
@@ -61,7 +63,7 @@ class Scan:
         points = (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()
         a, b, c = (points[faces[:, i]] for i in range(3))
         across = np.cross(b - a, c - a)
-        self.name, self.areas, self.centres = path.stem, np.linalg.norm(across, axis=1), (a + b + c) / 3.0
+        self.name, self.areas, self.centers = path.stem, np.linalg.norm(across, axis=1), (a + b + c) / 3.0
         self.normals = across / np.maximum(self.areas, 1e-300)[:, None]
         self.tree = BVHTree.FromPolygons(points.tolist(), faces.tolist(), all_triangles=True)
 
@@ -72,7 +74,7 @@ class Scan:
     def places(self, count, seed):
         """Random points and normals, by area."""
         faces = np.random.default_rng(seed).choice(len(self.areas), count, p=self.areas / self.areas.sum())
-        return zip(self.centres[faces], self.normals[faces], strict=True)
+        return zip(self.centers[faces], self.normals[faces], strict=True)
 
     def above(self, r, flat):
         """Where there are, points (m, 3) of the layers nearest to r along its normal above (n, 2)."""

@@ -53,22 +53,24 @@ def _touches(extension, path, share, count):
     """A row of the table, and how often what was said."""
     import bpy
 
-    extension.tactile_addon.mesh_file.open_file(path)
+    extension.tactile_addon.files.mesh_file.open_file(path)
     obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
-    size = extension.tactile_addon.surface.MeshSurface(obj, depsgraph).size
+    size = extension.tactile_addon.touch.surface.MeshSurface(obj, depsgraph).size
     planes = sampling_planes(extension)
     fit = {"extent": share * size, "step": 0.0, "noise": 0.0, "seed": 0, "method": "bayes", "degree": 4}
     reports, reasons, slowest = [], Counter(), 0.0
     for _, location in random_places(obj, count):
         start = perf_counter()
         try:
-            touched = extension.tactile_addon.touch.touch(obj, depsgraph, location, planes, **fit)
+            touched = extension.tactile_addon.touch.touch_object.touch(
+                obj, depsgraph, location, planes, **fit
+            )
         except ValueError as error:
             reasons[_kind(f"refused: {error}")] += 1
             continue
         finally:
             slowest = max(slowest, perf_counter() - start)
-        report = extension.tactile_addon.touch.verify(touched).report
+        report = extension.tactile_addon.touch.touch_object.verify(touched).report
         reports.append(report)
         _check_finite(report)
         if report["status"] != "ok":

@@ -28,7 +28,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import core
-from core import registration, triangles
+from core.scan import pose_search, scanned_mesh
 from tests import surfaces
 
 from . import SCANS_FOLDER, machine, table, timed
@@ -42,7 +42,7 @@ NEAR, TURN = 1.0, math.radians(2.0)  # mm
 AMBIGUOUS = 1.5
 FINE_TURNS = 36
 FIRST, KEPT = 6, 300  # contacts that all poses are judged by first; poses that are refined
-REFINED = 50  # of those, to the nearest triangles
+REFINED = 50  # of those, to the nearest scanned_mesh
 
 
 class Scan:
@@ -98,7 +98,7 @@ class Exhaustive:
     def __init__(self, scan):
         mesh = trimesh.Trimesh(scan.vertices, scan.faces, process=False)
         self.vertices, self.normals, self.faces = scan.vertices, np.array(mesh.vertex_normals), scan.faces
-        self.axes = registration._axes(self.normals)
+        self.axes = pose_search._axes(self.normals)
         self.tree = cKDTree(self.vertices)
 
     def places(self, contacts):
@@ -131,11 +131,11 @@ class Exhaustive:
         """Poses, the best first, and their residuals."""
         axes, origins = self.places(r.contacts)
         touch = np.array([r.contacts / r.radius, r.patch.normal(*r.contacts[:, :2].T)])
-        mesh = triangles.mesh_of(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
+        mesh = scanned_mesh.mesh_of(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
         places = np.concatenate([axes, origins[..., None] / r.radius], axis=2)
-        for neighbours in (1, registration.NEAREST):
-            places, residuals, _ = registration._descended(places, touch, mesh, neighbours, 10)
-            kept = registration._distinct(places, residuals)[:REFINED]
+        for neighbors in (1, pose_search.NEAREST):
+            places, residuals, _ = pose_search._descended(places, touch, mesh, neighbors, 10)
+            kept = pose_search._distinct(places, residuals)[:REFINED]
             places, residuals = places[kept], residuals[kept]
         rotations = places[..., :3] @ r.frame.axes.T
         shifts = r.radius * places[..., 3] - rotations @ r.frame.origin

@@ -92,7 +92,7 @@ def _rows(extension, scan, data):
     """A line of the table for each method."""
     import bpy
 
-    extension.tactile_addon.mesh_file.open_file(data / scan.file)
+    extension.tactile_addon.files.mesh_file.open_file(data / scan.file)
     touched = (bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get(), scan.location)
     planes = sampling_planes(extension)
     for method in METHODS:
@@ -116,7 +116,7 @@ def _random_pairs(extension, scan, data, count):
     """Reports of both methods at random points, where both give a patch."""
     import bpy
 
-    extension.tactile_addon.mesh_file.open_file(data / scan.file)
+    extension.tactile_addon.files.mesh_file.open_file(data / scan.file)
     obj, depsgraph = bpy.context.scene.objects[0], bpy.context.evaluated_depsgraph_get()
     planes = sampling_planes(extension)
     for index, location in random_places(obj, count):
@@ -157,7 +157,7 @@ def sampling_planes(extension):
 
 
 def random_places(obj, count):
-    """(face, its centre in the world), random by area but seeded."""
+    """(face, its center in the world), random by area but seeded."""
     import numpy as np
 
     areas = np.array([face.area for face in obj.data.polygons])
@@ -166,7 +166,7 @@ def random_places(obj, count):
 
 
 def _report(extension, *place, **inputs):
-    touch = extension.tactile_addon.touch
+    touch = extension.tactile_addon.touch.touch_object
     return touch.verify(touch.touch(*place, **inputs)).report
 
 

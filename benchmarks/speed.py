@@ -5,7 +5,7 @@
 `python -m benchmarks.speed`, from the root of a checkout. On the touches of benchmarks.accuracy (eleven exact
 surfaces, three plane sets, three noise levels, 75 contacts) it prints Markdown tables:
 
-(a) the minimisation of (9), by Newton's method, by scipy's L-BFGS-B from the same start and on the same grid,
+(a) the minimization of (9), by Newton's method, by scipy's L-BFGS-B from the same start and on the same grid,
     and by the paper's steepest descent from the paper's start;
 (b) fits a second, one by one and by core.reconstruct_many;
 (c) the parts of one fit.
@@ -18,7 +18,10 @@ from unittest.mock import patch
 import numpy as np
 from scipy.optimize import minimize
 
-from core import bayes, reconstruct, reconstruct_many, reconstruction, tagc
+from core import reconstruct, reconstruct_many
+from core.bayes import joint_fit
+from core.paper import tagc
+from core.reconstruction import from_contours
 
 from . import accuracy, machine, table, timed
 
@@ -143,13 +146,13 @@ def _departure(one, other):
 # (c) -------------------------------------------------------------------------------------------------
 
 PARTS = {
-    "curves through the point": (reconstruction, "curves_through"),
-    "Darboux frame": (reconstruction, "darboux_frames"),
-    "equations of the contacts": (bayes, "linear_system"),
-    "their QR": (bayes, "restricted"),
-    "waviness and noise": (bayes, "hyperparameters"),
-    "posterior": (bayes, "posterior"),
-    "patch and domain": (reconstruction, "_result"),
+    "curves through the point": (from_contours, "curves_through"),
+    "Darboux frame": (from_contours, "darboux_frames"),
+    "equations of the contacts": (joint_fit, "linear_system"),
+    "their QR": (joint_fit, "restricted"),
+    "waviness and noise": (joint_fit, "hyperparameters"),
+    "posterior": (joint_fit, "posterior"),
+    "patch and domain": (from_contours, "_result"),
 }
 
 

@@ -349,7 +349,7 @@ def rows_of(results):
     return rows
 
 
-LOOKS = {  # colour, line, letter
+LOOKS = {  # color, line, letter
     "bayes": (plot.BLUE, "-", "B"),
     "tagc": (plot.VERMILION, "--", "T"),
     "quadratic-variation": (plot.GREEN, "-.", "Q"),
@@ -383,9 +383,9 @@ def panel(axes, sweep, of, first):
     errors, conditions, shares = axes
     errors.set_title(sweep.title, fontsize=8)
     for method, rows in of.items():
-        colour, line, _ = LOOKS[method]
-        errors.plot(places, np.clip([float(r[4]) for r in rows], *ERRORS), line, color=colour, lw=1.4)
-        conditions.plot(places, np.clip([float(r[6]) for r in rows], *CONDITIONS), line, color=colour, lw=1.2)
+        color, line, _ = LOOKS[method]
+        errors.plot(places, np.clip([float(r[4]) for r in rows], *ERRORS), line, color=color, lw=1.4)
+        conditions.plot(places, np.clip([float(r[6]) for r in rows], *CONDITIONS), line, color=color, lw=1.2)
     bayes = of["bayes"]
     errors.plot(places, np.clip([float(r[5]) for r in bayes], *ERRORS), ".", color=plot.BLUE, ms=5)
     errors.set(yscale="log", ylim=ERRORS, yticks=[1e-4, 1e-2, 1])
@@ -407,7 +407,7 @@ def panel(axes, sweep, of, first):
     for part in (errors, conditions):
         part.set_xlim(-0.5, len(places) - 0.5)
         part.set_xticks([])
-        part.tick_params(labelsize=6, labelleft=first)
+        part.tick_params(labelsize=6, labeleft=first)
         part.minorticks_off()
     if first:
         errors.set_ylabel("error / L", fontsize=7)
@@ -417,19 +417,19 @@ def panel(axes, sweep, of, first):
 def key(axes):
     axes.axis("off")
     lines = [
-        *((line, colour, f"{letter}  {method}") for method, (colour, line, letter) in LOOKS.items()),
+        *((line, color, f"{letter}  {method}") for method, (color, line, letter) in LOOKS.items()),
         (".", plot.BLUE, "bayes: mean height_std"),
         ("s", (0.95, 0.65, 0.1), "share warned of"),
         ("s", (0.15, 0.15, 0.15), "share refused"),
         ("s", "#dce8dc", "harmless: no warning is due"),
     ]
-    for number, (look, colour, text) in enumerate(lines):
+    for number, (look, color, text) in enumerate(lines):
         y = 0.95 - 0.125 * number
         axes.plot(
             [0.0, 0.1] if look in ("-", "--", "-.", ":") else [0.05],
             [y] * (2 if look[0] in "-:" else 1),
             look,
-            color=colour,
+            color=color,
         )
         axes.text(0.15, y, text, va="center", fontsize=8)
     axes.set(xlim=(0, 1), ylim=(0, 1))

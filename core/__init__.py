@@ -6,23 +6,31 @@ Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the calle
 convex body has negative curvatures under its outward normal.
 """
 
-from .coefficients import SOLVERS
-from .common_point import common_point, in_running_order
-from .contour import CREASE, EXTENT, NO_CONTACT, NOT_MONGE, UNEXPLAINED, Contour, SamplingPlane
-from .deviations import mean_height_stds, with_height_stds
-from .domain import Domain
-from .exploration import Exploration, explore
-from .geometry import Geometry, distances, fit_error, overlapped
-from .local_geometry import DegenerateCurvesError, Frame
-from .monge import MongePatch
-from .next_plane import azimuth_of, suggest_plane
-from .reconstruction import METHODS, reconstruct, reconstruct_many
-from .registration import Pose, register
-from .result import Reconstruction
-from .sampling import spaced
-from .serialization import from_dict, to_dict
-from .tracking import Surface, track
-from .verification import reachable, verify
+from .contours.common_point import common_point, in_running_order
+from .contours.contour import (
+    CREASE,
+    EXTENT,
+    NO_CONTACT,
+    NOT_MONGE,
+    UNEXPLAINED,
+    Contour,
+    SamplingPlane,
+)
+from .contours.local_geometry import DegenerateCurvesError, Frame
+from .contours.tracking import Surface, track
+from .paper.by_method import SOLVERS
+from .patch.domain import Domain
+from .patch.geometry import Geometry, distances, fit_error, overlapped
+from .patch.monge import MongePatch
+from .reconstruction.deviations import mean_height_stds, with_height_stds
+from .reconstruction.exploration import Exploration, explore
+from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
+from .reconstruction.next_plane import azimuth_of, suggest_plane
+from .reconstruction.result import Reconstruction
+from .reconstruction.serialization import from_dict, to_dict
+from .scan.pose_search import Pose, register
+from .scan.sampling import spaced
+from .scan.verification import reachable, verify
 
 __all__ = [
     "CREASE",

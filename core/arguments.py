@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-ROUNDING = 4e-16  # of a unit vector's length
+ROUNDING = 4e-16  # Rounding of a unit vector's length.
 LARGEST, SMALLEST = 1e50, 1e-50  # lengths whose sixth powers are numbers
 
 

@@ -4,27 +4,17 @@
 
 import bpy
 
-from . import (
-    command_line,
-    contact_operators,
-    gizmos,
-    live,
-    map_object,
-    map_operator,
-    operators,
-    overlay,
-    panel,
-    pick,
-    probe,
-    probe_operators,
-    registration,
-    verification,
-)
+from . import command_line, panel
+from .comparison import register_operator, verify_operator
+from .files import contact_operators
+from .probe import change_handlers, operators, probe, probe_operators
+from .stability_map import map_object, map_operator
+from .viewport import gizmos, overlay, pick
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
-    verification.TACTILE_OT_verify,
-    registration.TACTILE_OT_register,
+    verify_operator.TACTILE_OT_verify,
+    register_operator.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,
     pick.TACTILE_OT_pick,
     gizmos.TACTILE_OT_drag,
@@ -48,7 +38,7 @@ def register():
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
     bpy.utils.register_manual_map(panel.manual_map)
-    live.register()
+    change_handlers.register()
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
     _drawings.extend(overlay.draw_handlers())
 
@@ -56,7 +46,7 @@ def register():
 def unregister():
     while _drawings:
         bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
-    live.unregister()
+    change_handlers.unregister()
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.utils.unregister_manual_map(panel.manual_map)
     for menu, draw in MENUS:

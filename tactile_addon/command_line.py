@@ -12,13 +12,15 @@ from pathlib import Path
 
 import bpy
 
-from . import contact_file, map_object, measured, mesh_file, patch_object, whole_file
-from .map_report import map_readable
-from .registration import register_patch
-from .report import readable, verification_columns
-from .settings import METHODS, SOLVERS
-from .units import ADAPTIVE, METRES
-from .verification import verify_patch
+from .comparison.register_operator import register_patch
+from .comparison.verify_operator import verify_patch
+from .files import contact_file, measured, mesh_file, whole_file
+from .scene import patch_object
+from .stability_map import map_object
+from .stability_map.map_report import map_readable
+from .touch.settings import METHODS, SOLVERS
+from .touch.units import ADAPTIVE, METERS
+from .touch.wording import readable, verification_columns
 
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 # What the operators take as it is given.
@@ -157,7 +159,7 @@ def _run(options):
     arguments = _arguments(options)
     before = set(bpy.data.objects)
     options.operator(**arguments, **options.more)
-    # By name it may be another, and it is not active where the scene was saved in edit mode.
+    # Its name may be another's, and it is not active where the scene was saved in edit mode.
     (made,) = (obj for obj in set(bpy.data.objects) - before if options.record in obj)
     if options.record == patch_object.RECORD:
         _compare(made, options)
@@ -206,7 +208,7 @@ def _open_contacts(options):
         bpy.ops.wm.read_homefile(use_empty=True)
         unit = measured.read(options.files, options.unit or "FILE", 1.0).unit
         settings = bpy.context.scene.unit_settings
-        name = {symbol: name for name, (symbol, _) in METRES.items()}.get(unit)
+        name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
         settings.system = "METRIC" if unit else "NONE"
         settings.scale_length = contact_file.LENGTHS.get(unit, 1.0)
         if name in ADAPTIVE["METRIC"]:

@@ -8,24 +8,26 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from . import map_object, probe, units
-from .map_operator import TACTILE_OT_stability_map
-from .map_report import map_rows, median_rows
-from .operators import TACTILE_OT_reconstruct
-from .pick import TACTILE_OT_pick
-from .probe_operators import (
+from .comparison.register_operator import TACTILE_OT_register
+from .comparison.verify_operator import TACTILE_OT_verify
+from .probe import probe
+from .probe.operators import TACTILE_OT_reconstruct
+from .probe.probe_operators import (
     TACTILE_OT_add_plane,
     TACTILE_OT_add_planes,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
-    TACTILE_OT_show_colours,
+    TACTILE_OT_show_colors,
     TACTILE_OT_update,
-    shows_colours,
+    shows_colors,
 )
-from .registration import TACTILE_OT_register
-from .report import patch_rows, verification_rows, verification_table
-from .settings import draw_chosen, draw_sensor, draw_solver
-from .verification import TACTILE_OT_verify
+from .stability_map import map_object
+from .stability_map.map_operator import TACTILE_OT_stability_map
+from .stability_map.map_report import map_rows, median_rows
+from .touch import units
+from .touch.settings import draw_chosen, draw_sensor, draw_solver
+from .touch.wording import patch_rows, verification_rows, verification_table
+from .viewport.pick import TACTILE_OT_pick
 
 TAB = "Tactile"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
@@ -103,7 +105,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if record is None:
             layout.label(text="This patch was edited: touch again", icon="ERROR")
             return
-        _draw_colours(context, layout, patch, "tactile_colours")
+        _draw_colors(context, layout, patch, "tactile_colors")
         box, unit = layout.box(), units.unit_of(context.scene, record["radius"])
         _draw_rows(box, patch_rows(record, unit))
         _draw_sentence(context, box, record["message"], ICONS.get(record["status"], "ERROR"))
@@ -125,7 +127,7 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
         if obj is None or map_object.RECORD not in obj:
             return
-        _draw_colours(context, layout, obj, "tactile_map_colours")
+        _draw_colors(context, layout, obj, "tactile_map_colors")
         record = obj[map_object.RECORD]
         box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
         _draw_rows(box, map_rows(record, unit))
@@ -135,11 +137,11 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
             _draw_rows(box, medians)
 
 
-def _draw_colours(context, layout, obj, name):
-    """What the colours show, and a button where the viewport does not show them."""
+def _draw_colors(context, layout, obj, name):
+    """What the colors show, and a button where the viewport does not show them."""
     layout.prop(obj, name)
-    if not shows_colours(context.space_data):
-        layout.operator(TACTILE_OT_show_colours.bl_idname, icon="SHADING_SOLID")
+    if not shows_colors(context.space_data):
+        layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
 
 
 def _draw_rows(layout, rows):
@@ -208,10 +210,10 @@ def manual_map():
         "bpy.ops.tactile.verify": "#verify",
         "bpy.ops.tactile.register": "#register",
         "bpy.ops.tactile.stability_map": "#stability-map",
-        "bpy.types.object.tactile_map_colours": "#stability-map",
+        "bpy.types.object.tactile_map_colors": "#stability-map",
         "bpy.ops.tactile*": "#probe",
         "bpy.types.tactileprobe*": "#probe",
-        "bpy.types.object.tactile_colours": "#result",
+        "bpy.types.object.tactile_colors": "#result",
     }
     return page.as_uri(), tuple(pages.items())
 

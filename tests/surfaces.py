@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exact surfaces to touch, with their curvatures known in closed form; lengths read as millimetres."""
+"""Exact surfaces to touch, with their curvatures known in closed form; lengths read as millimeters."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -17,7 +17,7 @@ from mathutils import Vector
 from tools import demo
 
 
-def test_a_rendered_pixel_has_the_colour_that_the_bar_has_for_its_curvature(extension, tmp_path):
+def test_a_rendered_pixel_has_the_color_that_the_bar_has_for_its_curvature(extension, tmp_path):
     import bpy
     from bpy_extras.object_utils import world_to_camera_view
 
@@ -30,20 +30,20 @@ def test_a_rendered_pixel_has_the_colour_that_the_bar_has_for_its_curvature(exte
     pixels = np.array(image.pixels[:]).reshape(height, width, -1)
 
     def pixel(obj, local):
-        """The rendered colour at a point of an object."""
+        """The rendered color at a point of an object."""
         scene = bpy.context.scene
         x, y, _ = world_to_camera_view(scene, scene.camera, obj.matrix_world @ Vector(local))
         return pixels[int(y * height), int(x * width), :3]
 
-    limit = patch["tactile"]["colour_limit"]
-    bar = bpy.data.objects["Colour Bar"]
+    limit = patch["tactile"]["color_limit"]
+    bar = bpy.data.objects["Color Bar"]
     (lines,) = patch.children
     contours = np.array([v.co.xy for v in lines.data.vertices])
     compared = []
     curvature = np.array([value.value for value in patch.data.attributes["gaussian_curvature"].data])
     corners = np.array([vertex.co for vertex in patch.data.vertices])
     edges = np.array([edge.vertices for edge in patch.data.edges])
-    # At vertices, and in the middle of neighbours, where the colour is between theirs.
+    # At vertices, and in the middle of neighbors, where the color is between theirs.
     for ends in [*np.arange(len(corners))[:, None], *edges]:
         place, values = corners[ends].mean(axis=0), curvature[ends]
         clear = np.linalg.norm(contours - place[:2], axis=1).min() > 0.05 * patch["tactile"]["radius"]
@@ -62,7 +62,7 @@ def test_the_labels_and_the_bar_say_the_range(extension):
 
     patch = demo.touch(extension)
     demo.compose(extension, patch, "m")
-    limit = patch["tactile"]["colour_limit"]
+    limit = patch["tactile"]["color_limit"]
     labels = [obj.data.body for obj in bpy.data.objects if obj.type == "FONT"]
     for text in (f"{limit:+.3g}", f"{-limit:+.3g}", "0", "Gaussian curvature", "in 1/m²"):
         assert text in labels

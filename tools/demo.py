@@ -36,8 +36,8 @@ def main():
             render(patch, blender.BUILD / "demo.png")
     except (RuntimeError, OSError) as error:
         sys.exit(f"demo: {str(error).strip()}")
-    report = patch[extension.tactile_addon.patch_object.RECORD].to_dict()
-    print(extension.tactile_addon.report.readable(report))
+    report = patch[extension.tactile_addon.scene.patch_object.RECORD].to_dict()
+    print(extension.tactile_addon.touch.wording.readable(report))
     print(f"saved {blender.BUILD / 'demo.blend'} and {blender.BUILD / 'demo.png'}")
 
 
@@ -46,7 +46,7 @@ def touch(extension, mesh=""):
     import bpy
 
     if mesh:
-        extension.tactile_addon.mesh_file.open_file(Path(mesh))
+        extension.tactile_addon.files.mesh_file.open_file(Path(mesh))
         target = next(o for o in bpy.context.scene.objects if o.type == "MESH" and len(o.data.polygons))
         corners = np.array([target.matrix_world @ type(target.location)(c) for c in target.bound_box])
         location, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
@@ -67,11 +67,11 @@ def touch(extension, mesh=""):
 
 
 def compose(extension, patch, unit):
-    """Camera, light, a colour bar and labels for a picture of the patch, whose colours come out true."""
+    """Camera, light, a color bar and labels for a picture of the patch, whose colors come out true."""
     import bpy
     from mathutils import Matrix, Vector
 
-    report = patch[extension.tactile_addon.patch_object.RECORD].to_dict()
+    report = patch[extension.tactile_addon.scene.patch_object.RECORD].to_dict()
     radius, scene = report["radius"], bpy.context.scene
     point, normal = Vector(report["frame"]["origin"]), Vector(report["frame"]["normal"])
     upright = Vector((0, 0, 1)) if abs(normal.z) < 0.9 else Vector((0, 1, 0))
@@ -92,10 +92,10 @@ def compose(extension, patch, unit):
         scene.collection.objects.link(obj)
     scene.camera = camera
 
-    material = extension.tactile_addon.mesh_data.emission
-    ink = material("Ink", colour=(0.01, 0.01, 0.01, 1.0))
+    material = extension.tactile_addon.scene.mesh_data.emission
+    ink = material("Ink", color=(0.01, 0.01, 0.01, 1.0))
     put = _Overlay(camera, radius, ink)
-    _colour_bar(extension, put, report["colour_limit"], unit)
+    _color_bar(extension, put, report["color_limit"], unit)
     put.text(f"{report['source']}, touched at {report['contacts']} points", -3.3, 2.25, 0.21)
     put.text(f"principal curvatures {report['k1']:.3g} and {report['k2']:.3g} 1/{unit}", -3.3, -2.25, 0.14)
     if report["vertices"]:
@@ -109,7 +109,7 @@ def compose(extension, patch, unit):
 
 
 class _Overlay:
-    """Places things in front of the camera, in units of the patch radius from the picture's centre."""
+    """Places things in front of the camera, in units of the patch radius from the picture's center."""
 
     def __init__(self, camera, radius, ink):
         self.camera, self.radius, self.ink = camera, radius, ink
@@ -133,7 +133,7 @@ class _Overlay:
         self.add("Label", text, x, y)
 
 
-def _colour_bar(extension, put, limit, unit):
+def _color_bar(extension, put, limit, unit):
     """A strip with the patch's own material from -limit to limit, ticks and a title."""
     import bpy
 
@@ -142,12 +142,12 @@ def _colour_bar(extension, put, limit, unit):
     points = np.array([(x, BAR_REACH * y, 0.0) for y in at for x in (0.0, 0.2)])
     corners = 2 * np.arange(BAR_STEPS)[:, None]
     triangles = np.vstack([corners + corner for corner in ((0, 1, 3), (0, 3, 2))])
-    colours = module.colours.diverging(np.repeat(at, 2), 1.0)
-    attributes = [(module.patch_object.COLOUR, "FLOAT_COLOR", colours)]
-    strip = bpy.data.meshes.new("Colour Bar")
+    colors = module.colors.diverging(np.repeat(at, 2), 1.0)
+    attributes = [(module.patch_object.COLOR, "FLOAT_COLOR", colors)]
+    strip = bpy.data.meshes.new("Color Bar")
     module.mesh_data.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])
-    put.add("Colour Bar", strip, 2.35, 0.0)
+    put.add("Color Bar", strip, 2.35, 0.0)
     put.text("Gaussian curvature", 1.6, BAR_REACH + 0.45, 0.18)
     put.text(f"in 1/{unit}²", 2.25, BAR_REACH + 0.2, 0.18)
     for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
@@ -155,7 +155,7 @@ def _colour_bar(extension, put, limit, unit):
 
 
 def look(scene, source):
-    """Clay for the mesh, a light background, and colours that reach the file as they are."""
+    """Clay for the mesh, a light background, and colors that reach the file as they are."""
     import bpy
 
     if not any(slot.material for slot in source.material_slots):
@@ -182,9 +182,9 @@ def render(patch, path, samples=32):
     import bpy
 
     scene = bpy.context.scene
-    towards = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
+    toward = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
     (lines,) = patch.children
-    patch.delta_location, lines.delta_location = towards, patch.matrix_world.to_3x3().inverted() @ towards
+    patch.delta_location, lines.delta_location = toward, patch.matrix_world.to_3x3().inverted() @ toward
     photograph(scene, path, WIDTH, HEIGHT, samples)
     patch.delta_location = lines.delta_location = (0.0, 0.0, 0.0)
 

@@ -30,7 +30,7 @@ def data_blocks():
 
 
 def look(point, direction, distance, perspective="PERSP"):
-    """Turns the viewport to `point`, seen from `direction`; colours are those of the vertices."""
+    """Turns the viewport to `point`, seen from `direction`; colors are those of the vertices."""
     _, area, _ = gui.find()
     view = area.spaces.active.region_3d
     view.view_perspective = perspective

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: what users expect of any extension.
 
-Search, menus, Adjust Last Operation, presets, greyed-out buttons, the tab, and large letters; every step
+Search, menus, Adjust Last Operation, presets, grayed-out buttons, the tab, and large letters; every step
 asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
 """
 
@@ -144,7 +144,7 @@ def gestures(place):
     check("... and one takes a plane away", probe().tactile_probe.plane_count == 3)
     gui.xdo("mousemove", REMOVE_BUTTON[0] - 2, REMOVE_BUTTON[1], "sleep", 0.2, "mousemove", *REMOVE_BUTTON)
     yield 2
-    picture("greyed")
+    picture("grayed")
 
 
 def tab():

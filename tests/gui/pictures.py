@@ -40,7 +40,7 @@ def steps():
     picture_of_docs("probe")
     gui.xdo("mouseup", 1)
     yield from until(is_complete)
-    patch().tactile_colours = "height_std"
+    patch().tactile_colors = "height_std"
     gui.xdo("mousemove", 300, 640)
     yield 3
     picture_of_docs("deviation")

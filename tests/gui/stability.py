@@ -122,7 +122,7 @@ def by_button():
     yield 1
     check("Ctrl Shift Z brings it again", data_blocks() == full, data_blocks())
     for name in ("height_std", "condition_number", "blind_share", "reason"):
-        maps()[0].tactile_map_colours = name
+        maps()[0].tactile_map_colors = name
         yield 1
         picture(f"map_{name}")
     picture_of_docs("stability")
@@ -248,18 +248,18 @@ def scan():
         bpy.context.object.data.shade_smooth()
         name = bpy.context.object.name
     obj = bpy.data.objects[name]
-    centre = obj.matrix_world @ (sum((Vector(corner) for corner in obj.bound_box), Vector()) / 8)
+    center = obj.matrix_world @ (sum((Vector(corner) for corner in obj.bound_box), Vector()) / 8)
     yield from start(target=name)
     yield from until(lambda: not running())
     check("a scan has its map", bool(maps()), data_blocks())
     bpy.data.objects[name].hide_set(True)
-    look(centre, (0.4, -1, 0.25), 2.0 * max(obj.dimensions))
+    look(center, (0.4, -1, 0.25), 2.0 * max(obj.dimensions))
     yield 1
     picture("map_scan")
-    maps()[0].tactile_map_colours = "reason"
+    maps()[0].tactile_map_colors = "reason"
     yield 1
     picture("map_scan_reason")
-    maps()[0].tactile_map_colours = "error"
+    maps()[0].tactile_map_colors = "error"
     bpy.context.preferences.view.ui_scale = 2.0
     yield 1.5
 

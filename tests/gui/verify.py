@@ -90,7 +90,7 @@ def another_mesh():
 
 
 def scan():
-    """A scan in millimetres of the scene; the last picture, at 200 %, is run.sh's."""
+    """A scan in millimeters of the scene; the last picture, at 200 %, is run.sh's."""
     file = FOLDER / "pear.ply"
     if file.is_file():
         for obj in bpy.data.objects:
@@ -104,7 +104,7 @@ def scan():
         axes = patch().matrix_world
         look(axes.translation, axes.col[2].xyz + 0.5 * axes.col[0].xyz, 0.08)
     activate(patch())
-    patch().tactile_colours = "deviation"
+    patch().tactile_colors = "deviation"
     bpy.ops.tactile.verify("EXEC_DEFAULT", True)
     gui.xdo("mousemove", *BUTTON, "sleep", 0.2, "click", 5)  # the whole table
     gui.xdo("mousemove", *ASIDE)

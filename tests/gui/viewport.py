@@ -38,7 +38,7 @@ from common import (
 )
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
-EXTENT_FIELD, MOVE_BUTTON, DELETE_BUTTON, COLOURS_BUTTON = (943, 180), (837, 128), (1001, 128), (893, 430)
+EXTENT_FIELD, MOVE_BUTTON, DELETE_BUTTON, COLORS_BUTTON = (943, 180), (837, 128), (1001, 128), (893, 430)
 PLANES_BUTTON = (893, 634)  # once the sidebar is scrolled to its end
 VIEW = 6.0  # extents, that the view is away from the probe
 
@@ -86,7 +86,7 @@ def pick(target):
     normal = found.matrix_world.col[2].xyz
     outward = Vector(patch()["tactile"]["frame"]["normal"])
     check(
-        "... with z along the normal, towards the eye", normal.dot(outward) > 0.99 and normal.y < 0.0, normal
+        "... with z along the normal, toward the eye", normal.dot(outward) > 0.99 and normal.y < 0.0, normal
     )
     check("... and nothing else", len(bpy.data.objects) == len(before["objects"]) + 3, data_blocks())
     consistent("picked")
@@ -378,7 +378,7 @@ def delete_by_keys():
 
 
 def orthographic_and_tiny():
-    """A millimetre of a thing, scaled unevenly, with a modifier, seen without perspective."""
+    """A millimeter of a thing, scaled unevenly, with a modifier, seen without perspective."""
     file = FOLDER / "pear.ply"
     if not file.is_file():
         return
@@ -390,13 +390,13 @@ def orthographic_and_tiny():
     pear.modifiers.new("Smooth", "SMOOTH").iterations = 2
     bpy.ops.ed.undo_push(message="Pear")
     yield 0.5
-    centre = pear.matrix_world @ (sum((Vector(corner) for corner in pear.bound_box), Vector()) / 8)
-    look(centre, (0.2, -1, 0.3), 0.003, "ORTHO")
+    center = pear.matrix_world @ (sum((Vector(corner) for corner in pear.bound_box), Vector()) / 8)
+    look(center, (0.2, -1, 0.3), 0.003, "ORTHO")
     gui.find()[1].spaces.active.clip_start = 1e-5
     yield 1
     gui.click(*PICK_BUTTON)
     yield 0.5
-    at = [round(v) for v in gui.view_point(centre)]
+    at = [round(v) for v in gui.view_point(center)]
     gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.3, "mousemove", *at, "sleep", 0.5)
     yield 0.5
     picture("tiny_pick")
@@ -417,7 +417,7 @@ def orthographic_and_tiny():
     )
     picture("tiny")
     for perspective in ("ORTHO", "PERSP"):
-        look(centre, (0.2, -1, 0.3), 0.003, perspective)
+        look(center, (0.2, -1, 0.3), 0.003, perspective)
         yield 0.5
         at = [round(v) for v in gui.view_point(found.location)]  # where a contact is in front
         digest, count = found.tactile_probe.digest, len(bpy.data.objects)
@@ -453,22 +453,22 @@ def rendering():
 
 
 def looks():
-    """Colours, their button, a light theme and large letters; the last picture is run.sh's."""
+    """Colors, their button, a light theme and large letters; the last picture is run.sh's."""
     if patch() is None:  # there was no scan
         bpy.ops.tactile.pick(target="Suzanne")
     shading = gui.find()[1].spaces.active.shading
     shading.color_type = "MATERIAL"
     yield 1
-    gui.xdo("mousemove", *COLOURS_BUTTON)
+    gui.xdo("mousemove", *COLORS_BUTTON)
     yield 0.5
-    gui.click(*COLOURS_BUTTON)
+    gui.click(*COLORS_BUTTON)
     yield 1
-    check("a button has the viewport show the colours", shading.color_type == "VERTEX", shading.color_type)
+    check("a button has the viewport show the colors", shading.color_type == "VERTEX", shading.color_type)
     shown = patch()
     for name in ("mean_curvature", "deviation", "height_std"):
-        shown.tactile_colours = name
+        shown.tactile_colors = name
         yield 1
-        check(f"the colours of {name} have a range", shown["tactile"]["colour_limit"] > 0.0)
+        check(f"the colors of {name} have a range", shown["tactile"]["color_limit"] > 0.0)
         picture(name)
     yield from rendering()
     folder = bpy.utils.preset_paths("interface_theme")[0]

@@ -52,11 +52,11 @@ def check_patch(when, name):
     objects = found.objects.keys() if found else []
     good = {f"{name} Contours", f"{name} Patch"} <= set(objects)
     check(f"{when}: patch and contours are in the collection", good, objects)
-    wanted = {"gaussian_curvature", "mean_curvature", "deviation", "curvature_colour"}
+    wanted = {"gaussian_curvature", "mean_curvature", "deviation", "curvature_color"}
     missing = wanted - set(patch.data.attributes.keys())
     check(f"{when}: the patch has its attributes", not missing, missing)
-    colour = patch.data.color_attributes.active_color
-    check(f"{when}: its colours are active", colour and colour.name == "curvature_colour", colour)
+    color = patch.data.color_attributes.active_color
+    check(f"{when}: its colors are active", color and color.name == "curvature_color", color)
     report = patch["tactile"].to_dict()
     check(f"{when}: it is one to trust", report["status"] == "ok", report["message"])
     distance = (patch.matrix_world.translation - cursor).length / report["radius"]
@@ -102,20 +102,20 @@ def suzanne():
 
 
 def pear():
-    """A scan some centimetres wide, in metres, alone in the viewport."""
+    """A scan some centimeters wide, in meters, alone in the viewport."""
     for obj in bpy.data.objects:
         obj.hide_set(True)
     bpy.ops.wm.ply_import(filepath=str(FOLDER / "pear.ply"))
     scan = bpy.context.object
     scan.data.shade_smooth()
-    centre = sum((Vector(corner) for corner in scan.bound_box), Vector()) / 8
-    _, bpy.context.scene.cursor.location, normal, _ = scan.ray_cast(centre + Vector((0.1, 0, 0)), (-1, 0, 0))
-    look(centre, normal, 0.2)
+    center = sum((Vector(corner) for corner in scan.bound_box), Vector()) / 8
+    _, bpy.context.scene.cursor.location, normal, _ = scan.ray_cast(center + Vector((0.1, 0, 0)), (-1, 0, 0))
+    look(center, normal, 0.2)
     bpy.ops.ed.undo_push(message="Pear")
     yield 0.5
     yield from choose_in_menu()
     if check_patch("a scan, from the menu", "pear"):
-        look(centre, normal + Vector((0, -0.4, 0.5)), 0.12)
+        look(center, normal + Vector((0, -0.4, 0.5)), 0.12)
         yield 2
 
 

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The accurate fit: one Bayesian linear solve for everything at once, which knows what it cannot see.
+
+Beside the paper. Near the reference point the surface is taken for a polynomial of degree 6, in unit
+radius and in its Darboux frame. Slopes and second derivatives are free. The coefficient a_ij of a
+higher degree is a length^(1 - i - j): where the curvature changes over a length l it has the size
+l^(1 - i - j), so its prior is
+
+    a_ij ~ N(m_ij, (waviness^(i + j - 1) / 10)^2)    with waviness = L / l.
+
+m are the quartic and sextic of a surface that goes on with the curvatures it has at the point. The
+waviness and the noise of the contacts follow from their marginal likelihood (evidence.py).
+
+All functions fit b touches at once: of one, most of the time goes into calling numpy.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from ..contours.contour import cross
+from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances, restricted
+from .linear_system import (
+    hyperparameters,
+    linear_system,
+    posterior,
+    prior_mean,
+    solution,
+)
+from .posterior import FREE, Posterior
+
+MISFIT = 2e-3  # Share of the radius: no surface is a polynomial, so the noise is never less.
+PASSES = 8  # At most: two passes turn the frame to what they found, and more are for outliers.
+SETTLED = 0.1  # Change of a weight between passes that counts as none.
+UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
+LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
+OUTLYING = 5.0  # standard deviations
+STUDENT = 4.0  # degrees of freedom
+
+
+class _Touches(NamedTuple):
+    """What a pass of the fit needs to know of b touches; the last four are what it changes."""
+
+    contacts: Array
+    normals: Array  # (b, 0, 3) without
+    tangent: Array
+    floor: Array
+    axes: Array
+    k1: Array
+    k2: Array
+    weights: Array
+
+
+def joint_fit(
+    contacts: Array,
+    weights: Array,
+    k1: Array,
+    k2: Array,
+    tangent: Array,
+    accuracy: Array,
+    normals: Array | None = None,
+) -> tuple[Array, Posterior, Array]:
+    """The Darboux frames and the surfaces that the contacts of b touches show, and how well they show them.
+
+    contacts : (b, n, 3), in unit radius, in a frame near to the Darboux frame
+    weights : (b, n), 1 for a contact, 0 where there is none
+    k1, k2 : (b,), a first guess of the curvatures along its axes
+    tangent : (b, 3), in that frame, which d1 is to follow
+    accuracy : (b,), standard deviation of a contact, at least
+    normals : (b, n, 3), measured, over their standard deviation; 0 where there is none
+
+    Returns the columns d1, d2, n (b, 3, 3) in the frame given, the posteriors in the new one, where
+    the means of the slopes and of the mixed second derivative are 0, and the weights (b, n) that the
+    contacts have in the end: where one is beyond OUTLYING standard deviations, they weigh as under a
+    Student t distribution.
+    """
+    axes = np.eye(3)[None].repeat(len(contacts), axis=0)
+    given = contacts[:, :0] if normals is None else normals
+    touches = _Touches(contacts, given, tangent, np.maximum(accuracy, MISFIT), axes, k1, k2, weights)
+    pending, found = np.arange(len(contacts)), []
+    for step in range(PASSES):
+        touches, settled, surface = _pass(touches, step)
+        if surface is not None:
+            found.append((pending[settled], touches.axes[settled], touches.weights[settled], *surface))
+        if settled.all():
+            break
+        if not settled.any():
+            continue
+        touches, pending = _Touches(*(values[~settled] for values in touches)), pending[~settled]
+    if len(found) == 1:  # all at once, as nearly always: in the order they came
+        return found[0][1], Posterior(*found[0][3:]), found[0][2]
+    order, turns, found_weights, *surfaces = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    back = np.argsort(order)
+    return turns[back], Posterior(*(values[back] for values in surfaces)), found_weights[back]
+
+
+def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
+    """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
+    expected = np.array([prior_mean(*pair) for pair in zip(touches.k1, touches.k2, strict=True)])
+    local, normals = touches.contacts @ touches.axes, touches.normals @ touches.axes
+    system, data = linear_system(local, touches.weights, expected, normals), None
+    if step == 0:
+        waviness = np.full(len(expected), USUAL_WAVINESS)
+        hyper = Hyperparameters(waviness, prior_variances(waviness), touches.floor)
+    else:
+        data = restricted(system.basis, system.heights, touches.weights)
+        hyper = hyperparameters(system, data, touches.weights, touches.floor)
+    found = solution(system, hyper)
+    mean = expected + found
+    found_axes = [turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
+    axes, k1, k2, angle = (np.array(values) for values in zip(*found_axes, strict=True))
+    # Outliers show against a surface in level axes.
+    level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
+    weights, settled, surface = touches.weights, np.full(len(mean), step == PASSES - 1), None
+    if data is not None and level.any():
+        residuals = system.heights - (system.basis @ found[..., None])[..., 0]
+        weights = np.where(level[:, None], _student_weights(residuals, weights > 0.0, touches.floor), weights)
+        settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED)
+    if data is not None and settled.any():
+        which = slice(None) if settled.all() else settled
+        surface = posterior(mean, system, data, hyper, touches.weights).at(which).turned(angle[which])
+        surface.mean[:, [0, 1, 3]] = 0.0
+        surface.mean[:, 2], surface.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
+    return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, surface
+
+
+def posterior_of(k1: float, k2: float, contacts: Array, accuracy: float) -> Posterior:
+    """What contacts (n, 3) say in a frame and about curvatures that are given; all in unit radius."""
+    weights, expected = np.ones((1, len(contacts))), prior_mean(k1, k2)[None]
+    system = linear_system(contacts[None], weights, expected, contacts[None, :0])
+    data = restricted(system.basis, system.heights, weights)
+    hyper = hyperparameters(system, data, weights, np.array([max(accuracy, MISFIT)]))
+    return posterior(expected + solution(system, hyper), system, data, hyper, weights).at(0)
+
+
+def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
+    """Weights of the contacts, (b, n): all 1 where none of a touch is outlying; 0 where there is none."""
+    misses = np.abs(residuals)
+    if np.all(misses <= OUTLYING * floor[:, None]):  # Mostly so: there is no need to look closer.
+        return present.astype(float)
+    ordered, row = np.sort(np.where(present, misses, np.inf), axis=1), np.arange(len(misses))
+    count = present.sum(axis=1)
+    median = 0.5 * (ordered[row, (count - 1) // 2] + ordered[row, count // 2])
+    deviation = np.maximum(floor, 1.4826 * median)
+    if np.all(ordered[row, count - 1] <= OUTLYING * deviation):
+        return present.astype(float)
+    ratios = misses / deviation[:, None]
+    outlying = ordered[row, count - 1] > OUTLYING * deviation
+    return np.where(present, np.where(outlying[:, None], (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0), 0.0)
+
+
+def turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:
+    """The axes tilted to a surface's normal and turned to its principal directions; k1, k2; that angle."""
+    sx, sy, xx, xy, yy = mean[:FREE].tolist()
+    n = axes @ np.array([-sx, -sy, 1.0]) / math.sqrt(1.0 + sx**2 + sy**2)
+    tx, ty, _ = (tangent @ axes).tolist()
+    half, angle = math.hypot(xx - yy, xy), 0.5 * math.atan2(-xy, yy - xx)
+    if half <= UMBILIC * max(1.0, abs(xx), abs(yy)):
+        half, angle = 0.0, math.atan2(ty, tx)
+    if math.cos(angle) * tx + math.sin(angle) * ty < 0.0:
+        angle += math.pi
+    d1 = math.cos(angle) * axes[:, 0] + math.sin(angle) * axes[:, 1]
+    d1 -= (d1 @ n) * n
+    d1 /= math.sqrt(d1 @ d1)
+    return np.column_stack([d1, cross(n, d1), n]), xx + yy - half, xx + yy + half, angle

@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What contacts say of a surface and what they leave open: a Gaussian over polynomials of degree 6."""
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import Array
+from ..patch.monge import MongePatch, exponents, monomials
+
+DEGREE = 6
+TERMS = exponents(1, DEGREE)
+ORDERS = TERMS.sum(axis=1).astype(float)
+FREE = 5  # x, y, x^2, xy, y^2 have no prior
+DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L
+ALIKE = 0.05  # a difference of curvatures that makes no directions
+CONFIDENCE = 0.95
+INVISIBLE = 0.9  # A direction of which this share of the prior's variance is left is invisible.
+
+
+class Posterior(NamedTuple):
+    """A Gaussian over the heights sum b_ij x^i y^j, degree 1 to 6, in unit radius; or a stack (...) of such.
+
+    mean : (..., 27), b_10 b_01 b_20 b_11 b_02 b_30 ...
+    covariance : (..., 27, 27)
+    noise : (...), standard deviation of a contact
+    visibility : (..., 22, 22), upper triangular: its singular values are what the contacts show of
+        directions among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1;
+        those of a leading block, of the terms to a lower degree
+    """
+
+    mean: Array
+    covariance: Array
+    noise: Array
+    visibility: Array
+
+    __eq__, __hash__ = object.__eq__, object.__hash__  # type: ignore[misc]  # Arrays have no single truth value.
+
+    def at(self, index: int | slice | NDArray[np.bool_]) -> "Posterior":
+        """One of the stack, or several."""
+        return Posterior(*(values[index] for values in self))
+
+    def scaled(self, factor: ArrayLike) -> "Posterior":
+        """These surfaces with every length multiplied by `factor` (...)."""
+        f = np.asarray(factor)
+        factors = f[..., None] ** (1.0 - ORDERS)
+        covariance = factors[..., :, None] * factors[..., None, :] * self.covariance
+        return self._replace(mean=factors * self.mean, covariance=covariance, noise=f * self.noise)
+
+    def turned(self, angle: Array) -> "Posterior":
+        """These surfaces in axes that are turned by `angle` (...) about the normal."""
+        turn = _turn(angle)
+        mean = (turn @ self.mean[..., None])[..., 0]
+        return self._replace(mean=mean, covariance=turn @ self.covariance @ np.swapaxes(turn, -1, -2))
+
+    # What follows is of one only.
+
+    def height_std(self, x: Array, y: Array) -> Array:
+        """Standard deviations of the height at n points, (n,)."""
+        basis = monomials(x, y, TERMS)
+        return np.sqrt(np.maximum(np.einsum("ni,ni->n", basis @ self.covariance, basis), 0.0))
+
+    def height_covariance(self, p: Array, q: Array) -> Array:
+        """Covariances of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
+        flat = (v.reshape(-1, 2) for v in (p, q))
+        at_p, at_q = (monomials(v[:, 0], v[:, 1], TERMS) for v in flat)
+        at_p, at_q = at_p.reshape(*p.shape[:-1], -1), at_q.reshape(*q.shape[:-1], -1)
+        covariance: Array = (at_p @ self.covariance) @ np.swapaxes(at_q, -1, -2)
+        return covariance
+
+    def height(self, x: Array, y: Array) -> Array:
+        """The mean height at n points, (n,)."""
+        return monomials(x, y, TERMS) @ self.mean
+
+    def patch(self, degree: int) -> MongePatch:
+        """The patch (1) of this degree nearest to the mean over the disk, with its curvatures."""
+        a = _truncation(degree) @ self.mean[FREE:]
+        return MongePatch(2.0 * float(self.mean[2]), 2.0 * float(self.mean[4]), a)
+
+    def degree_shown(self, contacts: Array) -> int:
+        """The least whose patch departs from the mean by half its deviation at most, at contacts (n, 3)."""
+        x, y, _ = contacts.T
+        basis = monomials(x, y, TERMS)
+        variance = np.einsum("ni,ni->", basis @ self.covariance, basis)
+        for degree in range(2, DEGREE):
+            off = basis @ (self.mean - coefficients_of(self.patch(degree)))
+            if off @ off <= 0.25 * variance:
+                return degree
+        return DEGREE
+
+    def turn(self, confidence: float = CONFIDENCE) -> float:
+        """The angle (radians) that the Darboux frame is off by at most, with a probability of `confidence`.
+
+        0 where with that probability the curvatures are ALIKE: then there are no directions.
+        """
+        x, y, xx, xy, yy = self.mean[:FREE].tolist()
+        c = self.covariance
+        # The ratio of yy - xx and xy turns the frame: this is a Cholesky factor of their covariance.
+        std = math.sqrt(max(c[2, 2] + c[4, 4] - 2.0 * c[2, 4], 1e-300))
+        shared = (c[3, 4] - c[2, 3]) / std
+        own = math.sqrt(max(c[3, 3] - shared**2, 0.0))
+        u, v = _normal_points()
+        difference, mixed = yy - xx + std * u, xy + shared * u + own * v
+        angles = 0.5 * np.abs(np.arctan2(mixed, difference))
+        angles[2.0 * np.hypot(difference, mixed) <= ALIKE] = 0.0
+        angle = float(np.sort(angles)[int(confidence * len(angles))])
+        return math.hypot(angle, x, y, math.sqrt(c[0, 0] + c[1, 1])) if angle > 0.0 else 0.0
+
+    def curvature_std(self) -> float:
+        """Standard deviation of the normal curvature at the origin where it is known least."""
+        bent = _bent()
+        variances = np.einsum("ni,ni->n", bent @ self.covariance[2:FREE, 2:FREE], bent)
+        return math.sqrt(max(float(variances.max()), 0.0))
+
+    def blind(self, degree: int) -> int:
+        """How many directions among the terms of degree 1 to `degree` keep 90 % of their prior variance."""
+        last = terms_to(degree) - FREE
+        singular = np.linalg.svd(self.visibility[:last, :last], compute_uv=False)
+        return int(np.count_nonzero(INVISIBLE * (1.0 + singular**2) < 1.0))
+
+
+def terms_to(degree: int) -> int:
+    """The number of terms of degree 1 to `degree`."""
+    return (degree + 1) * (degree + 2) // 2 - 1
+
+
+def coefficients_of(patch: MongePatch) -> Array:
+    """Coefficients of the 27 terms of a Posterior from those of a patch, (27,)."""
+    b = np.zeros(len(TERMS))
+    b[2], b[4] = patch.k1 / 2.0, patch.k2 / 2.0
+    b[FREE : FREE + len(patch.coefficients)] = patch.coefficients
+    return b
+
+
+def _turn(angle: Array) -> Array:
+    """(..., 27, 27): coefficients in axes turned by `angle` about the normal.
+
+    Of z = x + iy and its conjugate z' a turn changes nothing but the phase of the terms z^i z'^j.
+    """
+    to_complex, from_complex = _complex_terms()
+    phases = np.exp(1j * np.asarray(angle)[..., None] * (TERMS[:, 0] - TERMS[:, 1]))
+    turn: Array = ((from_complex * phases[..., None, :]) @ to_complex).real
+    return turn
+
+
+@cache
+def _complex_terms() -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Coefficients of x^i y^j to those of z^i z'^j and back, (27, 27) each."""
+    x, y, _ = nodes()
+    z, (i, j) = (x + 1j * y)[:, None], TERMS.T
+    complex_terms: NDArray[np.complex128] = z**i * z.conj() ** j
+    to_complex = np.linalg.lstsq(complex_terms, monomials(x, y, TERMS).astype(complex), rcond=None)[0]
+    return to_complex, np.linalg.inv(to_complex)
+
+
+@cache
+def _truncation(degree: int) -> Array:
+    """(m, 22): least squares over the disk of the terms of degree 3 to 6 by those to `degree`."""
+    x, y, weights = nodes()
+    basis = np.sqrt(weights)[:, None] * monomials(x, y, TERMS[FREE:])
+    return np.linalg.lstsq(basis[:, : terms_to(degree) - FREE], basis, rcond=None)[0]
+
+
+@cache
+def _bent() -> Array:
+    """(18, 3): the second derivatives of x^2, xy and y^2 in as many directions."""
+    azimuths = np.pi / 18.0 * np.arange(18)
+    return 2.0 * monomials(np.cos(azimuths), np.sin(azimuths), TERMS[2:FREE])
+
+
+@cache
+def _normal_points() -> Array:
+    """(2, 256), spread as a normal distribution's: the spiral of a sunflower."""
+    rank = np.arange(256) + 0.5
+    azimuths, radii = math.pi * (3.0 - math.sqrt(5.0)) * rank, np.sqrt(-2.0 * np.log(1.0 - rank / 256.0))
+    return np.array([radii * np.cos(azimuths), radii * np.sin(azimuths)])
+
+
+@cache
+def nodes() -> tuple[Array, Array, Array]:
+    """x, y and weights (52,) that integrate products of two terms over the disk: Gauss by circles."""
+    at, weights = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
+    azimuths = 2.0 * np.pi * np.arange(13) / 13
+    radii = DISK * np.sqrt((at + 1.0) / 2.0)
+    x, y = np.outer(radii, np.cos(azimuths)).ravel(), np.outer(radii, np.sin(azimuths)).ravel()
+    return x, y, np.repeat(weights, 13)

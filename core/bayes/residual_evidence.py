@@ -1,0 +1,204 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether contacts ask for a residual, how large it is, and what they say of it.
+
+Where a sextic describes the contacts to their accuracy, or with white noise makes them as likely as a
+residual does, there is none. Otherwise its variances and the noise follow from the marginal likelihood on
+a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from ..patch.monge import monomials
+from ..patch.residual import Residual, kernels, places_factor, solved
+from .evidence import FREE_PRECISION, USUAL_WAVINESS, prior_variances
+from .measured_slopes import slope_equations
+from .posterior import FREE, TERMS, Posterior
+
+# Chosen with benchmarks.real.
+MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
+FACETS = 1e-3  # Share of the radius: misfits of a smooth surface, whose curvatures a polynomial tells best.
+UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
+AMPLITUDES = np.array([0.004, 0.022, 0.12])  # Deviations of the residual, in units of the radius.
+ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
+NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
+PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
+NEGLIGIBLE = 40.0  # -2 log likelihood beside the best, at which no other noise is tried
+FREE_VARIANCE = 1e2  # Prior variance of slopes and second derivatives, in the evidence.
+
+
+class Touch(NamedTuple):
+    """A touch in unit radius and in a frame near to its Darboux frame.
+
+    contacts : (n, 3)
+    weights : (n,), above 0
+    least, most : noise of the contacts
+    expected : (27,), the prior's mean
+    normals : (n, 3), measured, over their standard deviation; None without
+    """
+
+    contacts: Array
+    weights: Array
+    least: float
+    most: float
+    expected: Array
+    normals: Array | None
+
+    def moved(self, turn: Array, scale: float) -> "Touch":
+        """This touch in axes (3, 3), with lengths over `scale`."""
+        return self._replace(
+            contacts=self.contacts @ turn / scale,
+            least=self.least / scale,
+            most=self.most / scale,
+            normals=None if self.normals is None else self.normals @ turn,
+        )
+
+
+def asking(contacts: Array, weights: Array, posterior: Posterior, accuracy: Array) -> NDArray[np.intp]:
+    """Which of b touches have contacts (b, n, 3) that their sextics do not describe to an accuracy (b,)."""
+    flat = contacts.reshape(-1, 3)
+    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
+    off = contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0]
+    rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
+    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, FACETS))
+
+
+class System(NamedTuple):
+    """Basis (n, 27), heights (n,) less the prior's mean, places (m,) among the contacts.
+
+    kernels : of unit variance, (n, m) each, of contacts and places
+    """
+
+    basis: Array
+    heights: Array
+    places: NDArray[np.intp]
+    kernels: list[Array]
+
+
+def system_of(touch: Touch) -> System:
+    """What fits of the touch are made of."""
+    flat = touch.contacts[:, :2]
+    basis = monomials(flat[:, 0], flat[:, 1], TERMS)
+    places = _some(len(flat), PLACES)
+    return System(basis, touch.contacts[:, 2] - basis @ touch.expected, places, kernels(flat, flat[places]))
+
+
+def _some(count: int, most: int) -> NDArray[np.intp]:
+    """Indices (m,) of all of them, or of some, evenly spread, where they are more than `most`."""
+    m = min(count, most)
+    return np.arange(m) * count // m
+
+
+def sizes(touch: Touch, system: System) -> tuple[Array, float, bool]:
+    """Variances (2,) and noise, averaged over their grid; and whether the touch asks for a residual.
+
+    Heights ~ N(0, K), K = basis prior basis' + v k + noise^2, by one Cholesky factor of K bordered by the
+    heights, as in evidence.py; each contact's row times the root of its weight.
+    """
+    root = np.sqrt(touch.weights[system.places])
+    basis, heights = root[:, None] * system.basis[system.places], root * system.heights[system.places]
+    noises = touch.least * (touch.most / touch.least) ** (np.arange(NOISES) / (NOISES - 1.0))
+    covariances = _bordered(basis, heights, [root[:, None] * k[system.places] * root for k in system.kernels])
+    # The middle noise first; the others where it does not rule out a length and an amplitude.
+    with_it = np.full((*covariances.shape[:2], NOISES), np.inf)
+    for at in np.ndindex(with_it.shape[:2]):
+        with_it[at][MIDDLE] = _surprise(covariances[at], noises[MIDDLE])
+    for at in zip(*np.nonzero(with_it[..., MIDDLE] < with_it.min() + NEGLIGIBLE), strict=True):
+        with_it[at] = [_surprise(covariances[at], noise) for noise in noises]
+    without = _surprises_alone(basis / touch.most, heights / touch.most)
+    without += 2.0 * len(heights) * math.log(touch.most)
+    least = min(with_it.min(), without.min())
+    p, p_alone = np.exp(-0.5 * (with_it - least)), np.exp(-0.5 * (without - least))
+    shares = p / p.sum()
+    noise = float(np.sqrt(shares.sum(axis=(0, 1)) @ noises**2))
+    return shares.sum(axis=2) @ AMPLITUDES**2, noise, bool(p.mean() > p_alone.mean())
+
+
+def _prior(waviness: float) -> Array:
+    """Variances (27,) of the coefficients."""
+    return np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(waviness))])
+
+
+def _bordered(basis: Array, heights: Array, kernels_within: list[Array]) -> Array:
+    """(2, 3, m + 1, m + 1): for each length and amplitude K without noise, bordered by the heights."""
+    m = len(heights)
+    bordered = np.empty((len(kernels_within), len(AMPLITUDES), m + 1, m + 1))
+    bordered[..., :m, m] = bordered[..., m, :m] = heights
+    terms = (basis * _prior(USUAL_WAVINESS)) @ basis.T
+    for found, within in zip(bordered, kernels_within, strict=True):
+        for matrix, amplitude in zip(found, AMPLITUDES, strict=True):
+            np.add(terms, amplitude**2 * within, out=matrix[:m, :m])
+    return bordered
+
+
+def _surprise(bordered: Array, noise: float) -> float:
+    """-2 log likelihood of heights that border their covariance, (m + 1, m + 1), and of a noise."""
+    from scipy.linalg.lapack import dpotrf
+
+    matrix, m = bordered.copy(), len(bordered) - 1
+    matrix.flat[:: m + 2] += noise**2
+    # More than heights' K^-1 heights.
+    corner = matrix[m, m] = 2.0 * float(bordered[m, :m] @ bordered[m, :m]) / noise**2 + 1.0
+    factor = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)[0].diagonal()
+    return float(2.0 * np.log(factor[:m]).sum() + corner - factor[m] ** 2)
+
+
+def _surprises_alone(basis: Array, heights: Array) -> Array:
+    """The evidence without a residual for each of ALONE, over the noise and but for its logarithm, (3,).
+
+    By the terms' precision, bordered by what the heights say of them.
+    """
+    m, rows = basis.shape[1], np.column_stack([basis, heights])
+    priors = np.array([_prior(waviness) for waviness in ALONE])
+    bordered = np.tile(rows.T @ rows, (len(ALONE), 1, 1))
+    diagonal = np.einsum("kii->ki", bordered)  # a view
+    diagonal[:, :m] += 1.0 / priors
+    diagonal[:, m] += 1.0  # lest rounding leaves less than nothing over
+    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
+    explained = 2.0 * np.log(factors[:, :m]).sum(axis=1) + np.log(priors).sum(axis=1)
+    surprises: Array = explained + factors[:, m] ** 2 - 1.0
+    return surprises
+
+
+def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tuple[Residual, Array]:
+    """What the contacts say, given these; and the factor L of k(u, u).
+
+    The unknowns are the terms and what L^-1 k(u, p) is multiplied with: that makes the prior's precision 1
+    and the system well-conditioned.
+    """
+    index, terms = system.places, len(TERMS)
+    to_points = variances[0] * system.kernels[0] + variances[1] * system.kernels[1]
+    places = places_factor(to_points[index])
+    # Where each contact is a place the features are the factor itself.
+    whole = len(index) == len(to_points)
+    features = np.hstack([system.basis, places if whole else solved(places, to_points.T).T])
+    weighted = features * (np.sqrt(touch.weights) / noise)[:, None]
+    precision = weighted.T @ weighted
+    seen = weighted.T @ (system.heights * np.sqrt(touch.weights) / noise)
+    precision.flat[:: len(precision) + 1] += np.concatenate(
+        [
+            np.full(FREE, FREE_PRECISION),
+            1.0 / prior_variances(np.array(USUAL_WAVINESS)),
+            np.ones(len(index)),
+        ]
+    )
+    if touch.normals is not None:
+        _add_slopes(touch, precision, seen)
+    factor = np.linalg.cholesky(precision)
+    mean = solved(factor, solved(factor, seen), transposed=True)
+    mean[terms:] = solved(places, mean[terms:], transposed=True)
+    return Residual(touch.contacts[index, :2], variances, mean, factor, np.array(noise)), places
+
+
+def _add_slopes(touch: Touch, precision: Array, seen: Array) -> None:
+    """What measured normals add to the terms' part of the system."""
+    assert touch.normals is not None
+    given = touch.normals, touch.contacts, touch.weights
+    slopes, steepness = (part[0] for part in slope_equations(*(each[None] for each in given)))
+    precision[: len(TERMS), : len(TERMS)] += slopes.T @ slopes
+    seen[: len(TERMS)] += slopes.T @ (steepness - slopes @ touch.expected)

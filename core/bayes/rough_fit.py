@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The joint fit where contacts ask for a residual: the frame, curvatures and polynomial of the surface.
+
+A real surface has other curvatures at each scale; at the point itself they are those of its texture.
+Those of the patch are of the quartic nearest to sextic and residual over a disk of SCALE. Off dense fits
+of the scans they are by half as much, or less, as those of the sextic that was fitted to the contacts
+alone, and their intervals are true.
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arguments import Array
+from ..patch import residual as beside
+from ..patch.monge import exponents, monomials
+from ..patch.residual import Residual, kernel, kernels, weighted_kernel, whitened
+from .joint_fit import turned
+from .linear_system import prior_mean
+from .posterior import DISK, FREE, TERMS, Posterior, nodes
+from .residual_evidence import MISFIT, Touch, asking, fitted, sizes, system_of
+
+SCALE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.
+
+
+class RoughFit(NamedTuple):
+    """For b touches, columns d1, d2, n (b, 3, 3) in the frame given, radii (b,) in its unit, and more.
+
+    The posteriors and the residuals are in the new frame and unit.
+    """
+
+    turns: Array
+    scales: Array
+    posterior: Posterior
+    residuals: list[Residual | None]
+
+
+def rough_fit(
+    contacts: Array,
+    weights: Array,
+    posterior: Posterior,
+    accuracy: Array,
+    tangent: Array,
+    normals: Array | None = None,
+) -> RoughFit:
+    """The fits of b touches with a residual where their contacts ask for one; where not, as they were.
+
+    contacts : (b, n, 3), in unit radius and in the Darboux frame of the sextic
+    weights : (b, n), 0 where there is none
+    posterior : the stack of the sextics that were fitted to them
+    accuracy : (b,), standard deviation of a contact, at least
+    tangent : (b, 3), which d1 is to follow
+    normals : (b, n, 3), measured, over their standard deviation; they act on the terms alone
+    """
+    b = len(contacts)
+    found = RoughFit(np.eye(3)[None].repeat(b, axis=0), np.ones(b), posterior, [None] * b)
+    candidates = asking(contacts, weights, posterior, accuracy)
+    if not len(candidates):
+        return found
+    found = found._replace(posterior=Posterior(*(values.copy() for values in posterior)))
+    for i in candidates.tolist():
+        there, least = weights[i] > 0.0, max(float(accuracy[i]), MISFIT)
+        point = np.zeros((1, 3))  # a contact like the others: on facets it may be off as they are
+        touch = Touch(
+            np.vstack([contacts[i][there], point]),
+            np.append(weights[i][there], 1.0),
+            least,
+            max(float(posterior.noise[i]), least),
+            prior_mean(2.0 * posterior.mean[i, 2], 2.0 * posterior.mean[i, 4]),
+            None if normals is None else np.vstack([normals[i][there], point]),
+        )
+        system = system_of(touch)
+        variances, noise, asked = sizes(touch, system)
+        if asked:
+            _settle(found, i, touch, fitted(touch, system, variances, noise)[0], tangent[i])
+    return found
+
+
+def _settle(found: RoughFit, place: int, touch: Touch, first: Residual, tangent: Array) -> None:
+    """Into `found`: the fit of a touch in the frame that its first fit shows."""
+    (at, weights), half = _projection(), len(nodes()[2])
+    mean = _terms()[:FREE] @ (touch.expected + first.mean[: len(TERMS)])
+    mean += weights[:FREE, :half] @ weighted_kernel(
+        at[:half], first.places, first.variances, first.mean[len(TERMS) :]
+    )
+    turn, k1, k2, _ = turned(np.eye(3), mean, tangent)
+    scale = float(np.hypot(*(touch.contacts @ turn)[:, :2].T).max())
+    touch = touch.moved(turn, scale)._replace(expected=prior_mean(k1, k2))
+    second = fitted(touch, system_of(touch), first.variances / scale**2, float(first.noise) / scale)
+    found.turns[place], found.scales[place] = turn, scale
+    _put(found, place, *second, touch.expected)
+
+
+def _put(found: RoughFit, place: int, residual: Residual, places: Array, expected: Array) -> None:
+    """One fit: the polynomial nearest to it with its covariance, and the residual beside that."""
+    (at, weights), terms = _projection(), _terms()
+    told = weights @ kernel(at, residual.places, residual.variances)
+    mean = terms @ (expected + residual.mean[: len(TERMS)]) + told @ residual.mean[len(TERMS) :]
+    _, k1, k2, _ = turned(np.eye(3), mean, np.eye(3)[0])
+    mean[:FREE] = 0.0, 0.0, k1 / 2.0, 0.0, k2 / 2.0
+    residual.mean[: len(TERMS)] += expected - mean
+    told, left = whitened(places, residual.factor, terms.T, told.T)
+    own = np.tensordot(residual.variances, _own(tuple(beside.LENGTHS)), axes=1)
+    found.posterior.mean[place], found.posterior.noise[place] = mean, residual.noise
+    found.posterior.covariance[place] = own + left.T @ left - told.T @ told
+    found.residuals[place] = residual
+
+
+@cache
+def _projection() -> tuple[Array, Array]:
+    """Points (n, 2) and weights (27, n) that take the heights there to the nearest polynomial's coefficients.
+
+    To degree 2 those of the quartic nearest over the disk of SCALE; the others nearest to what these leave
+    over DISK.
+    """
+    x, y, shares = nodes()
+    whole, root = np.column_stack([x, y]), np.sqrt(shares)
+    near = SCALE / DISK * whole
+    quartic = np.linalg.pinv(root[:, None] * monomials(near[:, 0], near[:, 1], exponents(0, 4)))[1:] * root
+    basis = monomials(x, y, TERMS)
+    rest = np.linalg.pinv(root[:, None] * basis[:, FREE:]) * root
+    first = np.hstack([quartic[:FREE], np.zeros((FREE, len(x)))])
+    left = np.hstack([np.zeros((len(x), len(x))), np.eye(len(x))]) - basis[:, :FREE] @ first
+    return np.vstack([near, whole]), np.vstack([first, rest @ left])
+
+
+@cache
+def _terms() -> Array:
+    """(27, 27), what the projection makes of the terms."""
+    (x, y), weights = _projection()[0].T, _projection()[1]
+    return weights @ monomials(x, y, TERMS)
+
+
+@cache
+def _own(lengths: tuple[float, ...]) -> Array:
+    """(2, 27, 27), covariances of the coefficients of a g of unit variance and each of these lengths."""
+    assert lengths == tuple(beside.LENGTHS)
+    at, weights = _projection()
+    return np.array([weights @ values @ weights.T for values in kernels(at, at)])

@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where measured curves meet, when nobody has said where that is."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import LARGEST, Array, finite_array, list_of
+from .contour import Contour
+from .curves import (
+    LEAST_CONTACTS,
+    WINDOW,
+    curves_through,
+    local_curves,
+    stacked,
+)
+from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
+
+APART = 0.1  # Share of a curve's size that it may miss the point by.
+GAP = 0.25  # Share of a curve's size, around the point, in which it may have no contacts.
+STEPS = 50  # of Gauss-Newton; five are the rule
+STARTS = 3  # curves may come near each other in several places
+MOST = 1000  # contacts of a curve, and
+QUERIES = 10**6  # distances of a contact to a curve, that a start is looked for among
+NEAREST = 4 * WINDOW  # contacts of a curve that are looked at around a point
+
+
+def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
+    """The point (3,) with the least sum of squared distances to two or more curves, and the distances (c,).
+
+    Curves measured one by one do not meet exactly: the distances say by how much each misses the point.
+    Where curves meet twice, as sections of a body do, it is the better meeting.
+
+    Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
+    that do not come near each other, or that run in one direction where they do.
+    """
+    found = list_of("contours", contours, Contour)
+    if len(found) < 2:
+        raise DegenerateCurvesError(
+            f"the common point is where two or more curves meet, got {len(found)}: give more, or the point"
+        )
+    for number, contour in enumerate(found, 1):
+        if len(contour.points) <= LEAST_CONTACTS:
+            raise DegenerateCurvesError(
+                f"curve {number} has {len(contour.points)} contacts, and {LEAST_CONTACTS + 1} are needed to "
+                "say where it runs: measure more, or give the reference point"
+            )
+    origin = found[0].points[0]  # far from the world's origin differences of points are exact, points are not
+    contours = [Contour(contour.points - origin) for contour in found]
+    refined = [_refined(start, contours) for start in _starts(contours)]
+    point, feet, tangents = min(refined, key=lambda fit: float(np.sum(_misses(*fit) ** 2)))
+    misses = _misses(point, feet, tangents)
+    _require_near(point, misses, contours)
+    _require_crossing(tangents)
+    return origin + point, misses
+
+
+def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
+    """The contour with its contacts as they follow each other along a curve through `point`."""
+    r = contour.points - finite_array("point", point, (3,), LARGEST)
+    if not len(r):
+        return contour
+    tangent = curves_through(r[None, None], np.ones((1, 1, len(r)), dtype=bool)).tangents[0, 0]
+    order = np.argsort(np.copysign(np.linalg.norm(r, axis=1), r @ tangent), kind="stable")
+    normals = None if contour.normals is None else contour.normals[order]
+    return replace(contour, points=contour.points[order], normals=normals)
+
+
+def _misses(point: Array, feet: Array, tangents: Array) -> Array:
+    off = feet - point
+    across = off - np.sum(off * tangents, axis=1, keepdims=True) * tangents
+    return np.linalg.norm(across, axis=1)
+
+
+def _starts(contours: Sequence[Contour]) -> Array:
+    """The contacts nearest to all curves in the sense of least squares, best first, apart from each other.
+
+    Of many contacts some: Gauss-Newton goes on from there.
+    """
+    from scipy.spatial import cKDTree
+
+    thinned = [contour.points[:: -(-len(contour.points) // MOST)] for contour in contours]
+    contacts = np.vstack(thinned)
+    contacts = contacts[:: -(-len(contacts) * len(thinned) // QUERIES)]
+    squares = np.zeros(len(contacts))
+    for points in thinned:
+        squares += cKDTree(points).query(contacts)[0] ** 2
+    apart, starts = APART * min(map(_size, contours)), np.empty((0, 3))
+    left = squares <= 4.0 * squares.min() + len(contours) * apart**2
+    while len(starts) < STARTS and left.any():
+        best = contacts[np.argmin(np.where(left, squares, np.inf))]
+        starts = np.vstack([starts, best])
+        left &= np.linalg.norm(contacts - best, axis=1) > 2.0 * apart
+    return starts
+
+
+def _size(contour: Contour) -> float:
+    return float(np.linalg.norm(np.ptp(contour.points, axis=0)))
+
+
+def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, Array]:
+    """Gauss-Newton from a start: the point, and the feet and tangents (c, 3) of the curves next to it."""
+    reach = min(map(_size, contours))
+    for _ in range(STEPS):
+        near = [Contour(_near(point, contour.points)) for contour in contours]
+        local = local_curves(curves_through(*stacked(point[None], [near])))[0][0]
+        speeds = np.linalg.norm(local[:, 1], axis=1, keepdims=True)
+        feet, tangents = point + local[:, 0], local[:, 1] / np.maximum(speeds, 1e-300)
+        across = np.eye(3) - tangents[:, :, None] * tangents[:, None]
+        # Lines in one direction have a nearest solution, which _require_crossing then refuses.
+        step = np.linalg.lstsq(across.sum(axis=0), np.einsum("cij,cj->i", across, local[:, 0]), rcond=1e-9)[0]
+        length = float(np.linalg.norm(step))
+        if length <= 1e-9 * reach:
+            break
+        point = point + step * min(1.0, 0.5 * reach / length)
+    return point, feet, tangents
+
+
+def _near(point: Array, points: Array) -> Array:
+    """Contacts of a curve that say how it passes the point, and some more, in their order."""
+    if len(points) <= NEAREST:
+        return points
+    return points[np.sort(np.argpartition(np.sum((points - point) ** 2, axis=1), NEAREST)[:NEAREST])]
+
+
+def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> None:
+    for number, (contour, miss) in enumerate(zip(contours, misses, strict=True), 1):
+        size = _size(contour)
+        gap = float(np.linalg.norm(contour.points - point, axis=1).min())
+        if not (miss <= APART * size and gap <= GAP * size):
+            raise DegenerateCurvesError(
+                f"the curves do not come near each other: curve {number}, {size:.3g} long, is "
+                f"{max(miss, gap):.3g} away from the point nearest to all: give the reference point, or "
+                "leave that curve out"
+            )
+
+
+def _require_crossing(tangents: Array) -> None:
+    sines = np.linalg.norm(np.cross(tangents[:, None], tangents[None]), axis=2)
+    if sines.max() < math.sin(LEAST_ANGLE):
+        raise DegenerateCurvesError(
+            f"the curves run in one direction (within {math.degrees(math.asin(sines.max())):.2g} degrees), "
+            "which leaves open where on them the common point is: give the reference point"
+        )

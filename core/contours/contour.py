@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sampling planes and the contours in them (paper, section II), and vectors as Python floats."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import (
+    LARGEST,
+    Array,
+    finite_array,
+    list_of,
+    number,
+    shown,
+    unit_vector,
+)
+
+COARSE = 0.01  # Share of a curve's size: coordinates that are rounded by more say nothing about curvature.
+EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
+UNEXPLAINED = "not explained"
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class SamplingPlane:
+    """A plane through the reference point, holding the tangent at `azimuth`, leaning by `tilt` (radians)."""
+
+    azimuth: float
+    tilt: float = 0.0
+
+    def axes(self, normal: ArrayLike, tangent: ArrayLike | None = None) -> Array:
+        """Columns t (the tangent), u (up, in the plane) and t x u (the plane's normal), (3, 3).
+
+        Azimuth 0 is `tangent` projected onto the tangent plane of `normal`; without one world X, or
+        world Y where X is within 26 degrees of the normal. Raises ValueError where `tangent` is
+        along the normal, or the tilt is not between -90 and 90 degrees.
+        """
+        n = vector_of(unit_vector("normal", normal))
+        return np.array(self.floats(n, tangent_of(n, tangent))).T
+
+    def floats(self, n: Vector, e1: Vector) -> tuple[Vector, Vector, Vector]:
+        """`axes` of the unit n and of azimuth 0, across it."""
+        azimuth, tilt = number("azimuth", self.azimuth), number("tilt", self.tilt)
+        if abs(tilt) >= math.pi / 2:
+            raise ValueError(f"tilt: wanted less than 90 degrees, got {math.degrees(tilt):g}")
+        t = along(scaled(e1, math.cos(azimuth)), cross(n, e1), math.sin(azimuth))
+        u = along(scaled(n, math.cos(tilt)), cross(n, t), math.sin(tilt))
+        return t, u, cross(t, u)
+
+
+@dataclass(frozen=True, eq=False)
+class Contour:
+    """A tracked contour: the contacts along one curve through the reference point.
+
+    points : (n, 3), in any order, the reference point among them or not
+    plane_normal : (3,), of the sampling plane, or None for a curve of unknown plane or of none
+    normals : (n, 3), the surface normal at each contact, of any length, outward or inward; or None
+    noise : standard deviation of the contacts, or None where it is not known
+    stops : why tracking ended at the first and at the last point, or None
+    normal_std : standard deviation of normals that were measured, in radians; the fit by "bayes" then takes
+        them for slopes. None where they are not to be fitted, as the paper's methods never do.
+
+    Raises ValueError for another shape, for numbers that are not finite, for numbers of single
+    precision too far from the origin, and for measured normals without a direction.
+    """
+
+    points: Array
+    plane_normal: Array | None = None
+    normals: Array | None = None
+    noise: float | None = None
+    stops: tuple[str, str] | None = None
+    normal_std: float | None = None
+
+    def __post_init__(self) -> None:
+        points = finite_array("points", self.points, (None, 3), LARGEST)
+        single = getattr(self.points, "dtype", None) == np.float32
+        if single and len(points):
+            spacing = float(np.spacing(np.abs(points).max().astype(np.float32)))
+            if spacing > COARSE * np.ptp(points, axis=0).max() > 0.0:
+                raise ValueError(
+                    f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
+                    "of this size: wanted coordinates relative to a point near by, or double precision"
+                )
+        object.__setattr__(self, "points", points)
+        if self.plane_normal is not None:
+            object.__setattr__(self, "plane_normal", unit_vector("plane_normal", self.plane_normal))
+        if self.normals is not None:
+            normals = finite_array("normals", self.normals, (len(points), 3))
+            object.__setattr__(self, "normals", normals)
+        if self.noise is not None:
+            object.__setattr__(self, "noise", number("noise", self.noise, least=0.0))
+        if self.stops is not None:
+            object.__setattr__(self, "stops", tuple(list_of("stops", self.stops, str)))
+            if len(self.stops) != 2:
+                raise ValueError(f"stops: wanted two words, got {shown(self.stops)}")
+        if self.normal_std is not None:
+            object.__setattr__(self, "normal_std", number("normal_std", self.normal_std, least=0.0))
+            if self.normals is None:
+                raise ValueError("normal_std: wanted measured normals that it is of, got none")
+            if not np.abs(self.normals).max(axis=1, initial=0.0).all():
+                raise ValueError("normals: wanted directions where normal_std is given, got (0, 0, 0)")
+
+
+def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:
+    """The unit vector across the unit n that azimuths are measured from; see SamplingPlane.axes."""
+    given = (0.0, 1.0, 0.0) if abs(n[0]) > 0.9 else (1.0, 0.0, 0.0)
+    if tangent is not None:
+        given = vector_of(unit_vector("tangent", tangent))
+    e1 = along(given, n, -dot(given, n))
+    length = math.hypot(*e1)
+    if length < 1e-6:
+        raise ValueError("tangent: wanted a direction across the normal, got one along it")
+    return scaled(e1, 1.0 / length)
+
+
+def vector_of(v: Sequence[float] | Array) -> Vector:
+    """In Python floats: in the inner loops a numpy call would cost more than what it does."""
+    x, y, z = v
+    return float(x), float(y), float(z)
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector | Array, b: Vector | Array) -> Vector:
+    """a x b, of vectors or of arrays of which the first axis has three elements; np.cross is slow."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def scaled(a: Vector, factor: float) -> Vector:
+    """factor a."""
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+def along(a: Vector, direction: Vector, length: float) -> Vector:
+    """a + length direction."""
+    return a[0] + length * direction[0], a[1] + length * direction[1], a[2] + length * direction[2]

@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contours as seen from the reference point: sorted, with tangents and curvature vectors (paper, III-C)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import SMALLEST, Array
+from .contour import Contour
+
+WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
+LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
+RIDGE = 1e-12  # Share of the equations of r0, r1 and r2 that is added, for all s may be one.
+EXACT = 1e-6  # radians, of a measured normal: no less is told apart
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The contours of b touches as seen from their reference points, c curves a touch, n contacts a curve.
+
+    What a touch or a curve has less of is filled up.
+
+    points : (b, c, n, 3), contacts other than the reference point, relative to it, in running order
+    present : (b, c, n), which of them are contacts
+    along : (b, c, n), their signed distances from the point along the curve's direction, ascending
+    tangents : (b, c, 3), unit, pointing the way the contour's points were given; 0 where there is no curve
+    curvatures : (b, c, 3), the curvature vectors r''(s) at the point, in 1/length
+    normals : (b, c, n, 3), measured normals over their standard deviation (radians), 0 where there are
+        none; None where none is measured at all
+    """
+
+    points: Array
+    present: NDArray[np.bool_]
+    along: Array
+    tangents: Array
+    curvatures: Array
+    normals: Array | None = None
+
+    def at(self, index: int | list[int]) -> "Curves":
+        """The curves of one touch, without the leading dimension, or of several."""
+        parts: list[Any] = [part if part is None else part[index] for part in vars(self).values()]
+        return Curves(*parts)
+
+
+def stacked(
+    points: Array, touches: Sequence[Sequence[Contour]]
+) -> tuple[Array, NDArray[np.bool_], Array | None]:
+    """Contacts relative to their reference points (b, 3), which of them there are, and measured normals.
+
+    points, present and normals of Curves, as given.
+    """
+    # At least one place, empty where there is nothing at all.
+    curves = max([1, *(len(contours) for contours in touches)])
+    longest = max([1, *(len(contour.points) for contours in touches for contour in contours)])
+    r = np.zeros((len(touches), curves, longest, 3))
+    present, measured = np.zeros(r.shape[:3], dtype=bool), np.zeros_like(r)
+    for i, contours in enumerate(touches):
+        for j, contour in enumerate(contours):
+            count = len(contour.points)
+            r[i, j, :count] = contour.points - points[i]
+            present[i, j, :count] = True
+            if contour.normals is not None and contour.normal_std is not None:
+                normals = contour.normals / np.abs(contour.normals).max(axis=1, keepdims=True)
+                normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+                measured[i, j, :count] = normals / max(contour.normal_std, EXACT)
+    return r, present, measured if any(map(has_measured_normals, touches)) else None
+
+
+def has_measured_normals(contours: Sequence[Contour]) -> bool:
+    """Whether a fit of these contours has slopes in it."""
+    return any(contour.normal_std is not None for contour in contours)
+
+
+def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None = None) -> Curves:
+    """Fits r(s) = t s + r'' s^2 / 2, through the point, to the nearest contacts of each curve (III-C).
+
+    r : (b, c, n, 3), contacts relative to the point; present : (b, c, n); normals as in Curves. s is
+    the chord to the contact, the arc length up to its cube.
+    """
+    shape, curve = present.shape, np.arange(present[..., 0].size)[:, None]
+    r, present = r.reshape(len(curve), -1, 3), present.reshape(len(curve), -1)
+    distance, beside = besides_point(r)
+    present = present & beside
+    distance = np.where(present, distance, np.inf)
+    near = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
+    counts = present.sum(axis=1)[:, None]
+    farthest = near[curve, np.clip(counts, 1, WINDOW) - 1]
+    along = np.copysign(np.where(present, distance, 0.0), np.einsum("cni,cji->cn", r, r[curve, farthest]))
+    given = np.cumsum(present, axis=1) - (counts + 1) / 2.0
+    along[np.einsum("cn,cn->c", given, along) < 0.0] *= -1.0
+    scale = np.where(counts > 0, distance[curve, farthest], 1.0)
+    tangents, curvatures = _parabola(along[curve, near] / scale, r[curve, near] / scale[..., None])
+    speed = np.maximum(np.sqrt(np.einsum("ci,ci->c", tangents, tangents)), 1e-9)[:, None]  # 1 but for noise
+    along[~present] = np.inf
+    order = np.argsort(along, axis=1, kind="stable")
+    return Curves(
+        r[curve, order].reshape(*shape, 3),
+        present[curve, order].reshape(shape),
+        along[curve, order].reshape(shape),
+        (tangents / speed).reshape(*shape[:2], 3),
+        (curvatures / (scale * speed**2)).reshape(*shape[:2], 3),
+        None if normals is None else normals.reshape(len(curve), -1, 3)[curve, order].reshape(*shape, 3),
+    )
+
+
+def besides_point(r: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Distances (..., n) of contacts (..., n, 3) of curves from the point, and which are not the point."""
+    distance = np.sqrt(np.einsum("...ni,...ni->...n", r, r))
+    least = np.maximum(1e-9 * distance.max(axis=-1, initial=0.0, keepdims=True), SMALLEST)
+    return distance, distance > least
+
+
+def local_curves(curves: Curves) -> tuple[Array, Array]:
+    """r = r0 + r1 s + r2 s^2 of the curves of b touches, s along the tangent t; and the deviation of r0.
+
+    (b, c, 3, 3), rows r0, r1 and r2, fitted to the nearest contacts, and (b, c). 0 where there are too
+    few of them to tell.
+    """
+    distance = np.where(curves.present, np.abs(curves.along), np.inf)
+    order = np.argsort(distance, axis=-1, kind="stable")[..., :WINDOW]
+    near = np.take_along_axis(curves.present, order, axis=-1)
+    r = near[..., None] * np.take_along_axis(curves.points, order[..., None], axis=-2)
+    s = (r @ curves.tangents[..., None])[..., 0]
+    count, longest = np.count_nonzero(near, axis=-1), np.abs(s).max(axis=-1)
+    told = (count > LEAST_CONTACTS) & (longest > 0.0)
+    powers = np.where(told, longest, 1.0)[..., None] ** np.arange(3)
+    basis = (near & told[..., None])[..., None] * (s / powers[..., 1:2])[..., None] ** np.arange(3)
+    gram = np.swapaxes(basis, -1, -2) @ basis + RIDGE * np.eye(3)
+    inverse = np.linalg.inv(gram)
+    solution = inverse @ (np.swapaxes(basis, -1, -2) @ r)
+    variance = np.sum((r - basis @ solution) ** 2, axis=(-2, -1)) / np.maximum(count - 3, 1)
+    stds = np.sqrt(variance * inverse[..., 0, 0])
+    solution /= powers[..., None]
+    return np.where(told[..., None, None], solution, 0.0), np.where(told, stds, 0.0)
+
+
+def misses(curves: Curves) -> Array:
+    """The distances at which the curves of b touches pass the reference points, and their deviations.
+
+    (b, c, 2): the part of r0 across the tangent. 0 where there are too few contacts to tell.
+    """
+    local, stds = local_curves(curves)
+    across = np.cross(local[..., 0, :], curves.tangents)
+    return np.stack([np.linalg.norm(across, axis=-1), stds], axis=-1)
+
+
+def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
+    """t and r'' of r = t s + r'' s^2 / 2 by least squares, (c, 3) each, from (c, k) and (c, k, 3).
+
+    Where all s are one the two cannot be told apart: then the shortest solution.
+    """
+    powers = np.stack([s, 0.5 * s * s], axis=1)
+    gram = powers @ np.swapaxes(powers, 1, 2)
+    a, b, d = gram[:, 0, 0], gram[:, 0, 1], gram[:, 1, 1]
+    det, square = a * d - b * b, np.maximum((a + d) ** 2, 1e-300)
+    alike = det <= 1e-13 * square
+    adjugate = np.array([[d, -b], [-b, a]]).transpose(2, 0, 1)
+    inverse = np.where(alike[:, None, None], gram, adjugate) / np.where(alike, square, det)[:, None, None]
+    solution = inverse @ (powers @ r)
+    return solution[:, 0], solution[:, 1]

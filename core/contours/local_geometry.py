@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tangent plane, principal curvatures and Darboux frame at the reference point (paper, III-B and III-C)."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import Array
+from .contour import Contour, cross
+from .curves import LEAST_CONTACTS, Curves
+
+LEAST_ANGLE = math.radians(1.0)  # between tangents that count as distinct
+OFF_PLANE = math.sin(math.radians(25.0))  # Sine of the angle of a tangent and the tangent plane.
+UMBILIC = 1e-9  # the difference of curvatures, in unit radius, that is none
+
+
+class DegenerateCurvesError(ValueError):
+    """The contours cannot carry the method; the message says what to move."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A local frame: world = origin + axes @ local.
+
+    origin : (3,), the reference point
+    axes : (3, 3), columns d1, d2 (the principal directions) and n (the outward normal)
+    """
+
+    origin: Array
+    axes: Array
+
+    def to_local(self, points: ArrayLike) -> Array:
+        """World points (n, 3) in the frame, (n, 3)."""
+        return (np.asarray(points, dtype=float) - self.origin) @ self.axes
+
+    def to_world(self, points: ArrayLike) -> Array:
+        """Local points (n, 3) in the world, (n, 3)."""
+        return self.origin + np.asarray(points, dtype=float) @ self.axes.T
+
+
+def surface_normals(tangents: Array, outward: Array) -> Array:
+    """The unit n (..., 3) that minimize sum (n . t)^2 over tangents (..., c, 3), on the side of `outward`."""
+    n = np.linalg.eigh(np.swapaxes(tangents, -1, -2) @ tangents)[1][..., 0]
+    return np.where((n * outward).sum(axis=-1, keepdims=True) >= 0.0, n, -n)
+
+
+def principal_curvatures(
+    angles: ArrayLike, curvatures: ArrayLike, known: NDArray[np.bool_] | bool = True
+) -> tuple[Array, Array, Array]:
+    """kappa1 <= kappa2 and the angle of d1, in (-90, 90] degrees; (...) each.
+
+    From normal curvatures (..., c) at angles (..., c), those that are `known`. Euler's formula (2) as
+    kappa_i = H + A cos 2 phi_i + B sin 2 phi_i: linear, exact for three curves and least squares for
+    more. At an umbilic (A and B within rounding of 0, measured against 1 and the curvatures: pass them
+    in unit radius) d1 is at angle 0.
+    """
+    phi, kappa = np.asarray(angles, dtype=float), np.asarray(curvatures, dtype=float)
+    rows = np.stack([known * f for f in (np.ones_like(phi), np.cos(2.0 * phi), np.sin(2.0 * phi))], axis=-2)
+    solution = np.linalg.solve(rows @ np.swapaxes(rows, -1, -2), rows @ kappa[..., None])
+    mean, a, b = solution[..., 0, 0], solution[..., 1, 0], solution[..., 2, 0]
+    half = np.hypot(a, b)
+    umbilic = half <= UMBILIC * np.maximum(1.0, np.abs(known * kappa).max(axis=-1))
+    return mean - half, mean + half, np.where(umbilic, 0.0, 0.5 * np.arctan2(-b, -a))
+
+
+def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array]:
+    """Darboux frames about normals (b, 3), (b, 3, 3); kappa1 and kappa2 in unit radius and the radii L, (b,).
+
+    d1 is within 90 degrees of the first curve's tangent, and that tangent at an umbilic. L is the
+    largest distance of a contact from the point in the tangent plane.
+    """
+    tangents = curves.tangents
+    e1 = tangents[:, 0] - (tangents[:, 0] * n).sum(axis=1, keepdims=True) * n
+    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    e2 = np.array(cross(n.T, e1.T)).T
+    plane = np.array([e1.T, e2.T]).transpose(2, 1, 0)
+    flat = curves.points @ plane[:, None]
+    squares = np.einsum("...i,...i->...", flat, flat)
+    radius = np.sqrt(np.max(squares, axis=(1, 2), where=curves.present, initial=0.0))
+    # Meusnier with its sign: the normal curvature is the normal part of the curvature vector,
+    # kappa' cos(theta) in the paper's words.
+    kappas = radius[:, None] * np.einsum("bci,bi->bc", curves.curvatures, n)
+    flat = tangents @ plane
+    angles = np.arctan2(flat[..., 1], flat[..., 0])
+    k1, k2, theta = principal_curvatures(angles, kappas, curves.present.any(axis=2))
+    c, s = np.cos(theta), np.sin(theta)
+    turn = np.array([[c, -s], [s, c]]).transpose(2, 0, 1)
+    return np.concatenate([plane @ turn, n[:, :, None]], axis=2), k1, k2, radius
+
+
+def degeneracy(
+    contours: Sequence[Contour], present: NDArray[np.bool_], tangents: Array, normal: Array
+) -> DegenerateCurvesError | None:
+    """Why one touch of Curves carries no frame, and what to move; None where it carries one."""
+    for i, (contour, count) in enumerate(zip(contours, present.sum(axis=1), strict=False), 1):
+        if count < LEAST_CONTACTS:
+            why = f" (it ended by: {', '.join(contour.stops)})" if contour.stops else ""
+            return DegenerateCurvesError(
+                f"curve {i} has {count} of the {LEAST_CONTACTS} contacts it needs besides the reference "
+                f"point{why}: move the point away from the crease or edge there, or take a shorter step"
+            )
+    if len(contours) < 3:
+        return DegenerateCurvesError(
+            f"three curves are needed, got {len(contours)}: add a sampling plane in another direction"
+        )
+    tangents = tangents[: len(contours)]
+    heights = tangents @ normal
+    off_plane = np.abs(heights)
+    if not off_plane.max() < OFF_PLANE:
+        return DegenerateCurvesError(
+            "the tangents of the curves at the point lie in no plane, that of curve "
+            f"{np.argmax(off_plane) + 1} least of all: move the point away from the edge or corner, or give "
+            "each curve in its running order"
+        )
+    in_plane = tangents - heights[:, None] * normal
+    return _indistinct(in_plane / np.sqrt(np.einsum("ci,ci->c", in_plane, in_plane))[:, None])
+
+
+def _indistinct(tangents: Array) -> DegenerateCurvesError | None:
+    """An error that names two curves, unless three of these unit tangents differ as lines by LEAST_ANGLE."""
+    least = math.sin(LEAST_ANGLE)
+    sines = np.sqrt(np.maximum(1.0 - (tangents @ tangents.T) ** 2, 0.0))
+    rows, distinct = sines.tolist(), [0]
+    for i in range(1, len(rows)):
+        if all(rows[i][j] >= least for j in distinct):
+            distinct.append(i)
+    if len(distinct) >= 3:
+        return None
+    j, i = next((j, i) for i in range(len(rows)) for j in range(i) if rows[i][j] < least)
+    angle = math.degrees(math.asin(min(1.0, rows[i][j])))
+    return DegenerateCurvesError(
+        f"curves {j + 1} and {i + 1} run in one direction ({angle:.2g} degrees apart), "
+        f"which leaves {len(distinct)} distinct ones of the three needed: turn one of their planes"
+    )

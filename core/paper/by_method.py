@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The coefficients of (1) by one of the paper's methods (section IV), in unit radius."""
+
+import numpy as np
+
+from ..arguments import Array
+from ..contours.curves import Curves
+from ..patch.domain import Domain
+from . import least_squares, tagc
+
+PAPER_METHODS = ("tagc", "quadratic-variation", "least-squares")
+SOLVERS = ("fast", "descent")
+
+
+def coefficients(
+    curves: Curves, k1: float, k2: float, degree: int, domain: Domain, method: str, weight: float, solver: str
+) -> tuple[Array, bool]:
+    """a of (1) with these curvatures for the curves of one touch, and whether the solver converged.
+
+    weight : lambda L^2; the others as in `reconstruct`
+    """
+    data = least_squares.problem(k1, k2, degree, curves.points[curves.present])
+    if method == "least-squares":
+        return least_squares.least_squares(data), True
+    if method == "quadratic-variation":
+        return least_squares.quadratic_variation(data, domain, weight), True
+    objective = tagc.Objective(data, domain, weight)
+    if solver == "descent":
+        return tagc.descent_minimum(objective, least_squares.tagc_start(data, _half_curves(curves)))
+    # On convex surfaces (9) has many minima: from the quadric they are lower than from the paper's start.
+    return tagc.newton_minimum(objective, np.zeros(data.basis.shape[1]))
+
+
+def _half_curves(curves: Curves) -> list[Array]:
+    """The contacts (n_i, 3) on either side of the point, outward, by azimuth."""
+    halves = []
+    each = zip(curves.points, curves.present, curves.along, curves.tangents, strict=True)
+    for points, present, along, tangent in each:
+        for half, sign in (
+            (points[present & (along < 0.0)][::-1], -1.0),
+            (points[present & (along > 0.0)], 1.0),
+        ):
+            if len(half):
+                halves.append((np.arctan2(sign * tangent[1], sign * tangent[0]), half))
+    return [half for _, half in sorted(halves, key=lambda half: half[0])]

@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The coefficients of (1) from the contacts: least squares and quadratic variation, and the start of TAGC.
+
+Everything here is in unit radius, in the Darboux frame, kappa1 and kappa2 known. lambda is then a
+pure number, the weight of the mean square error f against a curvature integral over the domain.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arguments import Array
+from ..patch.domain import Domain
+from ..patch.monge import MongePatch, derived_monomials, exponents, monomials
+
+GRID = 600  # points of (8) over the domain
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """(1) over n contacts: basis (n, m) @ coefficients (m,) ~ remainder (n,) above the quadric."""
+
+    quadric: MongePatch
+    degree: int
+    basis: Array
+    remainder: Array
+
+
+def problem(k1: float, k2: float, degree: int, points: Array) -> Problem:
+    """What (5) asks of the terms of degree 3 to `degree` at local contacts (n, 3)."""
+    quadric = MongePatch(k1, k2, np.empty(0))
+    x, y, z = points.T
+    return Problem(quadric, degree, monomials(x, y, exponents(3, degree)), z - quadric.height(x, y))
+
+
+def condition_number(basis: Array) -> float:
+    """Largest over smallest singular value; 1e16 where there is no full rank."""
+    singular = np.linalg.svd(basis, compute_uv=False)
+    return float(singular[0] / max(singular[-1], 1e-16 * singular[0])) if singular.size else 1.0
+
+
+def least_squares(data: Problem) -> Array:
+    """Equation (5): min f(a), without cut-off but for rounding."""
+    return np.linalg.lstsq(data.basis, data.remainder, rcond=None)[0]
+
+
+def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
+    """min of the integral of z_xx^2 + 2 z_xy^2 + z_yy^2 plus lambda f(a) (section V), a linear solve."""
+    bends, known, h = on_grid(data, domain, [(2, 0), (1, 1), (0, 2)])
+    factors = h * np.sqrt([1.0, 2.0, 1.0])
+    share = np.sqrt(weight / len(data.basis))
+    rows = [share * data.basis, *(f * bend.T for f, bend in zip(factors, bends, strict=True))]
+    wanted = np.concatenate([share * data.remainder, (-factors[:, None] * known).ravel()])
+    return np.linalg.lstsq(np.vstack(rows), wanted, rcond=None)[0]
+
+
+def on_grid(data: Problem, domain: Domain, orders: list[tuple[int, int]]) -> tuple[Array, Array, float]:
+    """k derivatives of (1) on the m points of (8): of the terms, (k, terms, m), of the quadric, (k, m); h."""
+    points, h = domain.grid(GRID)
+    terms = derived_monomials(points[:, 0], points[:, 1], exponents(2, data.degree), orders)
+    known = 0.5 * (data.quadric.k1 * terms[:, 0] + data.quadric.k2 * terms[:, 2])
+    return terms[:, 3:], known, h
+
+
+def tagc_start(data: Problem, half_curves: Sequence[Array]) -> Array:
+    """a(0): (5) over the contacts and artificial points between them (IV-B).
+
+    half_curves : (n_i, 3) each, outward from the reference point, by azimuth. The paper leaves the
+    artificial points open; here k-th contact and k-th contact of neighboring half curves are joined
+    and the line is cut at 1/4, 1/2 and 3/4.
+    """
+    between = []
+    for one, other in zip(half_curves, [*half_curves[1:], half_curves[0]], strict=True):
+        pairs = min(len(one), len(other))
+        between += [(1.0 - t) * one[:pairs] + t * other[:pairs] for t in (0.25, 0.5, 0.75)]
+    artificial = problem(data.quadric.k1, data.quadric.k2, data.degree, np.vstack(between))
+    basis = np.vstack([data.basis, artificial.basis])
+    return np.linalg.lstsq(basis, np.concatenate([data.remainder, artificial.remainder]), rcond=None)[0]

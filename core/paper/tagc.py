@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Total absolute Gaussian curvature against the contacts: the objective (9) and two ways down it (IV-B)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arguments import Array
+from ..patch.domain import Domain
+from .least_squares import Problem, on_grid
+
+# Of |D|, in shares of its mean at the start. At the last the minimum is within a millionth of the true one.
+ROUNDINGS = np.geomspace(1.0, 1e-5, 14)
+SETTLED = 1e-3  # Share of the objective that a step wins: it is time to round less.
+CONVERGED = 1e-8
+NEWTON_CAP, DESCENT_CAP = 200, 20_000  # steps
+
+
+class _Fields(NamedTuple):
+    """The surface on the m points of the grid at some coefficients; and what it misses the contacts by."""
+
+    slopes: Array  # z_x, z_y (2, m)
+    bends: Array  # z_xx, z_xy, z_yy (3, m)
+    w: Array
+    shrink: Array  # W^(-3/2)
+    det: Array
+    miss: Array  # (n,)
+
+
+class Objective:
+    """g(a) + lambda f(a) of (9), in unit radius, on the grid of (8).
+
+    With W = 1 + z_x^2 + z_y^2 and D = z_xx z_yy - z_xy^2 the integrand |K| sqrt(W) is |D| W^(-3/2).
+    |D| has a kink where the surface turns from elliptic to hyperbolic; a rounding r > 0 makes it
+    sqrt(D^2 + r^2).
+    """
+
+    def __init__(self, data: Problem, domain: Domain, weight: float) -> None:
+        orders = [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+        basis, self._known, h = on_grid(data, domain, orders)
+        self._basis, self._area, self._data = basis, h**2, data
+        self._flat = np.concatenate(list(basis), axis=1)  # (terms, 5 m)
+        self._scale = weight / len(data.basis)
+        self._data_hessian = 2.0 * self._scale * data.basis.T @ data.basis
+        xx, xy, yy = basis[2:]
+        # The bending energy stands in for |D|, where it is to tell how long a step is.
+        self.metric = self._data_hessian + self._area * (xx @ xx.T + 2.0 * xy @ xy.T + yy @ yy.T)
+
+    def fields(self, a: Array) -> _Fields:
+        """What all else is computed from."""
+        z = (a @ self._flat).reshape(5, -1) + self._known
+        (zx, zy), (zxx, zxy, zyy) = z[:2], z[2:]
+        w = 1.0 + zx * zx + zy * zy
+        miss = self._data.basis @ a - self._data.remainder
+        return _Fields(z[:2], z[2:], w, 1.0 / (w * np.sqrt(w)), zxx * zyy - zxy * zxy, miss)
+
+    def total_absolute_curvature(self, at: _Fields, rounding: float = 0.0) -> float:
+        """g of (8)."""
+        return self._area * float(_rounded(at.det, rounding) @ at.shrink)
+
+    def value(self, at: _Fields, rounding: float = 0.0) -> float:
+        """g + lambda f."""
+        return self.total_absolute_curvature(at, rounding) + self._scale * float(at.miss @ at.miss)
+
+    def gradient(self, at: _Fields, rounding: float = 0.0) -> Array:
+        """(terms,); where nothing is rounded, with the signs delta_j of K held as they are (IV-B)."""
+        (zx, zy), (zxx, zxy, zyy) = at.slopes, at.bends
+        size = _rounded(at.det, rounding)
+        delta = (at.det / size if rounding else np.where(at.det >= 0.0, 1.0, -1.0)) * at.shrink
+        slope = -3.0 * size * at.shrink / at.w
+        by_field = np.concatenate([slope * zx, slope * zy, delta * zyy, -2.0 * delta * zxy, delta * zxx])
+        return self._area * (self._flat @ by_field) + 2.0 * self._scale * (at.miss @ self._data.basis)
+
+    def hessian(self, at: _Fields, rounding: float) -> Array:
+        """(terms, terms), W held as it is: slopes are small where D matters."""
+        zxx, zxy, zyy = at.bends
+        xx, xy, yy = self._basis[2:]
+        size = _rounded(at.det, rounding)
+        det = zyy * xx - 2.0 * zxy * xy + zxx * yy  # the gradient of D
+        delta = at.det / size * at.shrink
+        mixed = (delta * xx) @ yy.T
+        around = (rounding**2 * at.shrink / (size * size * size) * det) @ det.T
+        return self._area * (around + mixed + mixed.T - (2.0 * delta * xy) @ xy.T) + self._data_hessian
+
+
+def _rounded(det: Array, rounding: float) -> Array:
+    return np.sqrt(det * det + rounding * rounding)
+
+
+def newton_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
+    """Newton's method from `start`, |D| rounded less and less; the coefficients, and whether it converged."""
+    a, at, steps = start, objective.fields(start), 0
+    if not len(a):
+        return a, True
+    scale = max(float(np.mean(np.abs(at.det))), 1e-9)
+    # Beside a weight beyond all measure rounding may leave the metric indefinite.
+    least = 1e-13 * np.trace(objective.metric) * np.eye(len(a))
+    unit = np.linalg.inv(np.linalg.cholesky(objective.metric + least)).T
+    for share in ROUNDINGS:
+        rounding, damping = scale * share, 1e-3
+        value = objective.value(at, rounding)
+        enough = SETTLED if share > ROUNDINGS[-1] else CONVERGED
+        while steps < NEWTON_CAP:
+            before, steps = value, steps + 1
+            a, at, value, damping = _newton_step(objective, unit, a, at, value, rounding, damping)
+            if before - value <= enough * before:
+                break
+    return a, steps < NEWTON_CAP
+
+
+def _newton_step(
+    objective: Objective, unit: Array, a: Array, at: _Fields, value: float, rounding: float, damping: float
+) -> tuple[Array, _Fields, float, float]:
+    """A step down: from coefficients, their fields and value to others; and the damping of the next step.
+
+    unit : (terms, terms), columns of length 1 across each other in the metric
+
+    The Hessian may be indefinite: the moduli of its eigenvalues against the metric count.
+    """
+    bends, axes = np.linalg.eigh(unit.T @ objective.hessian(at, rounding) @ unit)
+    axes = unit @ axes
+    along = objective.gradient(at, rounding) @ axes
+    while True:
+        lengths = along / (np.maximum(np.abs(bends), 1e-9) + damping)
+        trial = a - axes @ lengths
+        there = objective.fields(trial)
+        trial_value = objective.value(there, rounding)
+        expected = float(lengths @ (along - 0.5 * bends * lengths))
+        if trial_value < value:
+            quick = value - trial_value > 0.7 * expected
+            return trial, there, trial_value, damping * (0.1 if quick else 2.0)
+        if expected <= 1e-10 * value:
+            return a, at, value, damping
+        damping = max(4.0 * damping, 1e-3)
+
+
+def descent_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
+    """The paper's steepest descent from `start`; the coefficients, and whether it converged before the cap.
+
+    Each step is halved until it descends at all, and the next one tries twice as far: a demand for
+    more descent would end it on the kinks of |K|. Converged where 100 steps have not lowered the
+    objective by a millionth.
+    """
+    a, at = start, objective.fields(start)
+    value, gradient = objective.value(at), objective.gradient(at)
+    length, mark = 1.0 / max(float(np.linalg.norm(gradient)), 1e-300), value
+    for step in range(1, DESCENT_CAP + 1):
+        square = float(gradient @ gradient)
+        while True:
+            trial = a - length * gradient
+            at = objective.fields(trial)
+            trial_value = objective.value(at)
+            if trial_value <= value - 1e-3 * length * square or length * square <= 1e-16 * abs(value):
+                break
+            length *= 0.5
+        if trial_value >= value:
+            return a, True
+        a, value, gradient = trial, trial_value, objective.gradient(at)
+        length *= 2.0
+        if step % 100 == 0:
+            if mark - value <= 1e-6 * abs(value):
+                return a, True
+            mark = value
+    return a, False

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A)."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import Array
+
+SAMPLES = 1024  # Samples of the boundary, whose radius is then good to 1e-5.
+ALONG, ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """The part of the tangent plane a patch is meant for; star-shaped about the origin.
+
+    ends : (m, 2), m >= 3, the projected ends of the contours, by azimuth
+    """
+
+    ends: Array
+
+    @cached_property
+    def _boundary(self) -> tuple[Array, Any]:
+        """Lengths along the chords at the ends, and at the first once more (m + 1,); the spline over them."""
+        from scipy.interpolate import CubicSpline
+
+        closed = np.vstack([self.ends, self.ends[:1]])
+        lengths = np.linalg.norm(np.diff(closed, axis=0), axis=1)
+        at = np.concatenate([[0.0], np.cumsum(lengths)])
+        return at, CubicSpline(at, closed, bc_type="periodic")
+
+    @cached_property
+    def _polar(self) -> tuple[Array, Array]:
+        """Azimuths, ascending, and radii of the boundary."""
+        at, spline = self._boundary
+        each = math.ceil(SAMPLES / len(self.ends))  # Samples of one piece: as symmetric as the ends.
+        x, y = spline((at[:-1, None] + np.diff(at)[:, None] / each * np.arange(each)).ravel()).T
+        azimuths, radii = np.arctan2(y, x), np.hypot(x, y)
+        if np.count_nonzero(np.diff(azimuths, append=azimuths[0]) <= 0.0) > 1:
+            azimuths, radii = self._without_turning_back()
+        order = np.argsort(azimuths)
+        return azimuths[order], radii[order]
+
+    def _without_turning_back(self) -> tuple[Array, Array]:
+        """Beside an end near to the origin the spline may turn back: a monotone one, of the radius."""
+        from scipy.interpolate import PchipInterpolator
+
+        # Two ends in one direction count once, the farther.
+        turns, place = np.unique(
+            np.round(np.arctan2(self.ends[:, 1], self.ends[:, 0]) / (2.0 * np.pi), 9) % 1.0,
+            return_inverse=True,
+        )
+        reach = np.zeros(len(turns))
+        np.maximum.at(reach, place, np.hypot(*self.ends.T))
+        at = np.concatenate([turns + whole for whole in (-2.0, -1.0, 0.0, 1.0)])
+        azimuths = np.arange(SAMPLES, dtype=np.float64) / SAMPLES - 0.5
+        radii: Array = PchipInterpolator(at, np.tile(reach, 4))(azimuths)
+        return 2.0 * np.pi * azimuths, radii
+
+    @cached_property
+    def nodes(self) -> tuple[Array, Array]:
+        """Points (n, 2) inside and weights (n,) of sum 1 for the mean of a function: Gauss, n = 12 m.
+
+        In circles parallel to the boundary.
+        """
+        piece, share, along, out, outward = _gauss(len(self.ends))
+        at, spline = self._boundary
+        chords = np.diff(at)[piece]
+        places = at[piece] + share * chords
+        points, ahead = spline(places), chords[:, None] * spline(places, 1)
+        weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
+        return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
+
+    def _radius(self, azimuth: Array) -> Array:
+        return np.interp(azimuth, *self._polar, period=2.0 * np.pi)
+
+    def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+        """Whether each (x, y) lies inside or on the boundary; booleans of the shape of x and y."""
+        return np.hypot(x, y) <= self._radius(np.arctan2(y, x)) * (1.0 + 1e-5)
+
+    def places(self, points: Array) -> Array:
+        """Points (n, 2) as points of the unit disk, at their azimuth and their share of the radius there."""
+        return points / self._radius(np.arctan2(points[:, 1], points[:, 0]))[:, None]
+
+    def points_at(self, places: Array) -> Array:
+        """The points (n, 2) that have these `places`."""
+        return places * self._radius(np.arctan2(places[:, 1], places[:, 0]))[:, None]
+
+    def boundary(self, n: int) -> Array:
+        """n points on the boundary, (n, 2), counterclockwise from azimuth 0 in equal turns."""
+        azimuths = 2.0 * np.pi * np.arange(n) / n
+        return self.points_at(np.column_stack([np.cos(azimuths), np.sin(azimuths)]))
+
+    @cached_property
+    def area(self) -> float:
+        """The area inside, in length^2."""
+        azimuth, r = self._polar
+        turn, following = np.diff(azimuth, append=azimuth[0] + 2.0 * np.pi), np.roll(r, -1)
+        return float(np.sum(turn * (r**2 + r * following + following**2)) / 6.0)
+
+    def grid(self, count: int) -> tuple[Array, float]:
+        """The grid of (8): about `count` points (m, 2) inside with uniform spacing h, and h."""
+        h = float(np.sqrt(self.area / count))
+        reach = self.boundary(SAMPLES)
+        low, high = np.floor(reach.min(axis=0) / h), np.ceil(reach.max(axis=0) / h)
+        axes = (h * (np.arange(a, b) + 0.5) for a, b in zip(low, high, strict=True))
+        x, y = (axis.ravel() for axis in np.meshgrid(*axes))
+        inside = self.contains(x, y)
+        return np.column_stack([x[inside], y[inside]]), h
+
+
+@lru_cache(maxsize=16)
+def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
+    """For Domain.nodes: piece, place on it and weight of each ray; places and weights along a ray."""
+    along, along_weights = np.polynomial.legendre.leggauss(ALONG)  # type: ignore[no-untyped-call]
+    square, outward = np.polynomial.legendre.leggauss(ACROSS)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
+    return (
+        np.repeat(np.arange(ends), ALONG),
+        np.tile(0.5 * (along + 1.0), ends),
+        np.tile(along_weights, ends),
+        np.sqrt(0.5 * (square + 1.0))[:, None, None],
+        0.5 * outward[:, None],
+    )
+
+
+def closed_spline_domain(ends: ArrayLike, radius: float) -> Domain:
+    """The domain through projected curve ends (m, 2), in any order.
+
+    Ends within 1e-3 radius of the origin (a curve that runs to one side only) or of another end
+    do not count. Raises ValueError where fewer than three are left.
+    """
+    x, y = np.asarray(ends, dtype=float).T
+    out = np.flatnonzero(x * x + y * y > (1e-3 * radius) ** 2)
+    x, y = np.array([x, y])[:, out[np.argsort(np.arctan2(y[out], x[out]), kind="stable")]]
+    before = np.arange(-1, len(x) - 1)
+    apart = (x - x[before]) ** 2 + (y - y[before]) ** 2 > (1e-3 * radius) ** 2
+    count = np.count_nonzero(apart)
+    if count < 3:
+        raise ValueError(f"ends: wanted three or more apart from each other, got {count}")
+    return Domain(np.array([x[apart], y[apart]]).T)

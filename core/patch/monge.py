@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surfaces z(x, y) over their tangent plane, their differential geometry, and the one of equation (1)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import Array
+
+
+@cache
+def exponents(lowest: int, highest: int) -> NDArray[np.intp]:
+    """(i, j) of the terms x^i y^j of these degrees, (m, 2), in the order of (1): 30 21 12 03 40 31 22 ..."""
+    terms = [(i, d - i) for d in range(lowest, highest + 1) for i in range(d, -1, -1)]
+    array = np.array(terms, dtype=np.intp).reshape(-1, 2)
+    array.flags.writeable = False
+    return array
+
+
+def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:
+    """The terms (m, 2) at n points, (n, m)."""
+    return derived_monomials(x, y, terms, [(0, 0)])[0].T
+
+
+def derived_monomials(
+    x: Array, y: Array, terms: NDArray[np.intp], orders: Sequence[tuple[int, int]]
+) -> Array:
+    """The terms (m, 2) at n points, (k, m, n), differentiated as each of k orders (dx, dy) says."""
+    i, j = terms.T
+    x_powers, y_powers = np.ones((2, int(terms.max(initial=0)) + 1, len(x)))
+    for k in range(1, len(x_powers)):
+        np.multiply(x_powers[k - 1], x, out=x_powers[k])
+        np.multiply(y_powers[k - 1], y, out=y_powers[k])
+    derived = np.empty((len(orders), len(terms), len(x)))
+    for values, (dx, dy) in zip(derived, orders, strict=True):
+        # Where a derivative has killed a term its factor is 0, whatever power stands beside it.
+        np.multiply(x_powers[np.maximum(i - dx, 0)], y_powers[np.maximum(j - dy, 0)], out=values)
+        for exponent, times in ((i, dx), (j, dy)):
+            for k in range(times):
+                values *= (exponent - k)[:, None]
+    return derived
+
+
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """Height and partial derivatives of a surface z(x, y), all of one shape (...), and its curvatures."""
+
+    z: Array
+    x: Array
+    y: Array
+    xx: Array
+    xy: Array
+    yy: Array
+
+    @property
+    def normal(self) -> Array:
+        """Unit normal on the side of +z, shape (..., 3)."""
+        n = np.stack([-self.x, -self.y, np.ones_like(self.x)], axis=-1)
+        return n / np.linalg.norm(n, axis=-1, keepdims=True)
+
+    @property
+    def first_form(self) -> tuple[Array, Array, Array]:
+        """E, F, G of the first fundamental form."""
+        return 1.0 + self.x**2, self.x * self.y, 1.0 + self.y**2
+
+    @property
+    def second_form(self) -> tuple[Array, Array, Array]:
+        """L, M, N of the second fundamental form, negative where the surface falls away below the normal."""
+        w = np.sqrt(1.0 + self.x**2 + self.y**2)
+        return self.xx / w, self.xy / w, self.yy / w
+
+    @property
+    def gaussian_curvature(self) -> Array:
+        """K = (LN - M^2) / (EG - F^2), in 1/length^2."""
+        return (self.xx * self.yy - self.xy**2) / (1.0 + self.x**2 + self.y**2) ** 2
+
+    @property
+    def mean_curvature(self) -> Array:
+        """H = (EN - 2FM + GL) / 2(EG - F^2), in 1/length."""
+        (e, f, g), (ll, mm, nn) = self.first_form, self.second_form
+        # EG - F^2 is E + G - 1, which does not cancel where it is steep.
+        return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e + g - 1.0))
+
+    @property
+    def principal_curvatures(self) -> tuple[Array, Array]:
+        """kappa1 <= kappa2, in 1/length."""
+        mean = self.mean_curvature
+        # H^2 - K is a square, (kappa1 - kappa2)^2 / 4; at umbilics rounding takes it below 0.
+        half = np.sqrt(np.maximum(mean**2 - self.gaussian_curvature, 0.0))
+        return mean - half, mean + half
+
+
+class HeightField:
+    """A surface z(x, y); all follows from its derivatives.
+
+    All methods take x and y of one shape (or that broadcast) and answer in that shape.
+    """
+
+    def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
+        """Height, slopes and second derivatives at (x, y)."""
+        raise NotImplementedError
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """z(x, y)."""
+        return self.derivatives(x, y).z
+
+    def normal(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Unit normal on the side of +z, shape (..., 3)."""
+        return self.derivatives(x, y).normal
+
+    def gaussian_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """K at (x, y), in 1/length^2."""
+        return self.derivatives(x, y).gaussian_curvature
+
+    def mean_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """H at (x, y), in 1/length."""
+        return self.derivatives(x, y).mean_curvature
+
+    def principal_curvatures(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """kappa1 <= kappa2 at (x, y), in 1/length."""
+        return self.derivatives(x, y).principal_curvatures
+
+    def closest_point(self, points: ArrayLike) -> Array:
+        """The foot on the surface of each local point, (n, 3) -> (n, 3).
+
+        Newton's method on the squared distance, all points at once, from the vertical projection;
+        a step that does not shorten the distance is halved.
+        """
+        q = np.asarray(points, dtype=float)
+        foot, damping = q[:, :2].copy(), np.ones(len(q))
+        nearest = np.abs(self.height(*foot.T) - q[:, 2])
+        close_enough = 1e-11 * np.abs(q).max(initial=0.0)
+        active = np.arange(len(q))
+        for _ in range(50):
+            step = damping[active, None] * _newton_step(self, foot[active], q[active])
+            trial = foot[active] + step
+            lifted = np.column_stack([trial, self.height(*trial.T)])
+            distance = np.linalg.norm(lifted - q[active], axis=1)
+            nearer = distance <= nearest[active]
+            foot[active[nearer]], nearest[active[nearer]] = trial[nearer], distance[nearer]
+            damping[active] = np.where(nearer, np.minimum(2.0 * damping[active], 1.0), 0.5 * damping[active])
+            active = active[np.abs(step).max(axis=1, initial=0.0) > close_enough]
+            if not len(active):
+                break
+        return np.column_stack([foot, self.height(*foot.T)])
+
+
+@dataclass(frozen=True, eq=False)
+class MongePatch(HeightField):
+    """z = (k1 x^2 + k2 y^2) / 2 + sum a_ij x^i y^j, equation (1), in the local frame.
+
+    k1, k2 : the principal curvatures at the origin, k1 <= k2, in 1/length
+    coefficients : a30 a21 a12 a03 a40 a31 a22 a13 a04 ..., a_ij in length^(1 - i - j)
+    """
+
+    k1: float
+    k2: float
+    coefficients: Array
+
+    @property
+    def degree(self) -> int:
+        """The degree d of (1)."""
+        terms, degree = len(self.coefficients), 2
+        while terms > 0:
+            degree += 1
+            terms -= degree + 1
+        return degree
+
+    def scaled(self, factor: float) -> "MongePatch":
+        """This surface with every length multiplied by `factor`."""
+        orders = exponents(3, self.degree).sum(axis=1)
+        return MongePatch(self.k1 / factor, self.k2 / factor, self.coefficients * factor ** (1.0 - orders))
+
+    def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
+        """Height, slopes and second derivatives at (x, y)."""
+        return Derivatives(*self._evaluate(x, y, [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]))
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """z(x, y)."""
+        return self._evaluate(x, y, [(0, 0)])[0]
+
+    def _evaluate(self, x: ArrayLike, y: ArrayLike, orders: list[tuple[int, int]]) -> Array:
+        """The derivatives of `orders` (dx, dy), (m, ...): rows x^i, times tables of a_ij, times y^j."""
+        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        powers = self.degree + 1
+        table = np.zeros((powers, powers))
+        i, j = exponents(2, self.degree).T
+        table[i, j] = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
+        tables = [_derive(powers, dx) @ table @ _derive(powers, dy).T for dx, dy in orders]
+        x_powers, y_powers = (np.vander(v.ravel(), powers, increasing=True) for v in (x_array, y_array))
+        rows = (x_powers @ np.hstack(tables)).reshape(-1, len(orders), powers)
+        return np.einsum("nmj,nj->mn", rows, y_powers).reshape(len(orders), *x_array.shape)
+
+
+@cache
+def _derive(powers: int, order: int) -> Array:
+    """(powers, powers): takes the a_i of x^i to those of its derivative of that order."""
+    return np.linalg.matrix_power(np.diag(np.arange(1.0, powers), 1), order)
+
+
+def _newton_step(surface: HeightField, foot: Array, q: Array) -> Array:
+    """-H^-1 g of half the squared distance, (n, 2); where H is not positive, without its z'' part."""
+    d = surface.derivatives(*foot.T)
+    above = d.z - q[:, 2]
+    gx, gy = foot[:, 0] - q[:, 0] + above * d.x, foot[:, 1] - q[:, 1] + above * d.y
+    hxx, hxy, hyy = 1.0 + d.x**2 + above * d.xx, d.x * d.y + above * d.xy, 1.0 + d.y**2 + above * d.yy
+    bowl = (hxx > 0.0) & (hxx * hyy - hxy**2 > 0.0)
+    hxx = np.where(bowl, hxx, 1.0 + d.x**2)
+    hxy = np.where(bowl, hxy, d.x * d.y)
+    hyy = np.where(bowl, hyy, 1.0 + d.y**2)
+    det = np.where(bowl, hxx * hyy - hxy**2, 1.0 + d.x**2 + d.y**2)
+    return np.column_stack([hxy * gy - hyy * gx, hxy * gx - hxx * gy]) / det[:, None]

@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a real surface is beside a polynomial: a Gaussian process over the tangent plane.
+
+Beside the paper. The heights are phi' b + g, phi the terms of degree 1 to 6 under the prior of bayes.py
+and g of zero mean and of the covariance
+
+    sum_i v_i M(|p - q| / l_i),  M(d) = (1 + a + a^2 / 3) exp(-a),  a = sqrt(5) d,
+
+a Matern's of order 5/2. residual_evidence.py finds the variances v_i and the noise that is left; the
+reference point is a contact like the others. All is in unit radius and in the Darboux frame.
+
+g = k(p, u)' c for places u of contacts, so what the contacts say of it is a Gaussian over 27 coefficients
+and one c for each place; and what no place tells adds k(p, p) - k(p, u)' k(u, u)^-1 k(u, p).
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..arguments import Array
+from ..bayes.posterior import TERMS
+from .monge import Derivatives, derived_monomials, monomials
+
+LENGTHS = np.array([0.4, 0.8])  # of the radius; with benchmarks.real
+BLOCK = 6000  # distances at once: they fit into a processor's cache
+ROUNDING = 1e-9  # Share of k(u, u).
+ORDER = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """What the surface is beside the mean of a Posterior, in its frame and in unit radius.
+
+    With k(u, u) = L L' and the features f(p) = (phi(p), L^-1 k(u, p)), heights have the covariance
+    k(p, q) less the part of it that f tells, and f(p)' A^-1 f(q), A = factor factor' the precision.
+
+    places : (m, 2), of contacts
+    variances : (2,), of g, for each of LENGTHS
+    mean : (27 + m,), of the terms, less the Posterior's mean; and of k(p, places)
+    factor : (27 + m, 27 + m), lower triangular
+    noise : (), standard deviation of a contact
+    """
+
+    places: Array
+    variances: Array
+    mean: Array
+    factor: Array
+    noise: Array
+
+    @property
+    def size(self) -> float:
+        """The standard deviation of g far from the point, as a share of the radius."""
+        return math.sqrt(float(self.variances.sum()))
+
+    def height(self, x: Array, y: Array) -> Array:
+        """What it adds to the Posterior's mean height at n points, (n,)."""
+        terms = monomials(x, y, TERMS) @ self.mean[: len(TERMS)]
+        return terms + weighted_kernel(
+            np.column_stack([x, y]), self.places, self.variances, self.mean[len(TERMS) :]
+        )
+
+    def derivatives(self, x: Array, y: Array) -> Derivatives:
+        """The kernel with its slopes and second derivatives."""
+        terms = np.einsum("kmn,m->kn", derived_monomials(x, y, TERMS, ORDER), self.mean[: len(TERMS)])
+        p = np.column_stack([x, y])
+        return Derivatives(*(terms + _derived(p, self.places, self.variances, self.mean[len(TERMS) :])))
+
+    def height_std(self, x: Array, y: Array) -> Array:
+        """Standard deviations of the height at n points, (n,)."""
+        p = np.column_stack([x, y])
+        told, left = self.whitened(p)
+        variance = own_variance(p, self.variances)
+        variance += np.einsum("in,in->n", left, left) - np.einsum("in,in->n", told, told)
+        return np.sqrt(np.maximum(variance, 0.0))
+
+    def height_covariance(self, p: Array, q: Array) -> Array:
+        """Covariances of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
+        at_p = self.signed(p)
+        at_q = at_p.copy() if q is p else self.signed(q)
+        at_q[..., : len(self.places)] *= -1.0
+        covariance: Array = kernel(p, q, self.variances) + at_p @ np.swapaxes(at_q, -1, -2)
+        return covariance
+
+    def signed(self, p: Array) -> Array:
+        """What `whitened` gives of points (..., n, 2), side by side, (..., n, 27 + 2 m)."""
+        return np.vstack(self.whitened(p.reshape(-1, 2))).T.reshape(*p.shape[:-1], -1)
+
+    def whitened(self, p: Array) -> tuple[Array, Array]:
+        """L^-1 k(places, p), (m, n), and factor^-1 f(p), (27 + m, n), at points (n, 2)."""
+        terms = monomials(p[:, 0], p[:, 1], TERMS).T
+        return whitened(self._places_factor, self.factor, terms, kernel(self.places, p, self.variances))
+
+    @cached_property
+    def _places_factor(self) -> Array:
+        return places_factor(kernel(self.places, self.places, self.variances))
+
+
+def places_factor(within: Array) -> Array:
+    """L of k(u, u) of places, (m, m), lower triangular."""
+    np.einsum("ii->i", within)[:] += ROUNDING * within.trace() / len(within)  # a view
+    return np.linalg.cholesky(within)
+
+
+def whitened(places: Array, factor: Array, terms: Array, told: Array) -> tuple[Array, Array]:
+    """As of a Residual, by the two factors, of terms (27, n) and k(places, p), (m, n), or of sums of such."""
+    told = solved(places, told)
+    return told, solved(factor, np.vstack([terms, told]))
+
+
+def solved(factor: Array, right: Array, transposed: bool = False) -> Array:
+    """factor^-1 @ right, or factor'^-1 @ right, of a lower triangular matrix (m, m)."""
+    from scipy.linalg.lapack import dtrtrs
+
+    found: Array = dtrtrs(factor.T, right, lower=0, trans=0 if transposed else 1)[0]
+    return found
+
+
+def kernel(p: Array, q: Array, variances: Array) -> Array:
+    """Covariances of g at points (..., n, 2) and (..., m, 2), (..., n, m), for variances (2,)."""
+    one, other = kernels(p, q)
+    one *= variances[0]
+    other *= variances[1]
+    one += other
+    return one
+
+
+def kernels(p: Array, q: Array) -> list[Array]:
+    """Kernels of unit variance, (..., n, m), for each of LENGTHS."""
+    return _maternes(distances(p, q))
+
+
+def weighted_kernel(p: Array, q: Array, variances: Array, weights: Array) -> Array:
+    """k(p, q) @ weights at points (n, 2) and (m, 2), (n,)."""
+    total, rows = np.empty(len(p)), max(1, BLOCK // max(len(q), 1))
+    for start in range(0, len(p), rows):
+        one, other = _maternes(distances(p[start : start + rows], q))
+        total[start : start + rows] = one @ (variances[0] * weights) + other @ (variances[1] * weights)
+    return total
+
+
+def distances(p: Array, q: Array) -> Array:
+    """Distances of points (..., n, 2) and (..., m, 2), (..., n, m)."""
+    apart, across = (p[..., :, None, i] - q[..., None, :, i] for i in (0, 1))
+    apart *= apart
+    across *= across
+    apart += across
+    return np.sqrt(apart, out=apart)
+
+
+def own_variance(p: Array, variances: Array) -> Array:
+    """k(p, p) at points (n, 2), (n,)."""
+    return np.full(len(p), variances.sum())
+
+
+def _maternes(distance: Array) -> list[Array]:
+    """M of distances (...) over each of LENGTHS."""
+    return [_matern(math.sqrt(5.0) / length * distance) for length in LENGTHS]
+
+
+def _matern(a: Array) -> Array:
+    """(1 + a + a^2 / 3) exp(-a); what it works on is passed over memory as seldom as can be."""
+    values = a / 3.0
+    values += 1.0
+    values *= a
+    values += 1.0
+    np.negative(a, out=a)
+    values *= np.exp(a, out=a)
+    return values
+
+
+def _derived(p: Array, places: Array, variances: Array, weights: Array) -> Array:
+    """k(p, places) @ weights at points (n, 2) and its derivatives by p, (6, n), as ORDER says."""
+    total = np.zeros((len(ORDER), len(p)))
+    for variance, length in zip(variances, LENGTHS, strict=True):
+        total += variance * (_derived_matern(p[:, None] - places, length) @ weights)
+    return total
+
+
+def _derived_matern(apart: Array, length: float) -> Array:
+    """M(|apart| / length) of (..., 2) and its derivatives, (6, ...), as ORDER says."""
+    x, y = np.moveaxis(apart, -1, 0)
+    a = math.sqrt(5.0) / length * np.hypot(x, y)
+    e, b = np.exp(-a), 5.0 / (3.0 * length**2)
+    slope, bend = -b * (1.0 + a) * e, 3.0 * b**2 * e
+    height = (1.0 + a * (1.0 + a / 3.0)) * e
+    second = slope + bend * x**2, bend * x * y, slope + bend * y**2
+    return np.array([height, slope * x, slope * y, *second])

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where to touch next: the sampling plane whose contour would tell most."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import Array, unit_vector
+from ..contours.contour import SamplingPlane
+from .result import Reconstruction
+
+AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))
+COARSE = 4  # So many azimuths lie between those that are tried first.
+MOST = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
+
+
+def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
+    """The plane that would lower the mean variance of the height over the domain most.
+
+    Also the mean height_std that is expected after it, in the caller's unit. The plane holds the
+    normal and is measured from d1 about n of `r.frame`: track it with outward=r.frame.axes[:, 2],
+    tangent=r.frame.axes[:, 0].
+
+    The contour is taken to reach as far and to have as many contacts as those before, with their
+    noise. What it will show follows from where it runs, not from the heights found there.
+    """
+    points, weights = r.domain.nodes
+    over = points / r.radius
+    tried = np.arange(0, len(AZIMUTHS), COARSE)
+    lost = _lost(r, over, AZIMUTHS[tried])
+    # Beside the best of them.
+    near = tried[np.argmax(lost @ weights)] + np.arange(1 - COARSE, COARSE)
+    near = near[near % COARSE > 0] % len(AZIMUTHS)
+    tried, lost = np.concatenate([tried, near]), np.vstack([lost, _lost(r, over, AZIMUTHS[near])])
+    best = int(np.argmax(lost @ weights))
+    variance = np.maximum((r.height_std(*points.T) / r.radius) ** 2 - lost[best], 0.0)
+    azimuth = float(AZIMUTHS[tried[best]])
+    return SamplingPlane(azimuth), r.radius * float(weights @ np.sqrt(variance))
+
+
+def _lost(r: Reconstruction, over: Array, azimuths: Array) -> Array:
+    """What contours at azimuths (k,) take off the variances at points (n, 2), (k, n); in unit radius.
+
+    A contour's heights have the covariance `seen`, and `shared` with those at the points, off whose variance
+    it takes the diagonal of shared' seen^-1 shared.
+    """
+    wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
+    count, surface = min(wanted, MOST), r.uncertainty
+    directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
+    contours = np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None]
+    shared = surface.height_covariance(contours, over)
+    seen = surface.height_covariance(contours, contours)
+    seen += surface.noise**2 * count / wanted * np.eye(count)
+    lost: Array = np.einsum("kin,kin->kn", shared, np.linalg.solve(seen, shared))
+    return lost
+
+
+def azimuth_of(direction: ArrayLike, normal: ArrayLike, tangent: ArrayLike | None = None) -> float:
+    """The azimuth, from 0 up to pi, of the sampling plane that holds `direction`; see SamplingPlane.axes."""
+    e1, _, across = SamplingPlane(0.0).axes(normal, tangent).T  # across is e1 x n, -e2
+    d = unit_vector("direction", direction)
+    return math.atan2(-(d @ across), d @ e1) % math.pi

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Points thinned to an even spacing: where to touch, for touches all over a surface."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+
+CROWD = 100_000  # points that are sorted at once
+CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
+
+
+def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[int | None]:
+    """Yields indices of points (n, 3) none of which are nearer to each other than `spacing`.
+
+    In random order, so that a part of them is an even cover too, up to all that have room; now and
+    then None, where there is work in between.
+    """
+    from scipy.spatial import cKDTree
+
+    left = []
+    for start in range(0, len(points), CROWD):
+        left.append(start + _one_a_cell(points[start : start + CROWD], CELL * spacing))
+        yield None
+    chosen = np.concatenate(left)
+    chosen = rng.permutation(chosen[_one_a_cell(points[chosen], CELL * spacing)])
+    yield None
+    tree = cKDTree(points[chosen])
+    yield None
+    free = np.ones(len(chosen), dtype=bool)
+    for i, index in enumerate(chosen.tolist()):
+        if free[i]:
+            free[tree.query_ball_point(tree.data[i], spacing)] = False
+            yield index
+
+
+def _one_a_cell(points: Array, size: float) -> NDArray[np.intp]:
+    """The first of the points (n, 3) in each cell of a grid."""
+    cells = np.floor(points / size)
+    cells -= cells.min(axis=0)
+    across = cells.max(axis=0) + 1.0
+    return np.unique((cells[:, 0] * across[1] + cells[:, 1]) * across[2] + cells[:, 2], return_index=True)[1]

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scanned mesh as triangles of like size, and how far contacts are from it.
+
+Lengths are in units of the patch's radius; places and touches are those of registration.py.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import Array, finite_array
+
+LARGEST_MESH = 40.0
+LONGEST_EDGE = 0.25  # longer ones are halved: a patch covers a hundred triangles
+FACING = 0.05  # what a right angle between normals counts, about, as a distance to a triangle
+TOUCHING = 1e-9
+
+
+class Mesh(NamedTuple):
+    """Triangles (m, 3, 3) of like size, unit normals, centers and smooth normals there (m, 3), a tree."""
+
+    triangles: Array
+    normals: Array
+    centers: Array
+    smooth: Array
+    tree: Any
+
+
+def corners_of(faces: ArrayLike, count: int) -> NDArray[np.intp]:
+    """The faces as indices of vertices (m, 3), of which there are `count`. Raises ValueError for others."""
+    indices = finite_array("faces", faces if np.size(faces) else np.zeros((0, 3)), (None, 3))
+    if not len(indices):
+        raise ValueError("faces: wanted triangles, got none: make a mesh of a cloud of points first")
+    if (indices % 1.0).any() or indices.min() < 0 or indices.max() >= count:
+        raise ValueError(f"faces: wanted whole numbers from 0 to {count - 1}, got others among them")
+    return indices.astype(np.intp)
+
+
+def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> Mesh:
+    """The mesh as it is searched. Raises ValueError where its size cannot be that of what was touched."""
+    from scipy.spatial import cKDTree
+
+    size = np.linalg.norm(np.ptp(co[corners], axis=(0, 1)))
+    if not patch <= size <= LARGEST_MESH:
+        raise ValueError(
+            f"vertices: wanted a mesh from {patch:.2g} (the patch) to {LARGEST_MESH:g} times the radius, "
+            f"got {size:.2g}: bring both to one unit, or take another extent"
+        )
+    normals = np.zeros_like(co)
+    np.add.at(normals, corners, _across(co[corners])[:, None])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    pieces = _halved(np.concatenate([co, normals], axis=1)[corners])
+    across, mean = _across(pieces[..., :3]), pieces.mean(axis=1)
+    lengths, bends = np.linalg.norm(across, axis=1), np.linalg.norm(mean[:, 3:], axis=1)
+    good = (lengths > 1e-12) & (bends > 1e-6)
+    if not good.any():
+        raise ValueError("faces: wanted triangles, got none that has an area")
+    centers, smooth = mean[good, :3], mean[good, 3:] / bends[good, None]
+    tree = cKDTree(np.concatenate([centers, FACING * smooth], axis=1))
+    return Mesh(pieces[good, :, :3], across[good] / lengths[good, None], centers, smooth, tree)
+
+
+def _across(triangles: Array) -> Array:
+    """Normals (..., 3) of triangles (..., 3, 3), twice the area long."""
+    a, b, c = np.moveaxis(triangles, -2, 0)
+    return np.cross(b - a, c - a)
+
+
+def _halved(pieces: Array) -> Array:
+    """Triangles (m, 3, 6) with normals, cut at their longest edges until none is longer than LONGEST_EDGE."""
+    done = []
+    while len(pieces):
+        edges = np.linalg.norm((np.roll(pieces, -1, axis=1) - pieces)[..., :3], axis=2)
+        long = edges.max(axis=1) > LONGEST_EDGE
+        done.append(pieces[~long])
+        order = (edges[long].argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.moveaxis(np.take_along_axis(pieces[long], order[..., None], axis=1), 1, 0)
+        middle = 0.5 * (a + b)
+        pieces = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return np.concatenate(done)
+
+
+def mesh_distances(places: Array, touch: Array, mesh: Mesh, neighbors: int) -> tuple[Array, Array]:
+    """Distances of the contacts to the mesh, (m, n, 1), and their derivatives (m, n, 6) by the motion.
+
+    To the plane of the nearest triangle, or of some that are near to the nearest point.
+    """
+    turned = places[..., :3].swapaxes(1, 2)
+    arms, normals = touch[0] @ turned, (touch[1] @ turned).reshape(-1, 3)
+    points = (arms + places[:, None, :, 3]).reshape(-1, 3)
+    near = mesh.tree.query(np.hstack([points, FACING * normals]), range(1, neighbors + 1))[1]
+    nearest = near[:, 0]
+    up, offsets = mesh.normals[nearest], points - mesh.centers[nearest]
+    if neighbors > 1:
+        near %= len(mesh.centers)  # where there are fewer
+        away = points[:, None] - _feet(points[:, None], mesh.triangles[near])
+        # Triangles that face the other way are of the other side of a thin wall, however near.
+        back = np.einsum("nki,ni->nk", mesh.smooth[near], normals) < 0.0
+        row, least = np.arange(len(points)), (np.linalg.norm(away, axis=2) + back).argmin(axis=1)
+        offsets = away[row, least]
+        # On the surface there is no direction to it but the normal.
+        up = offsets + TOUCHING * mesh.normals[near[row, least]]
+        up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
+    distances, up = np.sum(offsets * up, axis=1).reshape(*arms.shape[:2], 1), up.reshape(arms.shape)
+    return distances, np.concatenate([np.cross(arms, up), up], axis=2)
+
+
+def _feet(points: Array, triangles: Array) -> Array:
+    """The point of each triangle (..., 3, 3) nearest to a point (..., 3)."""
+    across, corners = _across(triangles), np.moveaxis(triangles, -2, 0)
+    edges, arms = np.roll(corners, -1, axis=0) - corners, points - corners
+    height = np.sum(arms[0] * across, axis=-1, keepdims=True)
+    below = points - height / np.sum(across**2, axis=-1, keepdims=True) * across
+    inside = (np.sum(np.cross(edges, arms) * across, axis=-1, keepdims=True) >= 0.0).all(axis=0)
+    shares = np.sum(arms * edges, axis=-1, keepdims=True) / np.sum(edges**2, axis=-1, keepdims=True)
+    feet = corners + np.clip(shares, 0.0, 1.0) * edges
+    nearest = np.sum((points - feet) ** 2, axis=-1, keepdims=True).argmin(axis=0)[None]
+    return np.where(inside, below, np.take_along_axis(feet, nearest, axis=0)[0])

@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a patch is from its contacts and from a mesh (paper, section V)."""
+
+import heapq
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arguments import Array, finite_array
+from ..contours.contour import SamplingPlane, Vector
+from ..contours.tracking import Surface, track
+from ..paper.least_squares import GRID
+from ..patch.domain import Domain
+from ..patch.geometry import Geometry, distances, fit_error, overlapped
+from ..reconstruction.result import Reconstruction
+
+EXTRA = 9  # contours, as in the paper's Fig. 3
+STEPS = 12  # Steps of such a contour in a radius.
+REACHES = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
+HAIR = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.
+
+
+def reachable(
+    geometry: Geometry, surface: Surface, vertices: ArrayLike, normals: ArrayLike
+) -> NDArray[np.intp]:
+    """Indices of the overlapped world vertices (n, 3) of `surface` that nothing hides from above."""
+    points = np.asarray(vertices, dtype=float)
+    over = overlapped(geometry, points, normals)
+    up = _vector(geometry.frame.axes[:, 2])
+    seen = [not is_hidden(surface, _vector(point), up, 2.0 * geometry.radius) for point in points[over]]
+    return over[np.array(seen, dtype=bool)]
+
+
+def verify(
+    r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
+) -> dict[str, float]:
+    """All that tells how good a patch is, as plain numbers, lengths in the caller's unit.
+
+    vertices : (n, 3), in the world, of the mesh, those that are `reachable`
+    extra : how many contours are tracked on the surface between those that were fitted
+
+    contacts, contact_distance_mean, .._median, .._max, .._rms : Euclidean distances to the patch
+    vertices, vertex_distance_mean, ... : the same, where there are vertices
+    fit_error : (6) over the contacts
+    extra_contours, extra_points, extra_fit_error : how many there are, without noise, and (6) over them;
+        the last where there are points
+    total_absolute_curvature : (8)
+    overlap : the share of the patch's area under which there is something of the surface that a finger
+        could reach, to about 0.01; the paper has no number for it
+
+    Raises ValueError for bad numbers.
+    """
+    local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
+    contours = _extra_contours(r, surface, extra)
+    points = np.concatenate([np.empty((0, 3)), *contours])
+    found = {
+        **_spread("contact", distances(r.geometry, r.contacts)),
+        **_spread("vertex", distances(r.geometry, local)),
+        "fit_error": r.fit_error,
+        "extra_contours": sum(len(contour) > 0 for contour in contours),
+        "extra_points": len(points),
+        "total_absolute_curvature": r.total_absolute_curvature,
+        "overlap": _overlap(r, surface),
+    }
+    if len(points):
+        found["extra_fit_error"] = fit_error(r.geometry, points)
+    return {"contacts": len(r.contacts), "vertices": len(local)} | found
+
+
+def _spread(name: str, misses: Array) -> dict[str, float]:
+    """Mean, median, maximum and root mean square; nothing of nothing."""
+    if not len(misses):
+        return {}
+    rms = math.sqrt(np.mean(misses**2))
+    values = {"mean": misses.mean(), "median": np.median(misses), "max": misses.max(), "rms": rms}
+    return {f"{name}_distance_{key}": float(value) for key, value in values.items()}
+
+
+def _extra_contours(r: Reconstruction, surface: Surface, count: int) -> list[Array]:
+    """Contacts (n, 3) over the domain, in the frame and without the first, of contours between the others."""
+    start = _start(r, surface)
+    if start is None:
+        return []
+    planes = [SamplingPlane(azimuth) for azimuth in _azimuths_between(r.domain, count)]
+    normal, tangent = r.frame.axes[:, 2], r.frame.axes[:, 0]
+    extent, step = 2.0 * r.radius, r.radius / STEPS  # Steep patches are followed to the rim too.
+    contours = []
+    for contour in track(surface, start, normal, planes, extent=extent, step=step, tangent=tangent):
+        local = r.frame.to_local(contour.points[(contour.points != start).any(axis=1)])
+        contours.append(local[r.domain.contains(local[:, 0], local[:, 1])])
+    return contours
+
+
+def _azimuths_between(domain: Domain, count: int) -> list[float]:
+    """`count` directions between those of the curves that end on the boundary, each where most room is."""
+    x, y = domain.ends.T
+    lines = np.sort(np.arctan2(y, x) % math.pi)
+    widths = np.diff(lines, append=lines[0] + math.pi)
+    inside = [0] * len(lines)
+    heap = [(-width, i) for i, width in enumerate(widths.tolist())]
+    heapq.heapify(heap)
+    for _ in range(count):
+        _, i = heap[0]
+        inside[i] += 1
+        heapq.heapreplace(heap, (-float(widths[i]) / (inside[i] + 1), i))
+    shares = zip(lines.tolist(), widths.tolist(), inside, strict=True)
+    return [line + width * k / (n + 1) for line, width, n in shares for k in range(1, n + 1)]
+
+
+def _start(r: Reconstruction, surface: Surface) -> Vector | None:
+    """The place of the surface nearest to the reference point along the normal; None where there is none."""
+    hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in REACHES)
+    return next((hit for hit in hits if hit is not None), None)
+
+
+def _overlap(r: Reconstruction, surface: Surface) -> float:
+    """See `verify`: rays from above onto a grid over the domain."""
+    points, _ = r.domain.grid(GRID)
+    d = r.geometry.derivatives(*points.T)
+    area = np.sqrt(1.0 + d.x**2 + d.y**2)
+    below = [_below(r, surface, (x, y, r.radius), 2.0 * r.radius) is not None for x, y in points.tolist()]
+    return float(area[below].sum() / area.sum())
+
+
+def _below(r: Reconstruction, surface: Surface, local: Vector, distance: float) -> Vector | None:
+    """Where a ray from a local point down along the normal meets what a finger can reach, in the world."""
+    up = _vector(r.frame.axes[:, 2])
+    hit = surface.ray_cast(_vector(r.frame.to_world(local)), (-up[0], -up[1], -up[2]), distance)
+    if hit is None or np.dot(hit[1], up) <= 0.0:
+        return None
+    point = _vector(hit[0])
+    return None if is_hidden(surface, point, up, 2.0 * r.radius) else point
+
+
+def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:
+    """Whether something of the surface is above the point, within `reach` along the unit `up`."""
+    (x, y, z), (ux, uy, uz), hair = point, up, HAIR * reach
+    return surface.ray_cast((x + hair * ux, y + hair * uy, z + hair * uz), up, reach) is not None
+
+
+def _vector(values: ArrayLike) -> Vector:
+    x, y, z = np.asarray(values, dtype=float).tolist()
+    return x, y, z

@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A patch, where it is now, against any mesh: the operator, and what it does."""
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, StringProperty
+
+from ... import core
+from ..probe import probe
+from ..probe.change_handlers import is_pending
+from ..probe.operators import is_unlocked, report_error, target_object
+from ..scene import mesh_data, patch_object
+from ..touch.surface import MeshSurface
+from ..touch.touch_object import reachable
+from ..touch.touch_report import judgment
+from ..touch.wording import verification_summary
+
+DISTANCE, OVERLAP = "patch_distance", "patch_overlap"  # attributes of the mesh
+NOTHING = -1.0  # the distance of a vertex that does not count
+
+
+def verify_patch(patch, target, depsgraph, write=False):
+    """Compares the patch object with the mesh object `target`; its record has the result as `verification`.
+
+    write : distance and overlap as attributes on the target, too
+
+    Raises ValueError, with a sentence and nothing changed, where that cannot be done.
+    """
+    probe.require_unlocked(patch)
+    patch_object.require_whole(patch)
+    r, surface = patch_object.reconstruction_of(patch), MeshSurface(target, depsgraph)
+    if write:
+        _require_writable(target, depsgraph)
+    indices, vertices = reachable(surface, r)
+    found = core.verify(r, surface, vertices)
+    record = patch[patch_object.RECORD]
+    points, normals = _vertices(patch.data, r, r.radius / record["radius"])
+    deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
+    mesh_data.own_mesh(patch)
+    mesh_data.write(patch.data, "deviation", "FLOAT", deviations)
+    patch_object.recolor(patch)
+    record["verification"] = {"target": target.name, **found}
+    if record["status"] != "outdated":
+        record.update(judgment(r, found.get("vertex_distance_mean", 0.0), record["ended"]))
+    if write:
+        distances = np.full(len(target.data.vertices), NOTHING)
+        distances[indices] = core.distances(r.geometry, r.frame.to_local(vertices))
+        mesh_data.write(target.data, DISTANCE, "FLOAT", distances)
+        mesh_data.write(target.data, OVERLAP, "BOOLEAN", distances != NOTHING)
+        target.data.update()
+
+
+def _vertices(mesh, r, scale):
+    """Points and unit normals of the patch's vertices, in its frame, and so many times the mesh's size."""
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", points.ravel())
+    points = scale * points.astype(float)
+    return points, r.geometry.normal(points[:, 0], points[:, 1])
+
+
+def _require_writable(target, depsgraph):
+    """Raises ValueError where the vertices that are felt have no attributes to write to."""
+    if not target.data.is_editable or target.data.is_editmode:
+        raise ValueError(
+            f'"{target.name}" cannot be changed: leave its Edit Mode, or make it local, to write on it'
+        )
+    if len(target.evaluated_get(depsgraph).data.vertices) != len(target.data.vertices):
+        raise ValueError(
+            f'The modifiers of "{target.name}" make or take away vertices: apply them to write on it'
+        )
+
+
+class TACTILE_OT_verify(bpy.types.Operator):
+    """Measure how far the active patch is from the mesh it was touched on, or from another selected mesh"""
+
+    bl_idname = "tactile.verify"
+    bl_label = "Verify Against Mesh"
+    bl_options = {"REGISTER", "UNDO"}
+
+    target: StringProperty(
+        name="Target",
+        description="Name of the mesh object to compare with; empty for the other selected mesh, or for the "
+        "one that was touched",
+    )
+    write: BoolProperty(
+        name="Write on the Mesh",
+        description="Keep the distance to the patch, and which vertices it overlaps, as attributes there",
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if probe.patch_near(context.view_layer.objects.active) is None:
+            cls.poll_message_set("Select a patch; after the mesh to compare with, if that is another one")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Leave this mode: patches are verified in Object Mode")
+            return False
+        return is_unlocked(cls, context)
+
+    def execute(self, context):
+        obj = context.view_layer.objects.active
+        found, patch = probe.probe_of(obj), probe.patch_near(obj)
+        if found is not None and is_pending(found):  # Completing it later would undo the verification.
+            probe.refresh(found, context)
+        try:
+            target = target_object(context, self.target or selected_mesh(context))
+            verify_patch(patch, target, context.evaluated_depsgraph_get(), self.write)
+        except ValueError as error:
+            return report_error(self, error)
+        record = patch[patch_object.RECORD].to_dict()
+        doubt, summary = verification_summary(record)
+        self.report({"WARNING"} if doubt else {"INFO"}, summary)
+        return {"FINISHED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop_search(self, "target", context.scene, "objects")
+        layout.prop(self, "write")
+
+
+def selected_mesh(context):
+    """The name of the selected mesh that is no result of a touch; empty for none."""
+    selected = context.view_layer.objects.selected
+    names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]
+    if len(names) > 1:
+        raise ValueError(
+            f"{len(names)} meshes are selected: select one besides the patch, or none for the one touched"
+        )
+    return names[0] if names else ""

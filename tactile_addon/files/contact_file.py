@@ -1,0 +1,321 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact data in files: CSV in and out, PLY in, JSON out. docs/contact_data.md describes the formats."""
+
+import csv
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import core
+from ...core.arguments import LARGEST
+from ..touch import units
+from . import contact_rows, whole_file
+from .contact_rows import NORMAL, POINT
+
+VERSION = 2
+TITLE = "# Tactile Patch contacts, version "
+LENGTHS = dict(units.METERS.values())  # meters in each unit
+DIRECTIONS, DEVIATIONS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
+NAMES = ("curve", "time", *POINT, *NORMAL)
+BLOCK = 1000  # rows of a .ply that are read together
+PLY_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+class Contacts(NamedTuple):
+    """What a file holds: contours, the unit it names or "", and the point and outward direction or None."""
+
+    contours: list
+    unit: str
+    point: list | None = None
+    outward: list | None = None
+
+
+def read(path):
+    """The Contacts of a .csv or .ply file; numbers as they are.
+
+    The contacts of each curve, by time where that is given, each once. Raises OSError where there is no
+    such file, ValueError with line and column where it holds no contacts.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise OSError(f'there is no file "{path}"')
+    readers = {".csv": _read_csv, ".txt": _read_csv, ".tsv": _read_csv, ".ply": _read_ply}
+    if path.suffix.lower() not in readers:
+        raise OSError(f'cannot read "{path.name}": wanted a .csv or .ply file of contacts')
+    try:
+        return readers[path.suffix.lower()](f'"{path.name}"', path)
+    except MemoryError:
+        name = f'"{path.name}"'
+        raise ValueError(f"{name}: wanted contacts that fit into memory, got more") from None
+
+
+def contacts_of(r):
+    """The Contacts that a reconstruction was fitted to: a fit of them gives the same again."""
+    noise, (origin, normal) = r.accuracy * r.radius, (r.frame.origin, r.frame.axes[:, 2])
+    contours = [replace(contour, noise=noise) for contour in r.contours]
+    return Contacts(contours, "", origin.tolist(), normal.tolist())
+
+
+def write(path, contacts):
+    """Contacts as CSV; what reads it finds the same numbers.
+
+    Normals are there where a contour has some. Comments say what else a fit takes: the reference point,
+    the outward direction, and the deviations of contacts and of normals, of all contours or of each.
+    """
+    contours, unit, point, outward = contacts
+    names = POINT + (NORMAL if any(c.normals is not None for c in contours) else ())
+    told = {"point": point, "outward": outward}
+    for key in DEVIATIONS:
+        stds = [getattr(c, key) for c in contours]
+        if any(std is not None for std in stds):
+            told[key] = stds[:1] if len(set(stds)) == 1 else stds
+    text = io.StringIO()
+    print(f"{TITLE}{VERSION}, lengths in {unit or 'no unit'}", file=text)
+    for key, values in told.items():
+        if values is not None:
+            print("#", key, *("-" if value is None else repr(value) for value in values), file=text)
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["curve", *(f"{name} [{unit}]" if unit and name in POINT else name for name in names)])
+    for number, contour in enumerate(contours, 1):
+        rows = contour.points.tolist()
+        if len(names) == 6:
+            blank = [[""] * 3] * len(rows)
+            normals = blank if contour.normals is None else contour.normals.tolist()
+            rows = [row + normal for row, normal in zip(rows, normals, strict=True)]
+        table.writerows([number, *row] for row in rows)
+    whole_file.write_text(path, text.getvalue())
+
+
+def write_patch(path, r):
+    """A reconstruction as JSON; core.from_dict reads it."""
+    whole_file.write_text(path, json.dumps(core.to_dict(r), allow_nan=False) + "\n")
+
+
+def _read_csv(name, path):
+    text = _text(name, path)
+    told = _told(name, text)
+    found = contact_rows.header_of(text)
+    if found is None:
+        raise ValueError(f"{name}: wanted a header with the columns curve, x, y, z, got an empty file")
+    header, number, start = found
+    at = f"{name}, line {number}"
+    separator = next((s for s in ";\t" if s in header), ",")
+    width, columns, unit = _columns(at, contact_rows.fields_of(at, header, separator))
+    rows = contact_rows.Rows(name, separator, width, columns)
+    for _, first, block in contact_rows.blocks(text, start, number + 1):
+        rows.add(first, block)
+    contours = rows.contours()
+    for key in DEVIATIONS:
+        stds = told.pop(key, [None])
+        stds = stds * len(contours) if len(stds) == 1 else stds
+        if len(stds) != len(contours):
+            raise ValueError(f"{name}: wanted one {key} or {len(contours)}, one a curve, got {len(stds)}")
+        contours = [_with(name, c, key, std) for c, std in zip(contours, stds, strict=True)]
+    return Contacts(contours, unit, **told)
+
+
+def _with(name, contour, key, std):
+    """The contour with that deviation; of normals only where it has some."""
+    if key == "normal_std" and contour.normals is None:
+        return contour
+    try:
+        return replace(contour, **{key: std})
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def _told(name, text):
+    """What the comments of a file of ours say besides its contacts, by key; of others nothing."""
+    if not text.startswith(TITLE):
+        return {}
+    told, start, number = {}, 0, 1
+    while text.startswith("#", start):
+        end = text.find("\n", start) + 1 or len(text)
+        at, line = f"{name}, line {number}", text[start:end]
+        if number == 1:
+            _require_version(at, line.removeprefix(TITLE).partition(",")[0].strip())
+        key, *words = line[1:].rstrip(",;\t\n ").split() or [""]  # A spreadsheet may leave separators behind.
+        if key in DIRECTIONS and len(words) != 3:
+            raise ValueError(f"{at}: wanted 3 numbers for {key}, got {len(words)}")
+        if key in DIRECTIONS:
+            told[key] = [contact_rows.number_of(f'{at}, "{key}"', word, LARGEST) for word in words]
+        elif key in DEVIATIONS:
+            told[key] = [_deviation(f'{at}, "{key}"', word) for word in words]
+        start, number = end, number + 1
+    return told
+
+
+def _deviation(at, word):
+    """A number of 0 or more; None for "-"."""
+    std = None if word == "-" else contact_rows.number_of(at, word, LARGEST)
+    if std is not None and std < 0.0:
+        raise ValueError(f"{at}: wanted a number of 0 or more, got {word[:40]}")
+    return std
+
+
+def _require_version(at, version):
+    if not version.isdecimal() or int(version) > VERSION:
+        raise ValueError(
+            f"{at}: wanted version {VERSION} or less, got {version[:40]}: this was written by a later release"
+        )
+
+
+def _text(name, path):
+    """All of a text file, with lines that end as they do here."""
+    data = path.read_bytes()
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = data.decode("utf-16", errors="replace")
+    elif b"\0" in data:
+        raise ValueError(f"{name}: wanted a text file, got bytes that are none")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _columns(at, header):
+    """How many there are, {column: its place}, and the unit of the coordinates."""
+    columns, found = {}, {}
+    for i, title in enumerate(header):
+        key, bracketed, suffix = _parts(title.lower())
+        if key not in NAMES:
+            continue
+        unit = (bracketed or suffix).replace("μ", "µ")
+        unit = "µm" if unit == "um" else unit
+        if key in POINT and unit and unit not in LENGTHS:
+            if suffix:  # Columns such as x_offset are not coordinates.
+                continue
+            raise ValueError(f'{at}: wanted a unit out of {", ".join(LENGTHS)}, got "{unit}"')
+        if key in columns:
+            raise ValueError(f'{at}: wanted one column "{key}", got two')
+        columns[key], found[key] = i, unit
+    missing = [key for key in POINT if key not in columns]
+    missing += [key for key in NORMAL if key not in columns and any(k in columns for k in NORMAL)]
+    if missing:
+        raise ValueError(f'{at}: wanted the column "{missing[0]}", got "{_shown(header)}"')
+    used = {found[key] for key in POINT}
+    if len(used) > 1:
+        raise ValueError(f"{at}: wanted x, y and z in one unit, got {' and '.join(sorted(used))}")
+    return len(header), columns, used.pop()
+
+
+def _shown(header):
+    text = ", ".join(header)
+    return text if len(text) < 60 else text[:57] + "..."
+
+
+def _parts(title):
+    """A column's name, and its unit as in "x [mm]" or as in "x_mm"; empty where it is none of these."""
+    place = next((i for i, letter in enumerate(title) if letter in "[(_"), len(title))
+    name, mark, rest = title[:place], title[place : place + 1], title[place + 1 :]
+    if mark == "_":
+        return (name, "", rest) if rest.replace("_", "0").isalnum() else ("", "", "")
+    if mark and rest[-1:] not in ("]", ")"):
+        return "", "", ""
+    return name.rstrip(), rest[:-1].strip(), ""
+
+
+def _read_ply(name, path):
+    data = path.read_bytes()
+    end = data.find(b"end_header")
+    lines = [line.split() for line in data[: max(end, 0)].decode("latin-1").splitlines()]
+    order = PLY_ORDERS.get(lines[1][1]) if len(lines) > 1 and len(lines[1]) > 1 else None
+    if not data.startswith(b"ply") or end < 0 or order is None:
+        raise ValueError(f"{name}: wanted the header of a .ply file, got another or half of one")
+    below = data.find(b"\n", end) + 1 or len(data)
+    before, count, fields = _ply_vertices(name, lines, order)
+    text = data[below:].splitlines() if lines[1][1] == "ascii" else None
+    sizes = [number * (1 if text is not None else np.dtype(kinds).itemsize) for kinds, number in before]
+    start, size = sum(sizes), 1 if text is not None else np.dtype(fields).itemsize
+    if (len(data) - below if text is None else len(text)) < start + count * size:
+        raise ValueError(f"{name}: wanted {count} contacts, got a file that ends before: is it whole?")
+    if text is None:
+        rows = np.frombuffer(data, fields, count, below + start)
+    else:
+        rows = _ply_rows(name, len(lines) + 2 + start, text[start : start + count], fields)
+    table = {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
+    points = np.column_stack([table[key] for key in POINT])
+    wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN is nowhere
+    if wild.any():
+        at = f"{name}, contact {np.argmax(wild) + 1}"
+        raise ValueError(f"{at}: wanted finite coordinates up to {LARGEST:g}, got others")
+    normals = np.column_stack([table[key] for key in NORMAL]) if set(NORMAL) <= set(table) else None
+    labels, titles = _in_order(table.get("curve", np.ones(count)))
+    return Contacts(contact_rows.contours(name, labels, points, normals, table.get("time"), titles), "")
+
+
+def _in_order(labels):
+    """Numbers from 0 in the order in which the labels first appear, and which label each stands for."""
+    titles, first, places = np.unique(labels, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return rank[places.ravel()], titles[order].tolist()
+
+
+def _ply_vertices(name, lines, order):
+    """(fields, how many) of the rows before the vertices; how many vertices there are, and their fields."""
+    elements = []
+    for line in lines[2:]:
+        try:
+            if line[:1] == ["element"]:
+                elements.append((line[1], int(line[2]), []))
+            elif line[:1] == ["property"]:
+                elements[-1][2].append(
+                    (line[-1].lower(), "list" if line[1] == "list" else PLY_TYPES[line[1]])
+                )
+        except (IndexError, ValueError, KeyError):
+            raise ValueError(f'{name}: wanted an element or a property, got "{" ".join(line)}"') from None
+    before = []
+    for element, count, properties in elements:
+        if count < 0 or any(kind == "list" for _, kind in properties):
+            break
+        fields = [(key, order + kind) for key, kind in properties]
+        if element == "vertex":
+            if not {*POINT} <= {*dict(fields)} or count < 1 or len(dict(fields)) < len(fields):
+                break
+            return before, count, fields
+        before.append((fields, count))
+    raise ValueError(f"{name}: wanted vertices with the properties x, y and z, got none of that kind")
+
+
+def _ply_rows(name, first, lines, fields):
+    """The values of lines of text, the first of them the file's line `first`."""
+    rows = np.empty(len(lines), [(key, "f8") for key, _ in fields])
+    for start in range(0, len(lines), BLOCK):
+        words = [line.decode("latin-1").split() for line in lines[start : start + BLOCK]]
+        some = rows[start : start + BLOCK]
+        try:
+            columns = list(zip(*words, strict=True))
+            for (key, _), column in zip(fields, columns, strict=True):
+                some[key] = contact_rows.numbers_of(column)
+        except ValueError:
+            _refuse_ply_row(name, first + start, words, fields)
+    return rows
+
+
+def _refuse_ply_row(name, first, words, fields):
+    """Raises ValueError for the first row that is none."""
+    for number, row in enumerate(words, first):
+        at = f"{name}, line {number}"
+        if len(row) != len(fields):
+            raise ValueError(f"{at}: wanted {len(fields)} numbers, got {len(row)}")
+        for (key, _), word in zip(fields, row, strict=True):
+            contact_rows.number_of(f'{at}, "{key}"', word)

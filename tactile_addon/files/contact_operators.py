@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured contours in and patches out: File > Import, File > Export, and files dropped into a viewport."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    StringProperty,
+)
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ..probe import probe
+from ..probe.operators import make_active, report_error
+from ..scene import patch_object
+from ..touch.settings import FitSettings, draw_solver
+from . import contact_file, measured
+
+UNITS = [
+    (
+        "FILE",
+        "From File",
+        "The unit that the columns name; where they name none, numbers are taken as they are",
+    ),
+    ("NONE", "As They Are", "Numbers are lengths of the scene, whatever the file says"),
+    *((unit, unit, f"Numbers are lengths in {unit}") for unit in contact_file.LENGTHS),
+]
+
+
+class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
+    """Rebuild the surface patch that measured contours show"""
+
+    bl_idname = "tactile.import_contacts"
+    bl_label = "Import Contact Data"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.ply", options={"HIDDEN"})
+    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
+    unit: EnumProperty(name="Unit", description="What the numbers of the file measure", items=UNITS)
+    use_point: BoolProperty(
+        name="Given Reference Point",
+        description="Not the point nearest to all curves",
+        options={"SKIP_PRESET"},
+    )
+    point: FloatVectorProperty(
+        name="Reference Point",
+        subtype="TRANSLATION",
+        description="Where the curves meet, exact; in units of the scene",
+        options={"SKIP_PRESET"},
+    )
+    use_outward: BoolProperty(
+        name="Given Outward Direction",
+        description="Not the mean of the normals, nor the side to which the surface bulges",
+        options={"SKIP_PRESET"},
+    )
+    outward: FloatVectorProperty(
+        name="Outward",
+        subtype="XYZ",
+        description="A direction on the outer side of the surface",
+        default=(0.0, 0.0, 1.0),
+        options={"SKIP_PRESET"},
+    )
+    flip: BoolProperty(name="Flip", description="The other side is the outer one")
+    noise: FloatProperty(
+        name="Noise",
+        subtype="DISTANCE",
+        description="Standard deviation of a contact, in units of the scene; 0 where it is not known",
+        min=0.0,
+        precision=4,
+    )
+    normal_std: FloatProperty(
+        name="Normal Deviation",
+        subtype="ANGLE",
+        description="Standard deviation of measured normals, which are then fitted; 0 to leave them out",
+        min=0.0,
+        soft_max=0.5,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+    def invoke(self, context, event):
+        return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.
+
+    def execute(self, context):
+        paths = [str(Path(self.directory) / file.name) for file in self.files if file.name] or [self.filepath]
+        try:
+            contacts = measured.read(paths, self.unit, context.scene.unit_settings.scale_length)
+            touched = measured.fit(
+                Path(paths[0]).name,
+                contacts,
+                point=self._given("point"),
+                outward=self._given("outward"),
+                flip=self.flip,
+                noise=self.noise,
+                normal_std=self.normal_std,
+                method=self.method,
+                degree=self.degree or "auto",
+                weight=self.weight,
+                solver=self.solver,
+            )
+        except (OSError, ValueError) as error:
+            return report_error(self, error)
+        make_active(context, patch_object.insert(context.scene, touched))
+        result, report = touched.result, touched.report
+        summary = (
+            f"{report['message']} Curvatures {result.patch.k1:.4g} and {result.patch.k2:.4g}, "
+            f"{report['contacts']} contacts missed by {result.fit_error:.3g} in the mean"
+        )
+        if "misses" in report:
+            summary += f", their common point by {max(report['misses']):.3g} at most"
+        self.report({"INFO"} if result.status == "ok" else {"WARNING"}, summary)
+        return {"FINISHED"}
+
+    def _given(self, name):
+        """The vector, where its box is ticked or, by a script, it is set."""
+        use = f"use_{name}"
+        given = (
+            getattr(self, use)
+            if self.properties.is_property_set(use)
+            else self.properties.is_property_set(name)
+        )
+        return list(getattr(self, name)) if given else None
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(self, "unit")
+        for name in ("point", "outward"):
+            layout.prop(self, f"use_{name}")
+            if getattr(self, f"use_{name}"):
+                layout.prop(self, name)
+        for name in ("flip", "noise", "normal_std"):
+            layout.prop(self, name)
+        draw_solver(layout, self)
+
+
+class _PatchExport(ExportHelper):
+    """Mixed into what writes the active patch, which may be active by its probe or contours."""
+
+    @classmethod
+    def poll(cls, context):
+        if probe.patch_near(context.view_layer.objects.active) is None:
+            cls.poll_message_set("Select a patch, its probe or its contours first")
+            return False
+        return True
+
+    def invoke(self, context, event):
+        if not self.filepath:
+            patch = probe.patch_near(context.view_layer.objects.active)
+            self.filepath = bpy.path.clean_name(patch.name) + self.filename_ext
+        return super().invoke(context, event)
+
+    def execute(self, context):
+        try:
+            self.write(probe.patch_near(context.view_layer.objects.active))
+        except (OSError, ValueError) as error:
+            return report_error(self, error)
+        self.report({"INFO"}, f'Wrote "{Path(self.filepath).name}"')
+        return {"FINISHED"}
+
+
+class TACTILE_OT_export_contacts(_PatchExport, bpy.types.Operator):
+    """Write the contacts of the active patch as CSV, in the scene's units"""
+
+    bl_idname = "tactile.export_contacts"
+    bl_label = "Export Contacts"
+    filename_ext = ".csv"
+    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+
+    def write(self, patch):
+        r = patch_object.reconstruction_of(patch)
+        contact_file.write(self.filepath, contact_file.contacts_of(r))
+
+
+class TACTILE_OT_export_patch(_PatchExport, bpy.types.Operator):
+    """Write the active patch as JSON: polynomial, frame, domain, covariance; as core.from_dict reads it"""
+
+    bl_idname = "tactile.export_patch"
+    bl_label = "Export Patch"
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def write(self, patch):
+        contact_file.write_patch(self.filepath, patch_object.reconstruction_of(patch))
+
+
+class TACTILE_FH_contacts(bpy.types.FileHandler):
+    bl_idname = "TACTILE_FH_contacts"
+    bl_label = "Contact Data"
+    bl_import_operator = TACTILE_OT_import_contacts.bl_idname
+    bl_file_extensions = ".csv;.ply"
+
+    @classmethod
+    def poll_drop(cls, context):
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+def draw_import(self, context):
+    self.layout.operator(TACTILE_OT_import_contacts.bl_idname, text="Contact Data (.csv, .ply)")
+
+
+def draw_export(self, context):
+    self.layout.operator(TACTILE_OT_export_contacts.bl_idname, text="Tactile Contacts (.csv)")
+    self.layout.operator(TACTILE_OT_export_patch.bl_idname, text="Tactile Patch (.json)")
+
+
+CLASSES = (
+    TACTILE_OT_import_contacts,
+    TACTILE_OT_export_contacts,
+    TACTILE_OT_export_patch,
+    TACTILE_FH_contacts,
+)
+MENUS = (("TOPBAR_MT_file_import", draw_import), ("TOPBAR_MT_file_export", draw_export))

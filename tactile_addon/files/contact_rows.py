@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows of contacts as arrays: many at once, and one by one where something is to be said of one."""
+
+import csv
+import math
+
+import numpy as np
+
+from ... import core
+from ...core.arguments import LARGEST
+
+POINT, NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
+BLOCK = 1 << 16  # letters that are looked at together
+MIX = np.array([1.0, math.pi, math.e])  # makes one number of a point, which few others share
+
+
+def blocks(text, start=0, number=1):
+    """(place, line number, some lines in one string) from that place on, but for what is empty."""
+    while start < len(text):
+        end = text.find("\n", start + BLOCK) + 1 or len(text)
+        block = text[start:end]
+        if not block.isspace():
+            yield start, number, block
+        number += block.count("\n")
+        start = end
+
+
+def header_of(text):
+    """The first line that says something, its number, and the place of the next; None without one."""
+    for start, number, block in blocks(text):
+        for line in block.split("\n"):
+            if _says(line):
+                return line, number, start + len(line) + 1
+            number += 1
+            start += len(line) + 1
+    return None
+
+
+def _says(line):
+    words = line.lstrip()
+    return bool(words) and not words.startswith("#")
+
+
+class Rows:
+    """The rows of a table as they are added; `contours` makes curves of all of them.
+
+    columns : the place of each column that counts
+    """
+
+    def __init__(self, name, separator, width, columns):
+        self._name, self._separator, self._width, self._columns = name, separator, width, columns
+        self._keys = [key for key in (*POINT, *NORMAL, "time") if key in columns]
+        self._curves, self._measured = {}, {}  # curves by their labels, and whether they have normals
+        self._numbers, self._labels = [np.empty((0, len(self._keys)))], [np.empty(0, dtype=np.intp)]
+
+    def add(self, number, block):
+        """Lines, the first of that number. Raises ValueError with line and column where one is no contact."""
+        try:
+            labels, numbers = self._together(block)
+        except (ValueError, csv.Error):  # a blank or short row, a missing normal, or something to refuse
+            labels, numbers = self._one_by_one(number, block)
+        ids = [self._curves.setdefault(label, len(self._curves)) for label in labels]
+        self._labels.append(np.array(ids, dtype=np.intp))
+        self._numbers.append(numbers)
+
+    def contours(self):
+        numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
+        if not len(numbers):
+            raise ValueError(f"{self._name}: wanted contacts below the header, got none")
+        normals = numbers[:, 3:6] if "nx" in self._columns else None
+        return contours(
+            self._name,
+            labels,
+            numbers[:, :3],
+            normals,
+            numbers[:, -1] if "time" in self._columns else None,
+            list(self._curves),
+        )
+
+    def _together(self, block):
+        """Labels, and numbers (n, k), of rows that are all as most are. Raises ValueError elsewhere."""
+        lines = filter(_says if "#" in block else str.strip, block.split("\n"))
+        if '"' in block:
+            rows = [next(csv.reader([line], delimiter=self._separator)) for line in lines]
+        else:
+            rows = [line.split(self._separator) for line in lines]
+        columns = list(zip(*rows, strict=True))
+        if rows and len(columns) != self._width:
+            raise ValueError
+        labels = ["1"] * len(rows)
+        if "curve" in self._columns and rows:
+            labels = list(map(str.strip, columns[self._columns["curve"]]))
+        numbers = np.empty((len(rows), len(self._keys)))
+        for i, key in enumerate(self._keys if rows else ()):
+            numbers[:, i] = numbers_of(columns[self._columns[key]])
+        measured, distinct = "nx" in self._columns, set(labels)
+        mixed = any(self._measured.setdefault(label, measured) is not measured for label in distinct)
+        if mixed or "" in distinct or np.abs(numbers[:, :3]).max(initial=0.0) > LARGEST:
+            raise ValueError
+        return labels, numbers
+
+    def _one_by_one(self, number, block):
+        labels, numbers = [], []
+        for place, line in enumerate(block.split("\n"), number):
+            at = f"{self._name}, line {place}"
+            fields = fields_of(at, line, self._separator) if _says(line) else []
+            if any(fields):
+                label, values = self._row(at, fields)
+                labels.append(label)
+                numbers.append(values)
+        return labels, np.array(numbers).reshape(-1, len(self._keys))
+
+    def _row(self, at, fields):
+        if any(fields[self._width :]):
+            raise ValueError(
+                f"{at}: wanted {self._width} fields, got {len(fields)}: decimal commas need semicolons or "
+                "tabs between the fields"
+            )
+        row = {key: fields[i] if i < len(fields) else "" for key, i in self._columns.items()}
+        label = row.get("curve", "1")
+        if not label:
+            raise ValueError(f'{at}: wanted a number or a name in the column "curve", got none')
+        values = [self._value(at, row, key) for key in POINT]
+        measured = "nx" in row and any(row[key] for key in NORMAL)
+        if measured is not self._measured.setdefault(label, measured):
+            raise ValueError(f"{at}: wanted normals all along a curve or nowhere, got some")
+        if "nx" in row:
+            values += [self._value(at, row, key) if measured else math.nan for key in NORMAL]
+        return label, [*values, *([self._value(at, row, "time")] if "time" in row else [])]
+
+    def _value(self, at, row, key):
+        return number_of(f'{at}, column "{key}"', row[key], LARGEST if key in POINT else math.inf)
+
+
+def contours(name, labels, points, normals, times, titles):
+    """One a label 0, 1, ..., which `titles` names: its contacts, by time where there is one, each once.
+
+    normals : (n, 3), NaN all along a curve without any; None for none at all
+    """
+    order = np.argsort(labels, kind="stable") if times is None else np.lexsort((times, labels))
+    # A sensor at rest writes one contact many times: it is no more certain for that.
+    order = order[_first(labels[order], points[order])]
+    found = []
+    for rows in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
+        some = normals is not None and not np.isnan(normals[rows[0]]).all()
+        try:
+            found.append(core.Contour(points[rows], normals=normals[rows] if some else None))
+        except ValueError as error:
+            at = f'{name}, curve "{titles[labels[rows[0]]]}"'
+            raise ValueError(f"{at}: {error}") from None
+    return found
+
+
+def _first(labels, points):
+    """Which rows are the first of that label and point."""
+    first = np.ones(len(labels), dtype=bool)
+    mixed = np.sort(points @ MIX)
+    if (mixed[1:] == mixed[:-1]).any():  # Two separators that are alike mix nothing.
+        keys = labels, *points.T
+        like = np.lexsort(keys)
+        first[like[1:]] = np.any([key[like[1:]] != key[like[:-1]] for key in keys], axis=0)
+    return first
+
+
+def fields_of(at, line, separator):
+    try:
+        (fields,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
+    except csv.Error:
+        raise ValueError(f"{at}: wanted fields of some letters, got a longer one") from None
+    return [field.strip() for field in fields]
+
+
+def numbers_of(texts):
+    """Numbers of many words, decimal commas or not. Raises ValueError where one is none."""
+    if "_" in "".join(texts):  # which Python would overlook
+        raise ValueError
+    try:
+        numbers = np.fromiter(map(float, texts), float, len(texts))
+    except ValueError:
+        plain = (text.replace(",", ".") if "." not in text else text for text in texts)
+        numbers = np.fromiter(map(float, plain), float, len(texts))
+    if not np.isfinite(numbers).all():
+        raise ValueError
+    return numbers
+
+
+def number_of(at, text, largest=math.inf):
+    """The number of one word, which is `at` that place. Raises ValueError for none, or beyond +-`largest`."""
+    try:
+        (value,) = numbers_of([text])
+    except ValueError:
+        raise ValueError(f'{at}: wanted a number, got "{text[:40]}"') from None
+    if abs(value) > largest:
+        raise ValueError(
+            f'{at}: wanted numbers up to {largest:g}, got "{text[:40]}": take another unit of length'
+        )
+    return float(value)

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured contours, from files to a reconstruction and its report; nothing in the scene changes."""
+
+import math
+from dataclasses import replace
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+
+from ... import core
+from ..touch.single_precision import require_single
+from ..touch.touch_object import Touch, reference_axes
+from ..touch.touch_report import measures, reconstruction_report, suggestion_report
+from . import contact_file
+
+FLAT = 0.02  # Least |k1 + k2| in unit radius: a surface with less bulges to no side.
+
+
+def read(paths, unit, meters):
+    """The contact_file.Contacts of files whose curves belong together, in a world of so many meters a unit.
+
+    unit : of the numbers, as in contact_file.LENGTHS; "FILE" for what each file names; "NONE" to take
+        them as they are, as those of a file that names none are taken.
+
+    Raises ValueError where files name different reference points, and what contact_file.read raises.
+    """
+    contours, points, directions, found = [], [], [], "" if unit in ("FILE", "NONE") else unit
+    for path in paths:
+        curves, named, point, outward = contact_file.read(path)
+        named = {"FILE": named, "NONE": ""}.get(unit, unit)
+        factor = contact_file.LENGTHS[named] / meters if named else 1.0
+        # 1 / 0.1 and the like are not exact: a file in the world's unit stays as it is.
+        factor = 1.0 if math.isclose(factor, 1.0, rel_tol=1e-6) else factor
+        contours += [_scaled(curve, factor) for curve in curves]
+        points += [] if point is None else [[factor * x for x in point]]
+        directions += [] if outward is None else [outward]
+        found = named or found
+    if any(not np.allclose(point, points[0], rtol=1e-12, atol=0.0) for point in points):
+        raise ValueError("The files name different reference points: import each of them by itself")
+    point, outward = (given[0] if given else None for given in (points, directions))
+    return contact_file.Contacts(contours, found, point, outward)
+
+
+def _scaled(curve, factor):
+    noise = None if curve.noise is None else factor * curve.noise
+    return replace(curve, points=factor * curve.points, noise=noise)
+
+
+def fit(source, contacts, *, point=None, outward=None, flip=False, noise=0.0, normal_std=0.0, **options):
+    """The patch that contact_file.Contacts show, as a Touch without a surface.
+
+    point : where the curves meet, exact; None for that of the file, or core.common_point
+    outward : None for that of the file or the mean of the normals, or where there are none for the side to
+        which the surface bulges, +z where it is flat; `flip` takes the other
+    noise, normal_std : in the contours' unit and in radians; 0 for those of the file. Where it has none
+        either, normals are not fitted
+    options : what else core.reconstruct takes
+
+    Raises ValueError with a sentence for the user.
+    """
+    try:
+        return _fit(source, contacts, point, outward, flip, noise, normal_std, options)
+    except MemoryError:
+        raise ValueError("There are more contacts than fit into memory: take fewer of them") from None
+
+
+def _fit(source, contacts, point, outward, flip, noise, normal_std, options):
+    start = perf_counter()
+    contours, unit, of_file, up = contacts
+    point = of_file if point is None else point
+    outward = up if outward is None else outward
+    if normal_std:
+        contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
+    distances = None
+    if point is None:
+        point, distances = core.common_point(contours)
+    contours = [core.in_running_order(contour, point) for contour in contours]
+    reconstruct = partial(core.reconstruct, point, contours, noise=noise or None, **options)
+    result = reconstruct(outward=_mean_normal(contours) if outward is None else outward)
+    bulges = (result.patch.k1 + result.patch.k2) * result.radius
+    unknown = outward is None and not any(c.normals is not None for c in contours)
+    if flip is not (unknown and bulges > FLAT):
+        result = reconstruct(outward=-result.frame.axes[:, 2])
+    require_single(result)
+    seconds, axes = perf_counter() - start, reference_axes(result.frame.axes[:, 2])
+    report = {
+        "source": source,
+        "method": options["method"],
+        "degree": result.patch.degree,
+        **reconstruction_report(result),
+        "unit": unit,
+        "curves": len(contours),
+        "axes": axes.tolist(),
+        "vertices": 0,
+        **measures(result),
+        "suggested_plane": suggestion_report(result, axes),
+        "seconds": {"fit": seconds},
+    }
+    if distances is not None:
+        report["misses"] = distances.tolist()
+    return Touch(None, result, report)
+
+
+def _mean_normal(contours):
+    """The mean of all normals that were measured; +z without any."""
+    normals = [contour.normals for contour in contours if contour.normals is not None]
+    mean = np.sum(np.vstack(normals), axis=0) if normals else np.zeros(3)
+    return mean if mean.any() else np.array([0.0, 0.0, 1.0])

@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenes and meshes in files, by Blender's own importers and exporter, without a window."""
+
+import sys
+
+import bpy
+import numpy as np
+
+from . import contact_file, whole_file
+
+HEADER = 1 << 16  # bytes in which that of a .ply comes to its end
+INCOMPLETE = "Blender has not written all of it"
+
+
+def open_file(path):
+    """Makes the file the scene: opens a .blend, imports a mesh into an empty one, coordinates as they are."""
+    if path.suffix.lower() == ".blend" and path.is_file():
+        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
+    else:
+        add(path, empty=True)
+
+
+def add(path, empty=False):
+    """Adds the mesh of a .ply, .stl or .obj file to the scene, or to an empty one; returns its object.
+
+    Raises OSError with a sentence for the user.
+    """
+    if not path.is_file():
+        raise OSError(f'there is no file "{path}"')
+    full, kind = str(path.absolute()), path.suffix.lower()
+    imports = {
+        ".ply": lambda: bpy.ops.wm.ply_import(filepath=full),
+        ".stl": lambda: bpy.ops.wm.stl_import(filepath=full),
+        ".obj": lambda: bpy.ops.wm.obj_import(filepath=full, forward_axis="Y", up_axis="Z"),
+    }
+    if kind not in imports:
+        raise OSError(f'cannot read "{path.name}": wanted a .blend, .ply, .stl or .obj file')
+    if empty:
+        bpy.ops.wm.read_homefile(use_empty=True)
+    unreadable, there = f'no mesh could be read from "{path.name}": is the file whole?', set(bpy.data.objects)
+    if kind == ".ply" and not _has_header(path):
+        raise OSError(unreadable)
+    try:
+        # Importers ask for a window, which is not the current one after `blender -b`.
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            imports[kind]()
+    except RuntimeError as error:
+        raise OSError(unreadable) from error
+    for obj in set(bpy.data.objects) - there:
+        if obj.type == "MESH" and len(obj.data.polygons):
+            return obj
+    raise OSError(unreadable)
+
+
+def _has_header(path):
+    """Whether the header of a .ply file comes to its end; where it does not, the importer ends Blender."""
+    with path.open("rb") as file:
+        return b"end_header" in file.read(HEADER)
+
+
+def write(path, obj):
+    """The mesh of an object without modifiers, with its attributes, as .ply.
+
+    Raises OSError, as save_scene does, with a sentence and the old file as it was.
+    """
+    with whole_file.replacing(path) as temporary:
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(selected_objects=[obj], window=window):
+            bpy.ops.wm.ply_export(
+                filepath=str(temporary),
+                export_selected_objects=True,
+                export_attributes=True,
+                export_uv=False,  # whose seams would split vertices
+            )
+        # On a full disk the exporter says that all is well.
+        if temporary.stat().st_size < _size_of_ply(temporary, obj.data):
+            raise OSError(INCOMPLETE)
+
+
+def save_scene(path):
+    """The open scene as .blend."""
+    with whole_file.replacing(path) as temporary:
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
+        except RuntimeError as error:  # Blender says of a full disk that there is no such file.
+            raise OSError(INCOMPLETE) from error
+        if not _is_whole_blend(temporary):  # Blender 5.2 says of a full disk that all is well
+            raise OSError(INCOMPLETE)
+
+
+def _is_whole_blend(path):
+    """Whether the file ends as one: compressed with the magic number of its frames' table, else with ENDB."""
+    with path.open("rb") as file:
+        start = file.read(4)
+        file.seek(max(0, path.stat().st_size - 64))
+        end = file.read()
+    return end.endswith(b"\xb1\xea\x92\x8f") if start == b"\x28\xb5\x2f\xfd" else b"ENDB" in end
+
+
+def _size_of_ply(path, mesh):
+    """How many bytes its header promises, of the faces of `mesh`; more than any file has without one."""
+    with path.open("rb") as file:
+        head, end, _ = file.read(HEADER).partition(b"end_header\n")
+    if not end:
+        return sys.maxsize
+    size, count = len(head) + len(end), 0
+    for words in map(str.split, head.decode("latin-1").splitlines()):
+        if words[0] == "element":
+            count = int(words[2])
+        elif words[:2] == ["property", "list"]:
+            size += count + 4 * len(mesh.loops)
+        elif words[0] == "property":
+            size += count * np.dtype(contact_file.PLY_TYPES[words[1]]).itemsize
+    return size

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files are written whole or not at all: beside the old one, which they then replace."""
+
+import os
+import secrets
+import shutil
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+
+@contextmanager
+def replacing(path):
+    """The path of a file that takes the place of `path` once it is written, that is at the end of the block.
+
+    Raises OSError, with a sentence, where that fails: the old file is then as it was, and nothing is
+    beside it.
+    """
+    require_file(path)
+    try:
+        target = Path(path).resolve()  # A link stands for what it points to.
+    except RuntimeError as error:  # links that point to each other
+        raise OSError(f'cannot write "{Path(path).name}" ({error}): choose another place') from error
+    temporary = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}{target.suffix[:40]}")
+    try:
+        yield temporary
+        with temporary.open("rb+") as file:
+            os.fsync(file.fileno())
+        if target.exists():
+            shutil.copymode(target, temporary)
+        os.replace(temporary, target)
+    except OSError as error:
+        raise OSError(
+            f'cannot write "{target.name}" ({error.strerror or error}): '
+            "make room there, or choose another place"
+        ) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def write_text(path, text):
+    """The text in UTF-8, lines ended as they are, as the file `path`."""
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        file.write(text)
+
+
+def require_file(path):
+    """Raises OSError for a folder, a device or a pipe, in whose place there can be no file."""
+    if Path(path).exists() and not Path(path).is_file():
+        raise OSError(f'"{path}" is no file that could be replaced: choose the name of one')

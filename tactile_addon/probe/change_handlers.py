@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live probes: what looks after every change whether a patch is still that of its probe's inputs.
+
+A depsgraph handler, for Blender has no callback for an object that moves. In a window it does the quick
+part at once, and a timer what is dear, once the gesture has ended; without a window all of it at once.
+"""
+
+from contextlib import suppress
+from time import perf_counter
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..scene import patch_object
+from ..scene.family import remembered
+from .probe import (
+    forget_targets,
+    is_free,
+    is_outdated,
+    is_probe,
+    may_be_outdated,
+    measure_shape,
+    patch_of,
+    probe_of,
+    record_of,
+    targets,
+    update,
+)
+
+SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
+SLICE = 0.2  # seconds of work between two events, in a window
+GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
+
+_deleted = set()  # session_uids
+_unsure = True  # whether any patch may be another than its inputs ask for, as after undo
+
+
+@persistent
+def on_depsgraph_update(scene, depsgraph):
+    """Brings the patches of outdated live probes up to date; nothing happens where no input has changed."""
+    if not targets() or depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
+        return
+    with remembered():
+        concerned = _concerned(depsgraph)
+        if not concerned:
+            return
+        reshaped = {u.id.original: None for u in depsgraph.updates if u.is_updated_geometry}
+        moved = {u.id.original for u in depsgraph.updates if u.is_updated_transform}
+        end = perf_counter() + SLICE
+        for probe in filter(is_free, concerned):
+            _look_at(probe, depsgraph, reshaped, moved, bpy.app.background or perf_counter() < end)
+
+
+def _look_at(probe, depsgraph, reshaped, moved, in_time):
+    """Brings one up to date; where there is no time for that now, once the gesture has ended."""
+    settings = probe.tactile_probe
+    _forget_deleted(probe)
+    measure_shape(settings, depsgraph, reshaped)
+    patch = patch_of(probe)
+    outdated = is_outdated(probe, depsgraph)
+    if outdated and settings.live and in_time:
+        update(probe, depsgraph, complete=bpy.app.background)
+    elif patch is not None and (outdated or probe in moved):  # on its way back, or scaled
+        patch_object.hold(patch)
+    if not bpy.app.background and (is_pending(probe) or (outdated and settings.live and not in_time)):
+        _settle_soon()
+
+
+@persistent
+def on_blend_import(imported):
+    """Has a probe that was appended without its patch touch again; a linked one is its own file's."""
+    on_other_data()
+    for item in imported.import_items:
+        if isinstance(item.id, bpy.types.Object) and is_probe(item.id) and item.id.library is None:
+            item.id.tactile_probe.digest = ""
+
+
+@persistent
+def on_other_data(*_):
+    """After a file was opened, or undo: any probe may be there, and any patch may be another."""
+    global _unsure
+    forget_targets()
+    _unsure = True
+
+
+def _concerned(depsgraph):
+    """The probes that something has happened to: to them, their patch or target, or to what is there."""
+    global _unsure
+    updates, known, unsure = depsgraph.updates, targets(), _unsure
+    # Where an object comes or goes, all others are among the updates too, with none of these two.
+    updated = {u.id.original for u in updates if u.is_updated_geometry or u.is_updated_transform}
+    objects = [datablock for datablock in updated if isinstance(datablock, bpy.types.Object)]
+    owners = {probe_of(obj) for obj in objects} - {None}
+    scene = unsure or any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
+    if not (scene or owners or any(obj.session_uid in known for obj in objects)):
+        return []
+    _unsure = False
+    there = set(depsgraph.view_layer.objects)
+    found = [obj for obj in there if is_probe(obj)]
+    if scene and not found:
+        forget_targets()  # the last one may have been deleted
+    return [
+        obj
+        for obj in sorted(found, key=lambda probe: probe.name)
+        if unsure
+        or obj in owners
+        or obj.tactile_probe.target in updated
+        or (scene and may_be_outdated(obj, there))
+    ]
+
+
+def _forget_deleted(probe):
+    """A target that was deleted lives on as long as the probe points to it: lets go, so that it is gone."""
+    settings, record = probe.tactile_probe, record_of(probe)
+    target = settings.target
+    # One that has never been touched is a script's, which may be about to put it into the scene.
+    # A library's is not deleted by being in no scene of this file.
+    if target is None or target.users_scene or not target.is_editable:
+        return
+    if record is None or record["source"] != target.name:
+        return
+    settings.property_unset("target")
+    if not target.users:  # A handler may not delete what is being evaluated.
+        _deleted.add(target.session_uid)
+        # Without a window no timer runs, and one that is left keeps Blender's module from ending.
+        if not bpy.app.background and not bpy.app.timers.is_registered(_remove_deleted):
+            bpy.app.timers.register(_remove_deleted)
+
+
+def _remove_deleted():
+    """Takes away the objects that were deleted and that no probe points to any more; a timer."""
+    for obj in [obj for obj in bpy.data.objects if obj.session_uid in _deleted and not obj.users]:
+        bpy.data.objects.remove(obj)
+    _deleted.clear()
+
+
+def is_pending(probe):
+    """Whether what is dear is still to be filled in."""
+    record = record_of(probe)
+    return record is not None and not probe.tactile_probe.message and not record["is_verified"]
+
+
+def _settle_soon():
+    if bpy.app.timers.is_registered(_settle):
+        bpy.app.timers.unregister(_settle)
+    bpy.app.timers.register(_settle, first_interval=SETTLE)
+
+
+def _settle():
+    """Completes what the gesture has left, once it has ended, some at a time; a timer."""
+    windows = bpy.context.window_manager.windows
+    running = [operator.bl_idname for window in windows for operator in window.modal_operators]
+    if bpy.app.is_job_running("RENDER") or any(name.startswith(GESTURES) for name in running):
+        return SETTLE
+    end = perf_counter() + SLICE
+    for window in windows:
+        with bpy.context.temp_override(window=window), remembered():
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            for probe in filter(is_probe, list(window.view_layer.objects)):
+                late = probe.tactile_probe.live and is_outdated(probe, depsgraph)
+                if (late or is_pending(probe)) and is_free(probe):
+                    update(probe, depsgraph, complete=True)
+                    if perf_counter() > end:
+                        return 0.01
+    return None
+
+
+HANDLERS = {
+    "depsgraph_update_post": on_depsgraph_update,
+    "blend_import_post": on_blend_import,
+    "load_post": on_other_data,
+    "undo_post": on_other_data,
+    "redo_post": on_other_data,
+}
+
+
+def register():
+    on_other_data()
+    for name, handler in HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister():
+    for timer in filter(bpy.app.timers.is_registered, (_settle, _remove_deleted)):
+        bpy.app.timers.unregister(timer)
+    for name, handler in HANDLERS.items():
+        with suppress(ValueError):  # another script may have taken it away
+            getattr(bpy.app.handlers, name).remove(handler)

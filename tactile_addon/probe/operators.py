@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator behind the menu entry, the scripts and the command line."""
+
+import bpy
+from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
+
+from ..scene import patch_object
+from ..stability_map import map_object
+from ..touch.settings import TouchSettings, draw_all, touch_arguments
+from ..touch.touch_object import touch, verify
+from ..touch.wording import sentence
+from .probe import lock_of, record_of
+
+
+class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
+    """Feel the surface along curves through a point and rebuild the patch around it"""
+
+    bl_idname = "tactile.reconstruct"
+    bl_label = "Fit Tactile Patch"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    target: StringProperty(
+        name="Target",
+        description="Name of the mesh object to touch; empty for the active object",
+        options={"SKIP_PRESET"},
+    )
+    location: FloatVectorProperty(
+        name="Location",
+        subtype="TRANSLATION",
+        description="Where to touch; the 3D cursor where it is not set",
+        options={"SKIP_PRESET"},
+    )
+    outward: FloatVectorProperty(
+        name="Outward",
+        subtype="XYZ",
+        description="The outward direction there; the surface's own where it is not set",
+        options={"SKIP_PRESET"},
+    )
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="Add planes until the height is good to this, where it is set, or no plane would help",
+        subtype="DISTANCE",
+        soft_min=0.0,
+        options={"SKIP_PRESET"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene is not None
+
+    def execute(self, context):
+        given = self.properties.is_property_set
+        depsgraph = context.evaluated_depsgraph_get()
+        try:
+            obj = target_object(context, self.target)
+            touched = touch(
+                obj,
+                depsgraph,
+                list(self.location) if given("location") else list(context.scene.cursor.location),
+                outward=list(self.outward) if given("outward") else None,
+                tolerance=self.tolerance if given("tolerance") else None,
+                **touch_arguments(self),
+            )
+        except ValueError as error:
+            return report_error(self, error)
+        touched = verify(touched)
+        patch = patch_object.insert(context.scene, touched)
+        make_active(context, patch)
+        result, report = touched.result, touched.report
+        summary = (
+            f"{report['message']} Curvatures {result.patch.k1:.4g} and {result.patch.k2:.4g}, "
+            f"{report['contacts']} contacts missed by {result.fit_error:.3g} in the mean"
+        )
+        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
+        return {"FINISHED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "target")
+        # Where they are not set, the cursor and the surface decide: zeros would say otherwise.
+        for name in filter(self.properties.is_property_set, ("location", "outward")):
+            layout.prop(self, name)
+        draw_all(layout, self)
+        given = self.properties.is_property_set("tolerance")
+        layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
+
+
+def report_error(operator, error):
+    operator.report({"ERROR"}, sentence(error))
+    return {"CANCELLED"}
+
+
+def target_object(context, name):
+    """The object to touch: by name, or the active one, or what the active patch or map was touched on."""
+    obj = context.view_layer.objects.active
+    record = record_of(obj) or (obj and obj.get(map_object.RECORD))
+    if not name and record is not None:
+        name = record["source"]
+    if name:
+        obj = bpy.data.objects.get(name)
+    if obj is None:
+        raise ValueError(
+            f'There is no object "{name}" in the scene: name one of its mesh objects'
+            if name
+            else "No object is active: select the mesh object to touch"
+        )
+    return obj
+
+
+def is_unlocked(operator, context):
+    """For its poll: whether the probe or patch near the active object can be changed; says so where not."""
+    lock = lock_of(context.view_layer.objects.active)
+    if lock is not None:
+        operator.poll_message_set(lock)
+    return lock is None
+
+
+def make_active(context, obj):
+    """Selects the new object alone; unless that would leave an edit mode, or its collection is excluded."""
+    context.view_layer.update()  # after `blender -b FILE -c` it would not know the new object yet
+    objects = context.view_layer.objects
+    if context.mode != "OBJECT" or obj.name not in objects:
+        return
+    for selected in list(objects.selected):
+        selected.select_set(False)
+    obj.select_set(True)
+    objects.active = obj

@@ -1,0 +1,200 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons of the panels besides picking: planes, another touch, deletion, and a viewport with colors."""
+
+import math
+
+import bpy
+from bpy.props import FloatProperty, IntProperty
+
+from ..scene import patch_object
+from ..touch import units
+from ..touch.settings import MOST_PLANES
+from ..touch.wording import added_planes
+from . import probe
+from .operators import is_unlocked, report_error
+
+
+class _ProbeOperator:
+    """Mixed into operators on the active probe, which may be active by its patch or contours."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if probe.probe_of(context.view_layer.objects.active) is None:
+            cls.poll_message_set("Select a probe, or pick a reference point first")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Leave this mode: probes are changed in Object Mode")
+            return False
+        return is_unlocked(cls, context)
+
+
+class _PlaneOperator(_ProbeOperator):
+    """Mixed into operators that add planes."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == MOST_PLANES:
+            cls.poll_message_set("Six planes are the most: remove one first")
+            return False
+        return True
+
+
+class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
+    """Feel along one more plane: the one that tells most of what is still open"""
+
+    bl_idname = "tactile.add_plane"
+    bl_label = "Add Suggested Plane"
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        record = probe.record_of(found)
+        _add(found.tactile_probe, None if record is None else record.get("suggested_plane"))
+        probe.refresh(found, context)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
+    """Feel along more planes, each time the one that tells most, until it is enough or none would help"""
+
+    bl_idname = "tactile.add_planes"
+    bl_label = "Add Planes While They Help"
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="Standard deviation of the height that is good enough; 0 to go on while a plane helps",
+        subtype="DISTANCE",
+        soft_min=0.0,
+    )
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        depsgraph = context.evaluated_depsgraph_get()
+        try:
+            touched = probe.touch_at(found, depsgraph, complete=True, tolerance=self.tolerance)
+        except ValueError as error:
+            return report_error(self, error)
+        settings = found.tactile_probe
+        settings.is_probe = False  # It must not be touched again for each of these.
+        for plane in touched.report["added_planes"]:
+            _add(settings, plane)
+        probe.adopt(found, touched, depsgraph, complete=True)
+        settings.is_probe = True
+        unit = units.unit_of(context.scene, touched.result.radius)
+        self.report({"INFO"}, added_planes(touched.report, unit))
+        return {"FINISHED"}
+
+
+def _add(settings, suggested):
+    """One more plane, where it is suggested, or as it was there before."""
+    number = settings.plane_count
+    if suggested is not None:
+        settings.azimuths[number] = math.radians(suggested["azimuth"])
+        settings.tilts[number] = 0.0
+    settings.plane_count = number + 1
+    settings.active_plane = number
+
+
+class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
+    """Feel along one plane less"""
+
+    bl_idname = "tactile.remove_plane"
+    bl_label = "Remove Plane"
+
+    plane: IntProperty(name="Plane", description="Which one, from 0", min=0, max=MOST_PLANES - 1)
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == 3:
+            cls.poll_message_set("A patch needs three planes")
+            return False
+        return True
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        settings = found.tactile_probe
+        for name in ("azimuths", "tilts"):
+            values = list(getattr(settings, name))
+            values.append(values.pop(self.plane))
+            setattr(settings, name, values)
+        settings.plane_count -= 1
+        probe.refresh(found, context)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_update(_ProbeOperator, bpy.types.Operator):
+    """Touch again with the numbers and at the place of the probe"""
+
+    bl_idname = "tactile.update"
+    bl_label = "Touch Again"
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        probe.refresh(found, context)
+        if found.tactile_probe.message:
+            self.report({"WARNING"}, found.tactile_probe.message)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
+    """Delete the probe with its patch and contours; the mesh that was touched stays"""
+
+    bl_idname = "tactile.delete"
+    bl_label = "Delete Probe and Patch"
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        patch = probe.patch_of(found)
+        lines = None if patch is None else patch_object.contours_of(patch)
+        for obj in filter(None, (lines, patch, found)):
+            mesh = obj.data
+            bpy.data.objects.remove(obj)
+            if mesh is not None and not mesh.users:
+                materials = list(filter(None, mesh.materials))
+                bpy.data.meshes.remove(mesh)
+                bpy.data.batch_remove([material for material in materials if not material.users])
+        return {"FINISHED"}
+
+
+class TACTILE_OT_show_colors(bpy.types.Operator):
+    """Have this viewport draw the colors of the vertices, in Solid shading"""
+
+    bl_idname = "tactile.show_colors"
+    bl_label = "Show Patch Colors"
+
+    @classmethod
+    def poll(cls, context):
+        space = context.space_data
+        if space is None or space.type != "VIEW_3D":
+            cls.poll_message_set("Use it in a 3D viewport")
+            return False
+        if shows_colors(space):
+            cls.poll_message_set("This viewport shows the colors of the patch already")
+            return False
+        return True
+
+    def execute(self, context):
+        context.space_data.shading.type = "SOLID"
+        context.space_data.shading.color_type = "VERTEX"
+        return {"FINISHED"}
+
+
+def shows_colors(space):
+    kind = space.shading.type
+    return kind in ("MATERIAL", "RENDERED") or (kind == "SOLID" and space.shading.color_type == "VERTEX")
+
+
+OPERATORS = (
+    TACTILE_OT_add_plane,
+    TACTILE_OT_add_planes,
+    TACTILE_OT_remove_plane,
+    TACTILE_OT_update,
+    TACTILE_OT_delete,
+    TACTILE_OT_show_colors,
+)

@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The diverging colors of curvature: blue below zero, white at zero, red above."""
+
+import numpy as np
+
+# ColorBrewer's RdBu in nine steps (sRGB), which color-blind readers can tell apart.
+STOPS = np.array([
+    (33, 102, 172), (67, 147, 195), (146, 197, 222), (209, 229, 240), (247, 247, 247),
+    (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
+]) / 255.0  # fmt: skip
+
+
+def symmetric_range(values, floor):
+    """The r of a scale -r..r: the 98th percentile of |values|, so a few wild ones do not bleach the rest."""
+    return max(float(np.percentile(np.abs(values), 98.0)), floor)
+
+
+def shades(values, limit):
+    """RGBA (n, 4), as screens have it (sRGB), of values (n,) on a scale from -limit to limit."""
+    at = np.clip(np.asarray(values) / limit, -1.0, 1.0)
+    srgb = np.column_stack([np.interp(at, np.linspace(-1.0, 1.0, len(STOPS)), stop) for stop in STOPS.T])
+    return np.column_stack([srgb, np.ones(len(srgb))])
+
+
+def diverging(values, limit):
+    """The colors as linear RGBA, as Blender stores them."""
+    return linear(shades(values, limit))
+
+
+def linear(rgba):
+    """Linear RGBA of sRGB (n, 4)."""
+    rgba = np.array(rgba)
+    srgb = rgba[:, :3]
+    rgba[:, :3] = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    return rgba

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes with point attributes, filled and read as arrays, and the material that shows their colors."""
+
+import bpy
+import numpy as np
+
+KEYS = {
+    "FLOAT": "value",
+    "INT": "value",
+    "BOOLEAN": "value",
+    "FLOAT_VECTOR": "vector",
+    "FLOAT_COLOR": "color",
+}
+
+
+def fill(mesh, points, triangles, attributes):
+    """Gives `mesh` points (n, 3), triangles (m, 3) and point attributes (name, Blender's type, values).
+
+    Where it has these triangles already, only coordinates and values are written.
+    """
+    if not _has_triangles(mesh, len(points), triangles):
+        mesh.clear_geometry()
+        mesh.vertices.add(len(points))
+        mesh.loops.add(triangles.size)
+        mesh.loops.foreach_set("vertex_index", triangles.astype(np.int32).ravel())
+        mesh.polygons.add(len(triangles))
+        mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+        mesh.update(calc_edges=True)
+    for name, kind, values in [("position", "FLOAT_VECTOR", points), *attributes]:
+        write(mesh, name, kind, values)
+    mesh.update()
+
+
+def write(mesh, name, kind, values):
+    """Writes a point attribute; one of that name that is of another kind makes room."""
+    # No reference to an attribute may outlive the next `new`, which moves them all.
+    attribute = mesh.attributes.get(name)
+    if attribute is not None and (attribute.data_type, attribute.domain) != (kind, "POINT"):
+        mesh.attributes.remove(attribute)
+        attribute = None
+    attribute = attribute or mesh.attributes.new(name, kind, "POINT")
+    attribute.data.foreach_set(KEYS[kind], values.ravel())
+
+
+def values(mesh, name):
+    """Values of a point attribute, (n,) or (n, 3)."""
+    attribute = mesh.attributes[name]
+    key = KEYS[attribute.data_type]
+    values = np.empty((len(attribute.data), 3) if key == "vector" else len(attribute.data))
+    attribute.data.foreach_get(key, values.ravel())
+    return values
+
+
+def own_mesh(obj):
+    """A linked copy, or the override of a library's object, shows something of its own from now on."""
+    if obj.data.users > 1 or not obj.data.is_editable:
+        obj.data = obj.data.copy()
+
+
+def _has_triangles(mesh, count, triangles):
+    if (len(mesh.vertices), len(mesh.loops)) != (count, triangles.size):
+        return False
+    corners = np.empty(triangles.size, dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    return np.array_equal(corners, triangles.ravel())
+
+
+def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0)):
+    """The material of that name, made where missing: a color attribute or one color, shown as it is."""
+    material = bpy.data.materials.get(name)
+    if material is None:
+        material = bpy.data.materials.new(name)
+        if material.node_tree is None:  # in Blender 4.5; later ones have it, and deprecate the switch
+            material.use_nodes = True
+        material.diffuse_color = color
+        nodes, links = material.node_tree.nodes, material.node_tree.links
+        nodes.clear()
+        emission = nodes.new("ShaderNodeEmission")
+        output = nodes.new("ShaderNodeOutputMaterial")
+        links.new(emission.outputs["Emission"], output.inputs["Surface"])
+        if attribute is None:
+            emission.inputs["Color"].default_value = color
+        else:
+            source = nodes.new("ShaderNodeVertexColor")
+            source.layer_name = attribute
+            links.new(source.outputs["Color"], emission.inputs["Color"])
+        output.location, emission.location = (200, 0), (0, 0)
+    return material

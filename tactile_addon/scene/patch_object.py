@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The reconstruction as objects of the scene: the patch, and the tracked contours."""
+
+import json
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ... import core
+from . import colors
+from .contour_mesh import fill_contours
+from .family import add, children_of
+from .mesh_data import emission, fill, own_mesh, values, write
+
+COLLECTION = "Tactile Patches"
+RECORD = "tactile"  # the patch object's custom property that holds the report,
+RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
+COLOR = "curvature_color"
+CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
+CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
+# What the colors can show: attribute, name, description, and the power of length it is measured in.
+QUANTITIES = [
+    ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
+    ("mean_curvature", "Mean Curvature", "H: blue where the surface bulges outward, red where inward", -1),
+    ("deviation", "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
+    ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
+]
+POWERS = {name: power for name, _, _, power in QUANTITIES}
+QUANTITIES_OF_A_FIT = ("gaussian_curvature", "mean_curvature", "height_std")  # these need no mesh
+NORMAL, PLACE = "custom_normal", "domain_place"  # attributes: as shaded; on the unit disk, see core.Domain
+POSITIVE = ("height_std",)  # never below zero: half a scale says it all
+FLOOR = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
+
+
+def insert(scene, touched, parent=None):
+    """Adds the patch and its contours to `scene`, in a collection of their own; returns the patch object."""
+    name = touched.report["source"]
+    patch, lines = (
+        bpy.data.objects.new(f"{name} {what}", bpy.data.meshes.new(f"{name} {what}"))
+        for what in ("Patch", "Contours")
+    )
+    patch.parent, lines.parent, lines[CONTOURS] = parent, patch, True
+    for obj in (patch, lines):
+        add(obj)
+        obj.show_in_front = True  # it lies in the surface it describes
+        collection(scene).objects.link(obj)
+    patch.data.materials.append(emission("Tactile Curvature", attribute=COLOR))
+    lines.data.materials.append(emission("Tactile Contour", color=CONTOUR_COLOR))
+    rewrite(patch, touched)
+    return patch
+
+
+def rewrite(patch, touched):
+    """Makes the patch, and its contours where they are still there, those of another touch, in place."""
+    lines = contours_of(patch)
+    for obj in filter(None, (patch, lines)):
+        own_mesh(obj)
+    if touched.report["is_verified"] or PLACE not in patch.data.attributes:
+        _fill_patch(patch, touched)
+    else:
+        _follow(patch, touched)
+    names = {"patch": patch.name}
+    if lines is not None:
+        fill_contours(lines.data, touched)
+        names["contours"] = lines.name
+    _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
+    patch[RECORD] = touched.report | names
+    patch.pop(RECONSTRUCTION, None)
+    if touched.report["is_verified"]:
+        patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
+    recolor(patch)
+
+
+def report_of(patch):
+    """The report of a patch object; None where somebody has made something else of it."""
+    report = patch.get(RECORD)
+    try:
+        frame = np.array([report["frame"][name] for name in ("origin", "d1", "d2", "normal")], dtype=float)
+        numbers = [float(report[name]) for name in ("radius", "height_std", "k1", "k2")]
+        words = [report[name] for name in ("source", "status", "message", "ended")]
+        report["is_verified"]
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return None
+    good = frame.shape == (4, 3) and np.isfinite(frame).all() and np.isfinite(numbers).all()
+    return report if good and numbers[0] > 0.0 and all(isinstance(word, str) for word in words) else None
+
+
+def require_whole(patch):
+    """Raises ValueError where the patch object has been edited into what is none."""
+    if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
+        raise ValueError(f'"{patch.name}" was edited, and is no whole patch any more: touch again')
+
+
+def _is_whole(mesh):
+    kinds = {name: "FLOAT" for name in POWERS} | {COLOR: "FLOAT_COLOR"}
+    found = {name: mesh.attributes.get(name) for name in kinds}
+    return len(mesh.vertices) > 0 and all(
+        attribute is not None and (attribute.data_type, attribute.domain) == (kinds[name], "POINT")
+        for name, attribute in found.items()
+    )
+
+
+def mark_failed(patch, why):
+    """The patch is that of an earlier touch, for the last one failed."""
+    report = report_of(patch)
+    if report is not None:
+        verdict = {
+            "status": "outdated",
+            "message": f"This is the patch of an earlier touch, for the last one failed. {why}",
+        }
+        report.update(verdict)
+
+
+def reconstruction_of(patch):
+    """The core.Reconstruction of a patch object, in the world, where the object is now.
+
+    Unmoved it is what was fitted, to the last bit. Raises ValueError while a gesture goes on, where what the
+    object keeps was edited, and where it is no longer of its shape.
+    """
+    require_whole(patch)
+    if RECONSTRUCTION not in patch:
+        raise ValueError(f'"{patch.name}" is not complete: end the gesture, or touch again')
+    try:
+        r = core.from_dict(json.loads(patch[RECONSTRUCTION]))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f'"{patch.name}" cannot be read any more: touch again ({error})') from error
+    if is_at(patch, r.frame.axes, r.frame.origin):  # where it is, that is in double precision
+        return r
+    placed = np.array(patch.matrix_world, dtype=float)
+    try:
+        return r.moved(placed @ np.linalg.inv(_matrix(r.frame.axes, r.frame.origin)))
+    except ValueError as error:
+        raise ValueError(
+            f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
+        ) from error
+
+
+def _place(patch, matrix):
+    """Puts the patch there in the world, under its probe or not; it stays where the probe is deleted."""
+    if patch.parent is not None:
+        patch.matrix_parent_inverse = patch.parent.matrix_world.inverted_safe()
+    matrix = Matrix(matrix.tolist())
+    patch.matrix_world = matrix  # known before the next evaluation
+    patch.matrix_basis = matrix
+
+
+def hold(patch):
+    """Keeps the patch where it was touched while its probe moves on without it."""
+    if report_of(patch) is None:
+        return
+    axes, origin = touched_frame(patch)
+    if not is_at(patch, axes, origin):
+        _place(patch, _matrix(axes, origin))
+
+
+def touched_frame(patch):
+    """Where it was touched: axes as columns, and origin."""
+    frame = patch[RECORD]["frame"]
+    return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
+
+
+def is_at(patch, axes, origin):
+    near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
+    return np.allclose(patch.matrix_world, _matrix(axes, origin), **near)
+
+
+def meshes(patch):
+    """Meshes of a patch object and of its contours; none for no patch."""
+    objects = [] if patch is None else [patch, contours_of(patch)]
+    return [obj.data for obj in objects if obj is not None]
+
+
+def contours_of(patch):
+    """The contours of a patch object, or None."""
+    return next((child for child in children_of(patch) if CONTOURS in child), None)
+
+
+def recolor(patch):
+    """Colors the patch by what it is set to show, and keeps their range in its record."""
+    own_mesh(patch)
+    shown, mesh = patch.tactile_colors, patch.data
+    shades, record = values(mesh, shown), patch[RECORD]
+    limit = colors.symmetric_range(shades, floor=FLOOR * record["radius"] ** POWERS[shown])
+    mesh.attributes[COLOR].data.foreach_set("color", colors.diverging(shades, limit).ravel())
+    mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
+    mesh.update()
+    record["color_limit"] = limit
+
+
+def _matrix(axes, origin):
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = axes, origin
+    return matrix
+
+
+def collection(scene):
+    # In a second scene of the file it is "Tactile Patches.001".
+    # To a library's, or its override, nothing can be added.
+    named = (
+        c
+        for c in scene.collection.children_recursive
+        if c.name.partition(".")[0] == COLLECTION and c.is_editable and c.override_library is None
+    )
+    found = next(named, None)
+    if found is None:
+        found = bpy.data.collections.new(COLLECTION)
+        scene.collection.children.link(found)
+    return found
+
+
+def _fill_patch(obj, touched):
+    """The patch in the Darboux frame, with its attributes; deviations are 0 until the touch is verified."""
+    result, frame, mesh = touched.result, touched.result.frame, obj.data
+    points, triangles = result.mesh()
+    d = result.geometry.derivatives(*points[:, :2].T)
+    deviation = np.zeros(len(points))
+    if touched.report["is_verified"] and touched.surface is not None:
+        world = frame.to_world(points), d.normal @ frame.axes.T
+        deviation = touched.surface.deviations(*world, result.radius)
+    places = np.column_stack([result.domain.places(points[:, :2]), np.zeros(len(points))])
+    attributes = [
+        *((name, "FLOAT", _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
+        ("deviation", "FLOAT", deviation),
+        (NORMAL, "FLOAT_VECTOR", d.normal),
+        (PLACE, "FLOAT_VECTOR", places),
+        (COLOR, "FLOAT_COLOR", np.ones((len(points), 4))),
+    ]
+    fill(mesh, points, triangles, attributes)
+
+
+def _follow(obj, touched):
+    """Moves the vertices that are there, each at its place in the domain, to the patch of another touch.
+
+    What is shown is up to date, what is not is left as it was: in a gesture that is all that is seen.
+    """
+    result, mesh = touched.result, obj.data
+    plane = result.domain.points_at(values(mesh, PLACE)[:, :2])
+    d = result.geometry.derivatives(*plane.T)
+    points = np.column_stack([plane, d.z])
+    write(mesh, "position", "FLOAT_VECTOR", points)
+    write(mesh, NORMAL, "FLOAT_VECTOR", d.normal)
+    if obj.tactile_colors in QUANTITIES_OF_A_FIT:
+        write(mesh, obj.tactile_colors, "FLOAT", _shown(obj.tactile_colors, result, points))
+
+
+def _shown(name, result, points):
+    """What the colors can show at points (n, 3) of a surface, (n,); curvatures are those of (1)."""
+    return getattr(result if name == "height_std" else result.patch, name)(*points[:, :2].T)

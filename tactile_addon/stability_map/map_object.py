@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A stability map as an object: a painted copy of the mesh that was touched."""
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+
+from ..scene import colors, patch_object
+from ..scene.mesh_data import emission
+from .stability import KEYS, NOTHING, QUANTITIES, REASONS
+
+RECORD = "tactile_map"  # the custom property that holds the report
+COLOR = "stability_color"
+SHADES = 256
+# What the colors can show: attribute, name, description, and the power of length it is measured in.
+SHOWN = [
+    ("error", "Error", "How far patch and mesh are apart, in height", 1),
+    ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
+    (
+        "condition_number",
+        "Condition Number",
+        "How many times larger noise comes out of plain least squares",
+        0,
+    ),
+    ("blind_share", "Blind Share", "The share of the coefficients that the planes say nothing of", 0),
+    ("reason", "Reason", "Whether there is a patch, and why there is none", 0),
+]
+LOGARITHMIC = ("condition_number",)  # on a scale from 1
+POWERS = {name: power for name, _, _, power in SHOWN}
+REFUSED = (0.27, 0.27, 0.27, 1.0)
+# Colors of the reasons, sRGB, are Okabe and Ito's, which color-blind readers can tell apart.
+REASON_COLORS = np.array([
+    (0.93, 0.93, 0.93, 1.0), (0.94, 0.89, 0.26, 1.0), (0.84, 0.37, 0.0, 1.0),
+    (0.0, 0.45, 0.70, 1.0), (0.0, 0.62, 0.45, 1.0), REFUSED,
+])  # fmt: skip
+
+
+def insert(context, obj, touched):
+    """Adds a painted copy of `obj`, whose touches are `touched`, to the scene; returns it."""
+    depsgraph = context.evaluated_depsgraph_get()
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
+    painted = bpy.data.objects.new(f"{obj.name} Stability", mesh)
+    mesh.name = painted.name
+    painted.matrix_world = obj.matrix_world
+    # Under a parent the target may be sheared, which an object of its own cannot be.
+    mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
+    painted.show_in_front = True  # it lies in the mesh it describes
+    _paint(mesh, touched)
+    mesh.materials.clear()
+    mesh.materials.append(emission("Tactile Stability", attribute=COLOR))
+    painted[RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
+    patch_object.collection(context.scene).objects.link(painted)
+    recolor(painted)
+    return painted
+
+
+def _paint(mesh, touched):
+    """Every vertex gets the values of the touch that is nearest."""
+    attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in QUANTITIES]
+    attributes.append(("reason", "INT", touched.reason))
+    for name in (*QUANTITIES, "reason", COLOR):
+        if name in mesh.attributes:  # The source may have one of that name, of whatever type.
+            mesh.attributes.remove(mesh.attributes[name])
+    for name, kind, values in attributes:
+        mesh.attributes.new(name, kind, "POINT").data.foreach_set("value", values[touched.nearest])
+    mesh.attributes.new(COLOR, "FLOAT_COLOR", "POINT")
+    mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
+
+
+def recolor(painted):
+    """Colors the map by what it is set to show, and keeps the range in its record."""
+    shown, mesh, record = painted.tactile_map_colors, painted.data, painted[RECORD]
+    values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == "reason" else np.float32)
+    mesh.attributes[shown].data.foreach_get("value", values)
+    if shown == "reason":
+        rgba, limit = colors.linear(REASON_COLORS)[values], len(KEYS) - 1.0
+    else:
+        limit = _limit(shown, values[values != NOTHING], record["extent"])
+        table = colors.diverging(np.arange(SHADES), SHADES - 1)
+        table = np.vstack([table, colors.linear([REFUSED])])
+        share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
+        share = np.log(share) / np.log(limit) if shown in LOGARITHMIC else share / limit
+        place = (np.minimum(share, 1.0) * (SHADES - 1) + 0.5).astype(np.int32)
+        rgba = table[np.where(values == NOTHING, SHADES, place)]
+    mesh.attributes[COLOR].data.foreach_set("color", rgba.astype(np.float32).ravel())
+    mesh.update()
+    record["color_limit"] = limit
+
+
+def _limit(shown, values, extent):
+    """The end of the colors' range."""
+    if shown == "blind_share":
+        return 1.0
+    floor = 10.0 if shown in LOGARITHMIC else patch_object.FLOOR * extent
+    return colors.symmetric_range(values, floor) if len(values) else floor
+
+
+def swatches(painted):
+    """(name, sRGB color) of what is not on the scale: the reasons that occur, or that there is no patch."""
+    record = painted[RECORD]
+    counts = {"patch": record["patches"] - record["in_doubt"], "doubt": record["in_doubt"]}
+    counts |= record["refused"].to_dict()
+    if painted.tactile_map_colors != "reason":
+        refused = sum(counts[key] for key in KEYS[2:])
+        return [(f"No Patch: {refused}", REFUSED)] if refused else []
+    names = zip(REASONS, REASON_COLORS, strict=True)
+    return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
+
+
+def register():
+    bpy.types.Object.tactile_map_colors = EnumProperty(
+        name="Colors",
+        description="What the colors of the map show",
+        items=[item[:3] for item in SHOWN],
+        update=lambda obj, _: recolor(obj) if RECORD in obj else None,
+    )
+
+
+def unregister():
+    del bpy.types.Object.tactile_map_colors

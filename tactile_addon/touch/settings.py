@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The inputs of a touch, as the operators and the probes have them."""
+
+import math
+
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
+from bpy.types import Object
+
+from ... import core
+
+METHODS = [
+    (
+        "bayes",
+        "Bayesian",
+        "All coefficients and the frame at once, with what the contacts leave open: the most accurate",
+    ),
+    (
+        "tagc",
+        "Total Curvature",
+        "The paper's fit: close to the contacts, with as little folding as possible",
+    ),
+    (
+        "quadratic-variation",
+        "Quadratic Variation",
+        "Close to the contacts, with as little bending as possible",
+    ),
+    (
+        "least-squares",
+        "Least Squares",
+        "Closest to the contacts, whatever the surface does between the curves",
+    ),
+]
+SOLVERS = [
+    ("fast", "Fast", "Quasi-Newton minimization"),
+    ("descent", "Steepest Descent", "The paper's minimization, slower, to compare with"),
+]
+AUTO = {  # literals, to be translated
+    "extent": "Extent (Auto)",
+    "step": "Step (Auto)",
+    "degree": "Degree (Auto)",
+    "spacing": "Spacing (Auto)",
+}
+MOST_PLANES = 6
+STEEPEST = math.radians(60)  # Greatest tilt by mouse.
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # what the override of a library's probe keeps as its own
+
+
+def changed(settings, context):
+    """Has the handler look at a probe at once, so that the patch is part of the same undo step."""
+    if isinstance(settings.id_data, Object) and settings.is_probe:
+        settings.id_data.update_tag()
+        context.view_layer.update()
+
+
+class FitSettings:
+    """Mixed into operators and property groups."""
+
+    method: EnumProperty(
+        name="Method",
+        description="How to fit the patch",
+        items=METHODS,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    degree: IntProperty(
+        name="Degree",
+        description="Of the polynomial that describes the patch, 2 to 6; 0 for the least that says what "
+        "the contacts show",
+        default=0,
+        min=0,
+        max=6,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    weight: FloatProperty(
+        name="Weight",
+        description="Of the contacts against the smoothness, in the two fits by curvature",
+        default=1000.0,
+        soft_min=1.0,
+        soft_max=1e5,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    solver: EnumProperty(
+        name="Solver",
+        description="How to minimize the curvature",
+        items=SOLVERS,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+
+
+class TouchSettings(FitSettings):
+    """The same; lengths in units of the world, angles in radians."""
+
+    plane_count: IntProperty(
+        name="Planes",
+        description="How many sampling planes to feel along",
+        default=3,
+        min=3,
+        max=MOST_PLANES,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    azimuths: FloatVectorProperty(
+        name="Azimuths",
+        description="Directions of the planes about the normal",
+        size=MOST_PLANES,
+        unit="ROTATION",
+        default=[math.radians(a) for a in (0, 60, 120, 30, 90, 150)],
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    tilts: FloatVectorProperty(
+        name="Tilts",
+        description="How far the planes lean from upright",
+        size=MOST_PLANES,
+        unit="ROTATION",
+        soft_min=-STEEPEST,
+        soft_max=STEEPEST,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    extent: FloatProperty(
+        name="Extent",
+        description="How far to feel to either side of the point; 0 for as far as a patch can be trusted. "
+        "In a map 0 is an eighth of the object's size",
+        subtype="DISTANCE",
+        soft_min=0.0,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    step: FloatProperty(
+        name="Step",
+        description="Distance between contacts; 0 for so many that more would tell little",
+        subtype="DISTANCE",
+        soft_min=0.0,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    noise: FloatProperty(
+        name="Noise",
+        description="Standard deviation of the simulated sensor",
+        subtype="DISTANCE",
+        soft_min=0.0,
+        precision=4,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+    seed: IntProperty(
+        name="Seed",
+        description="Of the noise: the same seed gives the same contacts",
+        min=0,
+        update=changed,
+        override=OVERRIDABLE,
+    )
+
+
+NAMES = (*TouchSettings.__annotations__, *FitSettings.__annotations__)
+
+
+def touch_arguments(settings):
+    """What touch() takes of `settings`, an operator or a probe's."""
+    count = settings.plane_count
+    pairs = zip(settings.azimuths[:count], settings.tilts[:count], strict=True)
+    return {
+        "planes": [core.SamplingPlane(*pair) for pair in pairs],
+        "degree": settings.degree or "auto",
+        **{name: getattr(settings, name) for name in ("extent", "step", "noise", "seed")},
+        **{name: getattr(settings, name) for name in ("method", "weight", "solver")},
+    }
+
+
+def draw_chosen(layout, settings, name):
+    """A number that the surface chooses where it is 0, which the label says."""
+    if getattr(settings, name):
+        layout.prop(settings, name)
+    else:
+        layout.prop(settings, name, text=AUTO[name])
+
+
+def draw_sensor(layout, settings):
+    draw_chosen(layout, settings, "step")
+    for name in ("noise", "seed"):
+        layout.prop(settings, name)
+
+
+def draw_solver(layout, settings):
+    layout.prop(settings, "method")
+    draw_chosen(layout, settings, "degree")
+    if settings.method in ("tagc", "quadratic-variation"):
+        layout.prop(settings, "weight")
+    if settings.method == "tagc":
+        layout.prop(settings, "solver")
+
+
+def draw_all(layout, settings):
+    """Everything, with nothing folded away, as Adjust Last Operation has it."""
+    draw_chosen(layout, settings, "extent")
+    layout.prop(settings, "plane_count")
+    for i in range(settings.plane_count):
+        column = layout.column(align=True)
+        column.prop(settings, "azimuths", index=i, text=f"Azimuth {i + 1}")
+        column.prop(settings, "tilts", index=i, text="Tilt")
+    draw_sensor(layout, settings)
+    draw_solver(layout, settings)

@@ -1,0 +1,251 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mesh object of the scene as a surface to touch: as it evaluates, in world coordinates."""
+
+import math
+import zlib
+from functools import cached_property
+
+import numpy as np
+
+FARTHEST = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
+WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
+
+
+class MeshSurface:
+    """The evaluated mesh of an object; core.track touches it through `ray_cast`.
+
+    sound : whether all its vertices are known to be at finite places, which takes time to see
+    size : the longest edge of its bounding box, in the world
+
+    The transform runs in Python floats: mathutils rounds to float32, which far from the world's
+    origin is coarser than the mesh.
+    """
+
+    def __init__(self, obj, depsgraph, sound=False):
+        """Raises ValueError, with a sentence, where `obj` cannot be touched."""
+        try:
+            evaluated, self._linear, self._origin = evaluated_object(obj, depsgraph)
+            if not sound:
+                self._co = coordinates(obj.name, evaluated)
+            evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
+        except RuntimeError as error:
+            raise disabled(obj) from error
+        self._inverse = np.linalg.inv(self._linear)
+        # ray_cast takes these, for a numpy call would cost more than the cast.
+        self._rows, self._inverse_rows, self._normal_rows, self._at = (
+            array.tolist() for array in (self._linear, self._inverse, self._inverse.T, self._origin)
+        )
+        self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
+        self._ray_cast = evaluated.ray_cast
+        # Scans mostly are neither moved, turned nor scaled.
+        self._is_in_place = np.array_equal(self._linear, np.eye(3)) and not self._origin.any()
+        self.size = size_of(evaluated, self._linear)
+
+    @cached_property
+    def _co(self):
+        return coordinates(self._object.name, self._object)
+
+    @property
+    def checksum(self):
+        """Another for another shape of the mesh in the object's coordinates."""
+        return zlib.crc32(self._co)
+
+    def ray_cast(self, origin, direction, distance):
+        """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
+        if self._is_in_place:
+            hit, point, normal, _ = self._ray_cast(
+                origin, direction, distance=distance, depsgraph=self._depsgraph
+            )
+            return (point, normal) if hit and any(normal) else None
+        back, (x, y, z) = self._inverse_rows, self._at
+        local = product(back, *direction)
+        hit, point, normal, _ = self._ray_cast(
+            product(back, origin[0] - x, origin[1] - y, origin[2] - z),
+            local,
+            distance=distance * math.hypot(*local),
+            depsgraph=self._depsgraph,
+        )
+        # A face of no area has no normal, and nothing of it can be felt.
+        return (self._to_world(point), self._normal_to_world(normal)) if hit and any(normal) else None
+
+    def vertices_near(self, point, radius, most=None):
+        """Indices, world coordinates and normals of any length of vertices within `radius` of a world point.
+
+        Where these are more than `most`, only each second, third, ... of them.
+        """
+        # A sphere of the world is an ellipsoid in the object: its longest axis bounds it.
+        reach = radius * np.linalg.norm(self._inverse, ord=2)
+        local = self._co - self._to_local(point).astype(np.float32)
+        near = np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
+        if most is not None:
+            near = near[:: math.ceil(len(near) / most) or 1]
+        # All of them: one by one, a few thousand take longer than a million.
+        normals = np.empty_like(self._co)
+        self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
+        return (
+            near,
+            self._co[near] @ self._linear.T + self._origin,
+            normals[near] @ self._inverse,
+        )
+
+    def triangles(self):
+        """Vertices (n, 3) in the world, and triangles (m, 3), counterclockwise from outside."""
+        self._mesh.calc_loop_triangles()
+        faces = np.empty((len(self._mesh.loop_triangles), 3), dtype=np.int32)
+        self._mesh.loop_triangles.foreach_get("vertices", faces.ravel())
+        mirrored = np.linalg.det(self._linear) < 0.0
+        return self._co @ self._linear.T + self._origin, faces[:, ::-1] if mirrored else faces
+
+    def project(self, location):
+        """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""
+        found = self._walk(location, location)
+        gram = self._linear.T @ self._linear
+        stretched = not np.allclose(gram, gram[0, 0] * np.eye(3), rtol=0.0, atol=1e-4 * gram[0, 0])
+        if stretched and found[2] > 1e-3 * self.size:
+            # Nearest within a stretched object may be on another sheet than nearest in the world.
+            offsets = self._co @ self._linear.T - np.subtract(location, self._origin)
+            nearest = self._co[np.argmin(np.einsum("ij,ij->i", offsets, offsets))]
+            found = min(found, self._walk(self._to_world(nearest.tolist()), location), key=lambda f: f[2])
+        return found
+
+    def _walk(self, start, location):
+        """Downhill to the nearest point, from the one nearest to `start` as the object measures.
+
+        By the foot of the perpendicular on the face found, as long as that brings the surface nearer.
+        """
+        found = self._foot(start, location)
+        for _ in range(WALK):
+            point, normal, distance = found
+            height = np.dot(np.subtract(location, point), normal)
+            ahead = self._foot(np.subtract(location, height * np.array(normal)), location)
+            if ahead[2] >= (1.0 - 1e-6) * distance:
+                break
+            found = ahead
+        return found
+
+    def _foot(self, near, location):
+        """The point nearest, as the object measures, to the world point `near`; its normal, its distance."""
+        point, normal = self._nearest(self._to_local(near))
+        if not any(normal):
+            raise ValueError("The location is on a face of no area: move it, or dissolve degenerate faces")
+        point = self._to_world(point)
+        return point, self._normal_to_world(normal), math.dist(location, point)
+
+    def deviations(self, points, normals, reach):
+        """Signed distances (n,) of world points to the mesh, positive outside it.
+
+        Measured along the unit normals (n, 3) either way, up to `reach`; to the nearest point of the
+        mesh where they meet nothing, as over a hole.
+        """
+        pairs = zip(points.tolist(), normals.tolist(), strict=True)
+        return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
+
+    def _deviation(self, point, normal, reach):
+        found = []
+        for sign in (-1.0, 1.0):
+            hit = self.ray_cast(point, [-sign * v for v in normal], reach)
+            if hit is not None:
+                found.append(sign * math.dist(point, hit[0]))
+        if found:
+            return min(found, key=abs)
+        foot = self._to_world(self._nearest(self._to_local(point))[0])
+        return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
+
+    def spacing(self, point):
+        """How far apart neighboring float32 numbers are at a world point, in the world and in the mesh."""
+        scale = np.linalg.norm(self._linear, axis=0).max()
+        world, local = (
+            np.spacing(np.abs(p).astype(np.float32)).max() for p in (point, self._to_local(point))
+        )
+        return float(max(world, scale * local))
+
+    def _nearest(self, local):
+        """(point, normal) in object coordinates."""
+        found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
+        if not found:
+            raise ValueError("The location is too far away to be measured: set it on the surface")
+        return point, normal
+
+    def _to_local(self, point):
+        return self._inverse @ np.subtract(point, self._origin)
+
+    def _to_world(self, point):
+        x, y, z = product(self._rows, *point)
+        return x + self._at[0], y + self._at[1], z + self._at[2]
+
+    def _normal_to_world(self, normal):
+        """The normal by the inverse transpose: outward stays outward under any scale, a mirroring one too."""
+        x, y, z = product(self._normal_rows, *normal)
+        length = math.hypot(x, y, z)
+        return x / length, y / length, z / length
+
+
+def disabled(obj):
+    """The error to raise for an object that Blender has not evaluated."""
+    return ValueError(
+        f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
+    )
+
+
+def evaluated_object(obj, depsgraph):
+    """The evaluated object and its transform: linear part and origin.
+
+    Raises ValueError, with a sentence, where it cannot be touched; but for disabled objects.
+    """
+    if obj.type != "MESH":
+        raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
+    evaluated = obj.evaluated_get(depsgraph)
+    if obj.data.is_editmode:
+        # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
+        evaluated.to_mesh()
+        evaluated.to_mesh_clear()
+    matrix = np.array(evaluated.matrix_world, dtype=float)
+    _require_invertible(obj.name, matrix[:3, :3])
+    if not len(evaluated.data.polygons):
+        raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
+    return evaluated, matrix[:3, :3], matrix[:3, 3]
+
+
+def coordinates(name, evaluated):
+    """Coordinates of all vertices of an evaluated object, in it, (n, 3) float32.
+
+    Raises ValueError, with a sentence, where they are not all at a place that can be touched.
+    """
+    co, matrix = _coordinates(evaluated.data), np.array(evaluated.matrix_world, dtype=float)
+    largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
+    if not math.isfinite(largest):
+        raise ValueError(f'"{name}" has vertices at no finite place: delete them, or mend its modifiers')
+    reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
+    if not reach <= FARTHEST:  # NaN is nowhere
+        raise ValueError(f'"{name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
+    return co
+
+
+def size_of(evaluated, linear):
+    """The longest edge of the bounding box, in the world."""
+    edges = np.ptp(np.array(evaluated.bound_box), axis=0)
+    return float((edges * np.linalg.norm(linear, axis=0)).max())
+
+
+def _coordinates(mesh):
+    """Coordinates of all vertices, (n, 3) float32; the attribute, where there is one, is 30 times faster."""
+    co = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    position = mesh.attributes.get("position")  # none in edit mode
+    if position is None:
+        mesh.vertices.foreach_get("co", co.ravel())
+    else:
+        position.data.foreach_get("vector", co.ravel())
+    return co
+
+
+def _require_invertible(name, linear):
+    lengths = np.linalg.norm(linear, axis=0)
+    if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
+        raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')
+
+
+def product(rows, x, y, z):
+    """A matrix, as rows of Python floats, times a vector."""
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z

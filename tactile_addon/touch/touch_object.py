@@ -1,0 +1,227 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One touch, from an object of the scene to a reconstruction and its report; nothing in the scene changes."""
+
+import math
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from ... import core
+from ...core.arguments import unit_vector
+from .mesh_error import height_error
+from .settings import MOST_PLANES, STEEPEST
+from .single_precision import require_single
+from .surface import MeshSurface
+from .touch_report import (
+    ends,
+    judgment,
+    measures,
+    reconstruction_report,
+    suggestion_report,
+)
+
+FARTHEST = 1.0 / 2.0  # Share of the object's size: a half contour that ends by itself is no longer.
+AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where no extent is given.
+FINEST = 1.0 / 128.0  # Share of it: the step where neither is given.
+STEPS = 12  # Least steps of a half contour, where no step is given.
+HELPS = 0.1  # Share of the mean deviation of the height that one more plane must take off.
+COARSE = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """What a touch gave; `report` is a dict of plain values.
+
+    surface : None where the contours were measured elsewhere
+    """
+
+    surface: MeshSurface | None
+    result: core.Reconstruction
+    report: dict
+
+
+def touch(obj, depsgraph, location, planes, *, tolerance=None, **inputs):
+    """A touch as `touch_along` gives, with more planes where a tolerance asks for them.
+
+    tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
+        added, up to MOST_PLANES, as long as one would take HELPS off. None for the given planes only.
+    """
+    touched = touch_along(obj, depsgraph, location, planes, **inputs)
+    added, farthest = [], touched.report["extent"]  # more planes are for a better patch, not for a larger one
+    while tolerance is not None and len(planes) < MOST_PLANES:
+        std, report = touched.result.mean_height_std, touched.report
+        plane = suggestion_report(touched.result, np.array(report["axes"]))
+        if std <= tolerance or plane["expected_height_std"] > (1.0 - HELPS) * std:
+            break
+        more = [*planes, core.SamplingPlane(math.radians(plane["azimuth"]))]
+        try:
+            touched = touch_along(obj, depsgraph, location, more, farthest=farthest, **inputs)
+        except ValueError:  # nothing can be felt along that one: what was felt so far stays
+            break
+        planes = more
+        after = touched.result.mean_height_std
+        added.append({"azimuth": plane["azimuth"], "height_std_before": std, "height_std": after})
+    return replace(touched, report=touched.report | {"added_planes": added})
+
+
+def touch_along(
+    obj,
+    depsgraph,
+    location,
+    planes,
+    *,
+    outward=None,
+    toward=None,
+    tangent=None,
+    extent,
+    step,
+    noise,
+    seed,
+    farthest=None,
+    sound=False,
+    **fit,
+):
+    """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
+
+    location : world coordinates, projected onto the object
+    outward : or None for the surface's; on the side of it that `toward` points to, where given
+    tangent : azimuth 0 of the planes, see core.SamplingPlane.axes; None for its choice
+    extent, step : 0 for what the surface there asks for, see core.explore
+    farthest : of an extent that is chosen, half the object's size where it is None
+    sound : see MeshSurface
+    fit : what core.reconstruct takes
+
+    Raises ValueError with a sentence for the user.
+    """
+    clock = [perf_counter()]
+    surface = MeshSurface(obj, depsgraph, sound)
+    require_lengths(obj.name, surface.size, extent, step, noise)
+    point, surface_normal = _reference_point(obj.name, surface, location, extent, step)
+    outward = unit_vector("outward", surface_normal if outward is None else outward)
+    if toward is not None and np.dot(outward, toward) < 0.0:
+        outward = [-v for v in outward]
+    axes = reference_axes(outward, tangent)
+    clock.append(perf_counter())
+    size = {
+        "farthest": farthest or FARTHEST * surface.size,
+        "extent": extent or "auto",
+        "step": step or "auto",
+    }
+    sensor = {"noise": noise, "rng": seed, "tangent": axes[:, 0]}
+    found = core.explore(surface, point, outward, planes, **size, **sensor, **fit)
+    clock.append(perf_counter())
+    result = found.result
+    require_single(result)
+    report = {
+        "source": obj.name,
+        "method": fit["method"],
+        "degree": result.patch.degree,
+        "extent": found.extent,
+        "step": found.step,
+        "noise": noise,
+        "seed": seed,
+        **reconstruction_report(result, "" if extent else ends(result.contours)),
+        "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
+        "axes": axes.tolist(),
+        "stops": [list(contour.stops) for contour in result.contours],
+        "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
+    }
+    return Touch(surface, result, report)
+
+
+def verify(touched, most=None):
+    """The touch with what is dear in its report too: where to touch next, and distances to the mesh.
+
+    most : of the vertices around, where not all are to be compared
+    """
+    clock, result, report = [perf_counter()], touched.result, touched.report
+    found = _verification_report(touched.surface, result, most)
+    # Where faces are large a pocket between the curves may have no vertex that lies over the patch.
+    offs = found.get("vertex_distance_mean"), height_error(touched.surface, result)
+    found |= judgment(result, max(off or 0.0 for off in offs), report["ended"])
+    clock.append(perf_counter())
+    plane = suggestion_report(result, np.array(report["axes"]))
+    clock.append(perf_counter())
+    seconds = report["seconds"] | dict(zip(("verify", "suggest"), np.diff(clock).tolist(), strict=True))
+    found |= {"suggested_plane": plane, "seconds": seconds, **measures(result)}
+    return replace(touched, report=report | found)
+
+
+def require_lengths(name, size, extent, step, noise):
+    """Raises ValueError for lengths, 0 where they are not given, that no touch of an object can have."""
+    if not all(length >= 0.0 for length in (extent, step, noise)):  # NaN is none
+        raise ValueError(
+            f"Extent, step and noise are lengths of 0 or more, got {extent:g}, {step:g} and {noise:g}"
+        )
+    if extent > size:
+        raise ValueError(f'The extent {extent:g} is longer than "{name}" ({size:g}): take a shorter one')
+    longest = extent or FARTHEST * size
+    if step > longest:
+        raise ValueError(f"The step {step:g} is longer than the extent {longest:g}: take a shorter one")
+    if noise > longest:
+        raise ValueError(f"The noise {noise:g} is larger than the extent {longest:g}: take a smaller one")
+
+
+def _reference_point(name, surface, location, extent, step):
+    """The point of the surface nearest to the location, and the normal there."""
+    if not np.isfinite(location).all():
+        raise ValueError("The location has coordinates that are not finite: set it on the surface")
+    point, normal, distance = surface.project(location)
+    farthest = extent or AWAY * surface.size
+    if distance > farthest:
+        raise ValueError(
+            f'The location is {distance:g} away from "{name}", farther than {farthest:g}: '
+            "move it to the surface"
+        )
+    require_fine(surface.spacing(point), step or extent / STEPS or FINEST * surface.size)
+    return point, normal
+
+
+def require_fine(spacing, step):
+    """Raises ValueError where coordinates are too coarse for the step."""
+    if spacing > COARSE * step:
+        raise ValueError(
+            f"Coordinates at the point are {spacing:g} apart in single precision, too coarse "
+            f"for a step of {step:g}: move the object nearer to the origin of the world or of its own mesh"
+        )
+
+
+def reference_axes(outward, tangent=None):
+    """Columns e1, n and e1 x n of the planes: by `tangent`, unless that is along the normal."""
+    plane = core.SamplingPlane(0.0)
+    try:
+        return plane.axes(outward, tangent)
+    except ValueError:
+        return plane.axes(outward)
+
+
+def plane_axes(matrix, settings, number):
+    """Columns t, u, t x u of a sampling plane of a probe with that world matrix, to draw it.
+
+    See core.SamplingPlane.axes; a tilt that cannot be touched with is drawn as the steepest.
+    """
+    tilt = min(max(settings.tilts[number], -STEEPEST), STEEPEST)
+    plane = core.SamplingPlane(settings.azimuths[number], tilt)
+    return plane.axes(matrix.col[2].xyz, matrix.col[0].xyz)
+
+
+def _verification_report(surface, result, most):
+    """Distances to the patch of the vertices over it that a finger can reach; none where there are none."""
+    _, over = reachable(surface, result, most)
+    misses = core.distances(result.geometry, result.frame.to_local(over))
+    if not len(misses):
+        return {"vertices": 0}
+    return {
+        "vertices": len(misses),
+        "vertex_distance_mean": float(misses.mean()),
+        "vertex_distance_max": float(misses.max()),
+    }
+
+
+def reachable(surface, r, most=None):
+    """The vertices over a patch that a finger can reach: indices in the evaluated mesh, world coordinates."""
+    near, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius, most)
+    over = core.reachable(r.geometry, surface, vertices, normals)
+    return near[over], vertices[over]

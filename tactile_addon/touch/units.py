@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lengths and curvatures in words, in the unit the scene shows lengths in."""
+
+METERS = {
+    "KILOMETERS": ("km", 1e3),
+    "METERS": ("m", 1.0),
+    "CENTIMETERS": ("cm", 1e-2),
+    "MILLIMETERS": ("mm", 1e-3),
+    "MICROMETERS": ("µm", 1e-6),
+    "MILES": ("mi", 1609.344),
+    "FEET": ("ft", 0.3048),
+    "INCHES": ("in", 0.0254),
+    "THOU": ("thou", 2.54e-5),
+}
+ADAPTIVE = {
+    "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
+    "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
+}
+POWERS = {1: "", 2: "²"}
+
+
+def unit_of(scene, size):
+    """(name, length in units of the world) of the unit for a thing of that size; "" where there is none.
+
+    The scene's own, unless that would make for very long numbers.
+    """
+    settings = scene.unit_settings
+    if settings.system == "NONE":
+        return "", 1.0
+    name, meters = settings.length_unit, size * settings.scale_length * (1.0 + 1e-6)
+    if name == "ADAPTIVE" or not 1e-2 <= meters / METERS[name][1] <= 1e4:
+        names = ADAPTIVE[settings.system]
+        name = next((n for n in names if METERS[n][1] <= meters), names[-1])
+    symbol, meters = METERS[name]
+    return symbol, meters / settings.scale_length
+
+
+def say(value, power, unit, std=None):
+    """A value in length^power, as in "0.0123 mm" or "-4.2 ± 0.3 1/mm²"; the panel has room for one digit."""
+    spread = "" if std is None else f" ± {float(f'{std / unit[1] ** power:.1g}'):g}"
+    return f"{value / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
+
+
+def symbol(power, unit):
+    """The unit of length^power, as in "mm" or "1/mm²"; empty for a number, and where lengths have none."""
+    name = unit[0] if power else ""
+    return f"1/{name}{POWERS[-power]}" if name and power < 0 else name

@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The reports of patches and maps as tables and sentences for people; and errors as sentences."""
+
+from . import units
+from .units import say
+
+SPREAD = ("mean", "median", "max", "rms")
+# What core.verify finds, in the order of a table.
+VERIFIED = (
+    *("vertices", *(f"vertex_distance_{key}" for key in SPREAD)),
+    *("contacts", *(f"contact_distance_{key}" for key in SPREAD), "fit_error"),
+    *("extra_contours", "extra_points", "extra_fit_error"),
+    *("total_absolute_curvature", "overlap"),
+)
+
+
+def readable(report):
+    """Lines of label and value; lengths in the unit of the scene or file."""
+    seconds = report["seconds"]
+    contacts = (
+        f"{report['contacts']} on {report['curves']} curves" if "curves" in report else _tracked(report)
+    )
+    rows = [
+        ("touched", report["source"]),
+        ("status", f"{report['status']}: {report['message']}"),
+        ("fit", f"{report['method']}, degree {report['degree']}"),
+        ("contacts", contacts),
+        *_lengths(report),
+        *([("more planes", added_planes(report, ("", 1.0)))] if report.get("added_planes") else []),
+        ("point", _vector(report["frame"]["origin"])),
+        ("normal", _vector(report["frame"]["normal"])),
+        ("direction d1", _vector(report["frame"]["d1"])),
+        ("kappa1, kappa2", f"{_measured(report, 'k1')}, {_measured(report, 'k2')} per unit of length"),
+        ("Gaussian curvature", f"{_measured(report, 'gaussian_curvature')} per unit of area"),
+        ("mean curvature", f"{_measured(report, 'mean_curvature')} per unit of length"),
+        ("residual", f"{report['residual']:.4g}, {_share(report, 'residual')} of the radius"),
+        ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
+        ("height std", f"{report['height_std']:.4g}, {_share(report, 'height_std')} of the radius"),
+        ("mesh to patch", _verification(report)),
+        *([("put onto", registration_summary(report["registration"]))] if "registration" in report else []),
+        *_verified_rows(report.get("verification")),
+        ("suggested next plane", _suggestion(report["suggested_plane"])),
+        ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
+        ("condition number", f"{report['condition_number']:.2g}"),
+        ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
+    ]
+    return table(rows)
+
+
+def added_planes(report, unit):
+    """What more planes have brought, in the unit."""
+    added = report["added_planes"]
+    if not added:
+        return "No further plane would help much"
+    before, after = (say(added[i][key], 1, unit) for i, key in ((0, "height_std_before"), (-1, "height_std")))
+    azimuths = ", ".join(f"{plane['azimuth']:.0f}°" for plane in added)
+    return f"Planes added at {azimuths}: ± {before} has become ± {after}"
+
+
+def _tracked(report):
+    stops = sorted({stop for pair in report["stops"] for stop in pair})
+    return f"{report['contacts']} on {len(report['planes'])} curves, ended by: {', '.join(stops)}"
+
+
+def _lengths(report):
+    """Rows of a touch; for measured curves, how far they miss their common point."""
+    if "step" in report:
+        lengths = f"{report['step']:.4g}, {report['extent']:.4g}, {report['radius']:.4g}"
+        return [("step, extent, radius", lengths)]
+    rows = [("unit", report["unit"])] if report["unit"] else []
+    rows.append(("radius", f"{report['radius']:.4g}"))
+    if "misses" in report:
+        rows.append(("curves miss it by", ", ".join(f"{miss:.3g}" for miss in report["misses"])))
+    return rows
+
+
+def table(rows):
+    """Labels and values as aligned lines."""
+    width = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
+
+
+def sentence(error):
+    """The words of an exception, as a sentence begins, in one line: names may hold more."""
+    words = " ".join(str(error).split())
+    return words[:1].upper() + words[1:]
+
+
+def _verification(report):
+    if "curves" in report:
+        return "there is none"
+    if not report["vertices"]:
+        return "no vertex of the mesh lies over the patch"
+    share = _share(report, "vertex_distance_mean")
+    return (
+        f"mean {report['vertex_distance_mean']:.4g}, {share} of the radius; "
+        f"max {report['vertex_distance_max']:.4g}; {report['vertices']} vertices"
+    )
+
+
+def _verified_rows(found):
+    """What is not in the report without it."""
+    if found is None:
+        return []
+    names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
+    more = f"{found['extra_fit_error']:.4g}, " if "extra_fit_error" in found else ""
+    return [
+        *(
+            (f"{name} distances", ", ".join(f"{key} {found[f'{name}_distance_{key}']:.4g}" for key in SPREAD))
+            for name in names
+        ),
+        ("(6) on more curves", f"{more}{found['extra_points']} points on {found['extra_contours']} curves"),
+        ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
+    ]
+
+
+def registration_summary(found):
+    """Where a patch was put, in a sentence."""
+    residual = found["residuals"][found["pose"] - 1]
+    words = f'The contacts are {residual:.3g} off "{found["target"]}" (root mean square)'
+    if not found["is_ambiguous"]:
+        return words
+    return f"{words}; others of its {len(found['residuals'])} poses are about as good"
+
+
+def verification_summary(record):
+    """Whether a verification gives reason to doubt, and what it has found, in a sentence."""
+    found = record["verification"]
+    name, vertices, percent = found["target"], found["vertices"], 100.0 * found["overlap"]
+    if not (vertices or percent or found["extra_points"]):
+        return True, f'Nothing of "{name}" is below the patch: move one to the other, or choose another mesh'
+    if not vertices:
+        return True, f'No vertex of "{name}" is over the patch, of which it covers {percent:.0f} %'
+    if record["status"] != "ok":
+        return True, record["message"]
+    mean, most = found["vertex_distance_mean"], found["vertex_distance_max"]
+    return False, (
+        f'{vertices} vertices of "{name}" are {mean:.3g} off the patch in the mean, {most:.3g} at most; it '
+        f"covers {percent:.0f} %"
+    )
+
+
+def verification_columns(report):
+    """(heading, value) of the row of a patch; the value is empty where there is none."""
+    found = report["verification"]
+    lengths = [key for key in VERIFIED if "distance" in key or "error" in key]
+    return [
+        *((key, report[key]) for key in ("patch", "source", "status")),
+        ("target", found["target"]),
+        *((f"{key} [unit of the file]" if key in lengths else key, found.get(key, "")) for key in VERIFIED),
+    ]
+
+
+def patch_rows(record, unit):
+    """(label, value) of what matters of a patch, with lengths in a unit of units.py."""
+
+    def row(label, key, power=1):
+        return label, units.say(record[key], power, unit)
+
+    def measured(label, key, power):
+        return label, units.say(record[key], power, unit, record[f"{key}_std"])
+
+    rows = [
+        measured("Curvature κ1", "k1", -1),
+        measured("Curvature κ2", "k2", -1),
+        measured("Gaussian K", "gaussian_curvature", -2),
+        measured("Mean H", "mean_curvature", -1),
+        row("Fit Error", "fit_error"),
+        ("Standard Deviation", "± " + units.say(record["height_std"], 1, unit)),
+    ]
+    if not record["is_verified"]:
+        return [*rows, ("Mesh to Patch", "…")]
+    if record["vertices"] and "verification" not in record:
+        rows += [row("Mesh to Patch", "vertex_distance_mean"), row("… at Most", "vertex_distance_max")]
+    plane = record["suggested_plane"]
+    return [
+        *rows,
+        ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
+        ("… Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
+    ]
+
+
+def verification_table(found, unit):
+    """Rows of a label and what a verification found for the mesh and for the contacts."""
+
+    def lengths(key):
+        return (_length(found, f"{what}_distance_{key}", unit) for what in ("vertex", "contact"))
+
+    names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
+    return [
+        ("Distance", "Mesh", "Contacts"),
+        *((name, *lengths(key)) for name, key in names),
+        ("Points", str(found["vertices"]), str(found["contacts"])),
+    ]
+
+
+def verification_rows(found, unit):
+    """(label, value) of what else a verification found."""
+    return [
+        ("Fit Error on Curves", _length(found, "fit_error", unit)),
+        (f"… on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
+        ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
+        ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
+    ]
+
+
+def _length(found, key, unit):
+    return units.say(found[key], 1, unit) if key in found else "–"
+
+
+def _suggestion(plane):
+    return (
+        f"azimuth {plane['azimuth']:.0f} degrees, along {_vector(plane['tangent'])}; "
+        f"would take height std to {plane['expected_height_std']:.4g}"
+    )
+
+
+def _vector(v):
+    return " ".join(f"{x:.5g}" for x in v)
+
+
+def _measured(report, key):
+    return f"{report[key]:.5g} ± {report[key + '_std']:.2g}"
+
+
+def _share(report, key):
+    return f"{100.0 * report[key] / report['radius']:.2f} %"

@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Handles of the active probe: to turn each sampling plane, to tilt the active one, and for the extent."""
+
+import math
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, IntProperty
+from mathutils import Matrix, Vector
+from mathutils.geometry import intersect_line_plane
+
+from ..probe import probe
+from ..touch.settings import MOST_PLANES, STEEPEST
+from ..touch.touch_object import plane_axes
+from .mouse import draw_hints, mouse_ray
+from .overlay import PLANE_COLORS
+
+TURN, TILT, EXTENT = "TURN", "TILT", "EXTENT"
+REACH = 1.15  # Place of the handles, in extents.
+UPRIGHT = 0.75
+SNAP = math.radians(5.0)
+PRECISE = 0.1
+HINTS = (
+    ("MOUSE_LMB", "Confirm"),
+    ("MOUSE_RMB", "Cancel"),
+    ("EVENT_CTRL", "Snap"),
+    ("EVENT_SHIFT", "Precise"),
+)
+
+
+class TACTILE_OT_drag(bpy.types.Operator):
+    """Drag to turn or tilt a sampling plane of the probe, or to feel farther"""
+
+    bl_idname = "tactile.drag"
+    bl_label = "Drag Sampling Plane"
+    bl_options = {"UNDO", "INTERNAL", "BLOCKING"}
+
+    what: EnumProperty(
+        name="What",
+        items=[
+            (TURN, "Turn", "Turn a sampling plane about the normal"),
+            (TILT, "Tilt", "Lean a sampling plane to the side"),
+            (EXTENT, "Extent", "Feel farther or less far"),
+        ],
+    )
+    plane: IntProperty(name="Plane", min=0, max=MOST_PLANES - 1)
+
+    @classmethod
+    def poll(cls, context):
+        return probe.is_probe(context.object) and probe.lock_of(context.object) is None
+
+    def invoke(self, context, event):
+        settings = context.object.tactile_probe
+        if self.what != EXTENT:
+            settings.active_plane = self.plane
+        self._matrix = context.object.matrix_world.copy()
+        # The handle comes to the mouse; where the button went down is not known, for a busy Blender hears
+        # of it late, with the mouse already elsewhere.
+        self._before = self._value = self._free = self._last = self._get(context)
+        if self._below(context, event) is None:
+            self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
+            return {"CANCELLED"}
+        context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
+        context.window_manager.modal_handler_add(self)
+        self._say(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            self._set(context, self._before)
+            self._end(context)
+            return {"CANCELLED"}
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            self._end(context)
+            return {"FINISHED"}
+        if event.type == "MOUSEMOVE":
+            self._follow(context, event)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        self._end(context)
+
+    def _follow(self, context, event):
+        """Moves the value by what the mouse has moved."""
+        now = self._below(context, event)
+        if now is None:
+            return
+        pace = PRECISE if event.shift else 1.0
+        if self.what == EXTENT:
+            self._free *= (now / self._last) ** pace
+            value = self._free
+        else:
+            self._free += pace * math.remainder(now - self._last, 2.0 * math.pi)
+            value = SNAP * round(self._free / SNAP) if event.ctrl else self._free
+        self._last = now
+        if self.what == TILT:
+            value = min(max(value, -STEEPEST), STEEPEST)
+        self._set(context, value)
+
+    def _below(self, context, event):
+        """Where the mouse is: an angle, or a distance from the point; None where that cannot be told."""
+        origin, direction = mouse_ray(context.region, context.region_data, event)
+        center, normal = self._matrix.translation, self._matrix.col[2].xyz.normalized()
+        e1 = self._matrix.col[0].xyz.normalized()
+        right, up = e1, normal.cross(e1)
+        if self.what == TILT:
+            t = Vector(plane_axes(self._matrix, context.object.tactile_probe, self.plane)[:, 0])
+            right, up, normal = normal, normal.cross(t), t
+        if abs(direction.dot(normal)) < 0.03:
+            return None
+        at = intersect_line_plane(origin, origin + direction, center, normal)
+        if at is None or (at - center).length == 0.0:
+            return None
+        if self.what == EXTENT:
+            return (at - center).length
+        return math.atan2((at - center).dot(up), (at - center).dot(right))
+
+    def _get(self, context):
+        settings = context.object.tactile_probe
+        if self.what == EXTENT:
+            return settings.extent or probe.record_of(context.object)["extent"]
+        return (settings.azimuths if self.what == TURN else settings.tilts)[self.plane]
+
+    def _set(self, context, value):
+        settings = context.object.tactile_probe
+        self._value = value
+        if self.what == EXTENT:
+            settings.extent = value
+        else:
+            (settings.azimuths if self.what == TURN else settings.tilts)[self.plane] = value
+        self._say(context)
+
+    def _say(self, context):
+        if self.what == EXTENT:
+            settings = context.scene.unit_settings
+            length = bpy.utils.units.to_string(
+                settings.system, "LENGTH", self._value * settings.scale_length, precision=4
+            )
+            words = f"Extent {length}"
+        else:
+            angle = "Azimuth" if self.what == TURN else "Tilt"
+            words = f"{angle} {self.plane + 1}: {math.degrees(self._value):.1f}°"
+        context.area.header_text_set(words)
+
+    def _end(self, context):
+        context.area.header_text_set(None)
+        context.workspace.status_text_set(None)
+        if context.object.tactile_probe.live:
+            probe.refresh(context.object, context)
+
+
+class TACTILE_GGT_handles(bpy.types.GizmoGroup):
+    """Handles of the active probe"""
+
+    bl_label = "Tactile Probe"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "WINDOW"
+    bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL"}
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.object
+        shown = context.mode == "OBJECT" and probe.is_probe(obj) and obj.visible_get()
+        return shown and probe.record_of(obj) is not None and probe.lock_of(obj) is None
+
+    def setup(self, context):
+        self.extent = self._handle("GIZMO_GT_dial_3d", EXTENT, 0, (1.0, 1.0, 1.0))
+        self.extent.use_draw_scale = False
+        self.extent.line_width = 2.0
+        self.turns = [self._ball(TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
+        self.tilts = [self._ball(TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
+
+    def _ball(self, what, plane, color):
+        ball = self._handle("GIZMO_GT_move_3d", what, plane, color)
+        ball.draw_style = "RING_2D"
+        ball.draw_options = {"FILL", "ALIGN_VIEW"} if what == TURN else {"FILL_SELECT", "ALIGN_VIEW"}
+        ball.scale_basis, ball.line_width = 0.12, 3.0
+        return ball
+
+    def _handle(self, kind, what, plane, color):
+        handle = self.gizmos.new(kind)
+        properties = handle.target_set_operator("tactile.drag")
+        properties.what, properties.plane = what, plane
+        handle.color, handle.alpha = color, 0.8
+        handle.color_highlight, handle.alpha_highlight = [0.5 + 0.5 * c for c in color], 1.0
+        handle.use_draw_modal = True
+        return handle
+
+    def draw_prepare(self, context):
+        obj = context.object
+        settings, matrix = obj.tactile_probe, obj.matrix_world
+        reach = settings.extent or probe.record_of(obj)["extent"]
+        center = np.array(matrix.translation)
+        active = min(settings.active_plane, settings.plane_count - 1)
+        for i, (turn, tilt) in enumerate(zip(self.turns, self.tilts, strict=True)):
+            turn.hide, tilt.hide = i >= settings.plane_count, i != active
+            if not turn.hide:
+                t, up, _ = plane_axes(matrix, settings, i).T
+                turn.matrix_basis = Matrix.Translation(center + REACH * reach * t)
+                tilt.matrix_basis = Matrix.Translation(center + UPRIGHT * reach * up)
+        self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)

@@ -1,0 +1,208 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is drawn over the viewport: the preview of a pick, the active sampling plane, and the legend."""
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from ..probe import probe
+from ..scene import colors, patch_object
+from ..stability_map import map_object
+from ..touch import units
+from ..touch.touch_object import plane_axes
+
+# Okabe and Ito's colors, which color-blind readers can tell apart, one a sampling plane.
+PLANE_COLORS = [
+    (0.90, 0.62, 0.0), (0.34, 0.71, 0.91), (0.0, 0.62, 0.45),
+    (0.94, 0.89, 0.26), (0.80, 0.47, 0.65), (0.84, 0.37, 0.0),
+]  # fmt: skip
+WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
+CIRCLE = np.linspace(0.0, 2.0 * np.pi, 97)
+FONT = 0
+STEPS = 65  # of the legend's colors
+# In pixels at the resolution scale 1, width and height: the legend's bar, and Blender's navigation buttons.
+BAR, NAVIGATION = (150, 12), (50, 290)
+
+
+def draw_preview(seen):
+    """A ring in the tangent plane, the normal and the section curves of the touch in `seen`, a dict."""
+    touched = seen["touched"]
+    if touched is None:
+        return
+    frame, size = touched.result.frame, touched.report["extent"]
+    e1, n, across = np.transpose(touched.report["axes"])
+    ring = frame.origin + size * (np.outer(np.cos(CIRCLE), e1) + np.outer(np.sin(CIRCLE), across))
+    strips = [(ring, WHITE), (np.array([frame.origin, frame.origin + 0.6 * size * n]), WHITE)]
+    pairs = zip(touched.contours, PLANE_COLORS, strict=False)
+    strips += [(contour.points, (*color, 1.0)) for contour, color in pairs]
+    scale = bpy.context.preferences.system.ui_scale
+    gpu.state.blend_set("ALPHA")
+    for points, color in strips:
+        _line(points, DARK, 4.5 * scale)
+        _line(points, color, 2.0 * scale)
+    gpu.state.blend_set("NONE")
+
+
+def _line(points, color, width):
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    shader.uniform_float("lineWidth", width)
+    shader.uniform_float("color", color)
+    batch_for_shader(shader, "LINE_STRIP", {"pos": points.tolist()}).draw(shader)
+
+
+def _active(context):
+    """The active object, where the viewport shows overlays."""
+    space = context.space_data
+    return context.view_layer.objects.active if space and space.overlay.show_overlays else None
+
+
+def draw_plane():
+    """The active sampling plane of the active probe, as far as its contour may reach."""
+    context = bpy.context
+    obj = _active(context)
+    if not probe.is_probe(obj) or not obj.visible_get():
+        return
+    settings, record = obj.tactile_probe, probe.record_of(obj)
+    if record is None:
+        return
+    number = min(settings.active_plane, settings.plane_count - 1)
+    t, up, _ = plane_axes(obj.matrix_world, settings, number).T
+    origin, size = np.array(obj.matrix_world.translation), record["extent"]
+    corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (1, 0.6), (-1, 0.6))]
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    gpu.state.blend_set("ALPHA")
+    shader.uniform_float("color", (*PLANE_COLORS[number], 0.18))
+    positions = {"pos": [corner.tolist() for corner in corners]}
+    batch_for_shader(shader, "TRIS", positions, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+def draw_legend():
+    """The legend of the active patch or map: quantity, unit and range, beside the sidebar."""
+    context = bpy.context
+    obj = _active(context)
+    patch = probe.patch_near(obj)
+    record = probe.record_of(obj)
+    if record is not None and "color_limit" in record and patch.visible_get():
+        shown = patch.tactile_colors
+        low = 0.0 if shown in patch_object.POSITIVE else -1.0
+        title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
+        bar = _scale(context, title, record, record["radius"], patch_object.POWERS[shown], low)
+        _draw_box(context, *bar)
+    elif obj is not None and map_object.RECORD in obj and obj.visible_get():
+        record, shown = obj[map_object.RECORD], obj.tactile_map_colors
+        title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
+        bar = _scale(context, title, record, record["spacing"], map_object.POWERS[shown], 0.0)
+        if shown == "reason":
+            bar = title, 0.0, []
+        elif shown in map_object.LOGARITHMIC:
+            bar = title, 0.0, [(at, f"{record['color_limit'] ** at:.2g}") for at in (0.0, 0.5, 1.0)]
+        _draw_box(context, *bar, map_object.swatches(obj))
+
+
+def _scale(context, title, record, size, power, low):
+    """The title with its unit, where the colors begin, and the (place, text) labels of a scale."""
+    unit = units.unit_of(context.scene, size)
+    symbol = units.symbol(power, unit)
+    top = record["color_limit"] / unit[1] ** power
+    labels = [(at, f"{at * top:.3g}") for at in (low, 0.5 * (low + 1.0), 1.0)]
+    return f"{title} ({symbol})" if symbol else title, low, labels
+
+
+def _draw_box(context, title, low, labels, swatches=()):
+    """Title, colors from `low` to 1 with labels, if any, and swatches; nothing where it has no room."""
+    theme, scale = (
+        context.preferences.themes[0].user_interface.wcol_tooltip,
+        context.preferences.system.ui_scale,
+    )
+    blf.size(FONT, 11.0 * scale)
+    blf.color(FONT, *theme.text, 1.0)
+    gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
+    bar = BAR[1] * scale + line + 2.0 * gap if labels else 0.0
+    high = line + 2.0 * gap + bar + len(swatches) * (line + gap)
+    left, right, bottom = _free_strip(context, high + gap)
+    lengths = [blf.dimensions(FONT, title)[0]]
+    lengths += [blf.dimensions(FONT, text)[0] + 2.0 * line + gap for text, _ in swatches]
+    wide = min(max(BAR[0] * scale, *lengths) + 4.0 * gap, right - left - gap)
+    if wide < 0.5 * BAR[0] * scale or bottom + high > context.region.height:
+        return
+    x, y = right - gap - wide, bottom + gap
+    _fill_box(x, y, wide, high, (*theme.inner[:3], 0.8))
+    x, wide = x + 2.0 * gap, wide - 4.0 * gap
+    for number, (text, color) in enumerate(reversed(swatches)):
+        at = y + gap + number * (line + gap)
+        _fill_box(x, at, 2.0 * line, line, color)
+        _write(text, x + 2.0 * line + gap, at)
+    y += high - gap - line
+    if labels:
+        _draw_bar(x, y - gap - BAR[1] * scale, wide, BAR[1] * scale, gap, low, labels)
+    blf.size(FONT, 11.0 * scale * min(1.0, wide / lengths[0]))
+    _write(title, x, y)
+
+
+def _draw_bar(x, y, wide, high, gap, low, labels):
+    """The colors from `low` to 1, and below them the (place, text) labels."""
+    at = np.linspace(x, x + wide, STEPS)
+    shades = colors.shades(np.repeat(np.linspace(low, 1.0, STEPS), 2), 1.0)
+    _fill([(a, b) for a in at for b in (y, y + high)], shades.tolist())
+    labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
+    first, middle, last = (blf.dimensions(FONT, text)[0] for _, text in labels)
+    if 0.5 * (wide - middle) < max(first, last):
+        del labels[1]  # it would run into one beside it
+    line = blf.dimensions(FONT, "0")[1]
+    for share, text in labels:
+        middle = x + (share - low) / (1.0 - low) * wide
+        length = blf.dimensions(FONT, text)[0]
+        _write(text, min(max(middle - 0.5 * length, x - gap), x + wide + gap - length), y - gap - line)
+
+
+def _fill_box(x, y, wide, high, color):
+    _fill([(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)], [color] * 4)
+
+
+def _write(text, x, y):
+    blf.position(FONT, x, y, 0.0)
+    blf.draw(FONT, text)
+
+
+def _fill(points, shades):
+    """A strip of triangles, each of its points (x, y) in a color of its own."""
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    gpu.state.blend_set("ALPHA")
+    batch_for_shader(shader, "TRI_STRIP", {"pos": points, "color": shades}).draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+def _free_strip(context, high):
+    """(left, right, bottom) of a strip so high that no sidebar, shelf or button covers, as low as can be."""
+    region, scale = context.region, context.preferences.system.ui_scale
+    left, right, bottom = 0.0, region.width, 0.0
+    hud = 0.0
+    for other in context.area.regions:
+        if other.type == "WINDOW" or min(other.width, other.height) <= 1:
+            continue
+        x, y = other.x - region.x, other.y - region.y
+        if other.type == "HUD":
+            hud, hud_top = x + other.width, y + other.height
+        elif other.alignment == "LEFT":
+            left = max(left, x + other.width)
+        elif other.alignment == "RIGHT":
+            right = min(right, x)
+        elif other.alignment == "BOTTOM":
+            bottom = max(bottom, y + other.height)
+    if region.height - NAVIGATION[1] * scale < bottom + high:
+        right -= NAVIGATION[0] * scale
+    if hud and right - 1.3 * BAR[0] * scale < hud:
+        bottom = max(bottom, hud_top)
+    return left, right, bottom
+
+
+def draw_handlers():
+    """Adds those that are always there; returns what takes them away."""
+    add = bpy.types.SpaceView3D.draw_handler_add
+    kinds = ((draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
+    return [add(draw, (), "WINDOW", kind) for draw, kind in kinds]

@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pick Reference Point: hover to see how the surface lies, click to have a probe and a patch there."""
+
+import bpy
+from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
+
+from ..probe import probe
+from ..probe.operators import make_active, report_error, target_object
+from ..touch import units
+from ..touch.settings import NAMES, TouchSettings, draw_all, touch_arguments
+from ..touch.surface import MeshSurface
+from ..touch.touch_object import touch
+from ..touch.wording import sentence
+from . import overlay
+from .mouse import draw_hints, mouse_ray, viewport_below
+
+NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
+LAYERS = 64  # patches and hidden objects that the mouse sees through at most
+UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
+HINTS = (
+    ("MOUSE_LMB", "Touch Here"),
+    ("MOUSE_RMB", "Cancel"),
+    ("EVENT_ESC", "Cancel"),
+    ("MOUSE_MMB", "Navigate"),
+)
+
+
+class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
+    """Click on a mesh: a probe there feels the surface and keeps a patch of it up to date"""
+
+    bl_idname = "tactile.pick"
+    bl_label = "Pick Reference Point"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    target: StringProperty(
+        name="Target",
+        description="Name of the mesh object to touch; empty for the active object",
+        options=UNSAVED,
+    )
+    location: FloatVectorProperty(
+        name="Location",
+        subtype="TRANSLATION",
+        description="Where to touch; the 3D cursor where it is not set",
+        options=UNSAVED,
+    )
+    outward: FloatVectorProperty(
+        name="Outward",
+        subtype="XYZ",
+        description="To the side to touch from; the surface's own normal where it is not set",
+        options=UNSAVED,
+    )
+    new: BoolProperty(
+        name="New Probe",
+        description="Make another probe instead of moving the active one",
+        options=UNSAVED,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Points are picked in Object Mode: leave this mode first")
+            return False
+        return True
+
+    def invoke(self, context, event):
+        if context.area is None or context.area.type != "VIEW_3D":
+            self.report({"ERROR"}, "Points are picked in a 3D viewport: start it there")
+            return {"CANCELLED"}
+        for name in NAMES:  # those of the last pick are remembered, but suited another object
+            self.properties.property_unset(name)
+        try:
+            self._inherit(context)
+        except ValueError as error:
+            return report_error(self, error)
+        # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
+        self._seen = {"touched": None}
+        self._drawing = bpy.types.SpaceView3D.draw_handler_add(
+            overlay.draw_preview, (self._seen,), "WINDOW", "POST_VIEW"
+        )
+        self._area = context.area
+        context.window.cursor_modal_set("EYEDROPPER")
+        context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
+        context.window_manager.modal_handler_add(self)
+        self._hover(context, event)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            self.cancel(context)
+            return {"CANCELLED"}
+        if event.type.startswith(NAVIGATION) or (event.type == "LEFTMOUSE" and event.alt):
+            return {"PASS_THROUGH"}
+        if event.type == "MOUSEMOVE":
+            self._hover(context, event)
+        if event.type == "LEFTMOUSE" and event.value == "PRESS":
+            self._hover(context, event)
+            touched = self._seen["touched"]
+            if touched is not None:
+                self.target = touched.report["source"]
+                self.location = touched.result.frame.origin
+                self.outward = touched.result.frame.axes[:, 2]
+                self.cancel(context)
+                return self.execute(context)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Takes away all that shows that a pick is going on."""
+        bpy.types.SpaceView3D.draw_handler_remove(self._drawing, "WINDOW")
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+        self._area.header_text_set(None)
+        _redraw(context)
+
+    def execute(self, context):
+        depsgraph = context.evaluated_depsgraph_get()
+        try:
+            moved = self._inherit(context)
+            target = self._target(context, moved)
+            touched = self._touch(context, target, depsgraph)
+        except ValueError as error:
+            return report_error(self, error)
+        found = moved or probe.make(context, target)
+        settings = found.tactile_probe
+        settings.is_probe = False  # It must not be touched again for each of these.
+        settings.target = target
+        for name in NAMES:
+            setattr(settings, name, getattr(self, name))
+        probe.adopt(found, touched, depsgraph, complete=True)
+        settings.is_probe = True
+        make_active(context, found)
+        report = touched.report
+        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, report["message"])
+        return {"FINISHED"}
+
+    def _target(self, context, moved):
+        if moved is not None and not self.target and moved.tactile_probe.target is not None:
+            return moved.tactile_probe.target
+        return target_object(context, self.target)
+
+    def _touch(self, context, target, depsgraph):
+        given = self.properties.is_property_set
+        return touch(
+            target,
+            depsgraph,
+            list(self.location) if given("location") else list(context.scene.cursor.location),
+            toward=list(self.outward) if given("outward") else None,
+            **touch_arguments(self),
+        )
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "target")
+        layout.prop(self, "location")
+        draw_all(layout, self)
+
+    def _inherit(self, context):
+        """The probe that is to be moved, if any; what is not set becomes what it has.
+
+        Raises ValueError where it cannot be changed.
+        """
+        moved = None if self.new else probe.probe_of(context.view_layer.objects.active)
+        if moved is not None:
+            probe.require_unlocked(moved)
+            for name in NAMES:
+                if not self.properties.is_property_set(name):
+                    setattr(self, name, getattr(moved.tactile_probe, name))
+        return moved
+
+    def _hover(self, context, event):
+        """Touches below the mouse; the preview shows it, and the header says it."""
+        self._seen["touched"], words = None, "Move over a mesh to touch it"
+        try:
+            found = _point_below(context, event)
+            if found is not None:
+                obj, location, eye = found
+                depsgraph = context.evaluated_depsgraph_get()
+                touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
+                self._seen["touched"] = touched
+                unit = units.unit_of(context.scene, touched.result.radius)
+                k1, k2 = (units.say(k, -1, unit) for k in (touched.result.patch.k1, touched.result.patch.k2))
+                words = f"{touched.report['source']}: principal curvatures {k1} and {k2}"
+        except ValueError as error:
+            words = sentence(error)
+        self._area.header_text_set(f"Pick Reference Point     {words}")
+        _redraw(context)
+
+
+def _redraw(context):
+    for area in context.screen.areas:
+        if area.type == "VIEW_3D":
+            area.tag_redraw()
+
+
+def _point_below(context, event):
+    """(object, location, direction toward the eye) of the mesh below the mouse, or None where there is none.
+
+    Raises ValueError for what cannot be touched.
+    """
+    viewport = viewport_below(context, event)
+    if viewport is None:
+        return None
+    space, region, view = viewport
+    eye, direction = mouse_ray(region, view, event)
+    # An orthographic view shows what is behind its origin too.
+    start = eye if view.is_perspective else eye - space.clip_end * direction
+    depsgraph = context.evaluated_depsgraph_get()
+    cast = context.scene.ray_cast
+    for _ in range(LAYERS):
+        hit, point, _, _, found, matrix = cast(depsgraph, start, direction)
+        if not hit:
+            return None
+        obj = found.original
+        if not probe.is_result(obj) and obj.visible_in_viewport_get(space):
+            _require_touchable(obj, matrix)
+            # Cast again from close by: from far away it is not exact.
+            surface = MeshSurface(obj, depsgraph)
+            depth = (point - eye).dot(direction) - surface.size
+            start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
+            hit = surface.ray_cast(start, direction, 2.0 * surface.size)
+            return obj, list(point) if hit is None else hit[0], -direction
+        # Behind it, by more than rounding: from close by, for from far away that is more than a small object.
+        back = 1e-3 * (point - start).length
+        hit, near, *_ = cast(depsgraph, point - back * direction, direction)
+        start = (near if hit else point) + 1e-5 * max(back, point.length) * direction
+    return None
+
+
+def _require_touchable(obj, matrix):
+    if obj.type != "MESH":
+        raise ValueError(f'"{obj.name}" is no mesh: convert it to one first')
+    if matrix != obj.matrix_world:
+        raise ValueError(f'This is an instance of "{obj.name}": make it real to touch it')

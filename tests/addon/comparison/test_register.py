@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Register onto Mesh of the installed extension in a real Blender, without a window."""
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from mathutils import Euler, Matrix, Vector
+
+RADIUS = 0.3
+
+
+@pytest.fixture
+def suzanne(empty):
+    empty.ops.mesh.primitive_monkey_add()
+    obj = empty.context.object
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 3
+    obj.scale, obj.rotation_euler = (1.1, 0.9, 1.0), (0.1, 0.2, 0.3)
+    empty.context.view_layer.update()
+    return obj
+
+
+def touched(bpy, target, location):
+    assert bpy.ops.tactile.reconstruct(target=target.name, location=location, extent=RADIUS) == {"FINISHED"}
+    return bpy.context.object
+
+
+def lost(bpy, patch):
+    """Where the patch was; it is somewhere else now."""
+    matrix = patch.matrix_world.copy()
+    patch.matrix_world = Matrix.LocRotScale(Vector((4.0, -3.0, 7.0)), Euler((2.0, 0.7, -1.2)), None) @ matrix
+    bpy.context.view_layer.update()
+    return matrix
+
+
+def apart(one, other):
+    """Distance, and angle in degrees, of two transforms."""
+    turn = one.to_quaternion().rotation_difference(other.to_quaternion()).angle
+    return (one.translation - other.translation).length, math.degrees(min(turn, 2.0 * math.pi - turn))
+
+
+def forehead(obj, bpy):
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    hit, point, _, _ = evaluated.ray_cast((0.35, -5.0, 0.35), (0.0, 1.0, 0.0))
+    assert hit
+    return obj.matrix_world @ point
+
+
+def test_a_lost_patch_comes_back_with_its_contours(empty, suzanne):
+    patch = touched(empty, suzanne, forehead(suzanne, empty))
+    truth = lost(empty, patch)
+    before = [tuple(vertex.co) for vertex in suzanne.data.vertices]
+    assert empty.ops.tactile.register(target=suzanne.name) == {"FINISHED"}
+    empty.context.view_layer.update()
+    distance, angle = apart(patch.matrix_world, truth)
+    assert (distance < 0.02 * RADIUS, angle < 2.0) == (True, True), (distance, angle)
+    (lines,) = patch.children
+    assert apart(lines.matrix_world, truth)[0] < 0.02 * RADIUS
+    found = patch["tactile"]["registration"].to_dict()
+    assert found["residuals"] == sorted(found["residuals"])
+    assert found["residuals"][0] < 0.01 * RADIUS
+    assert [tuple(vertex.co) for vertex in suzanne.data.vertices] == before
+    assert empty.ops.tactile.verify(target=suzanne.name) == {"FINISHED"}
+    assert patch["tactile"]["verification"]["extra_fit_error"] < 0.05 * RADIUS
+
+
+def test_a_mesh_that_is_mirrored_is_still_seen_from_outside(empty, suzanne):
+    suzanne.scale.x *= -1.0
+    empty.context.view_layer.update()
+    patch = touched(empty, suzanne, forehead(suzanne, empty))
+    truth = lost(empty, patch)
+    assert empty.ops.tactile.register(target=suzanne.name) == {"FINISHED"}
+    distance, angle = apart(patch.matrix_world, truth)
+    assert (distance < 0.02 * RADIUS, angle < 2.0) == (True, True), (distance, angle)
+
+
+def test_on_a_ball_others_are_about_as_good_and_can_be_chosen(empty, capfd):
+    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48)
+    ball = empty.context.object
+    patch = touched(empty, ball, (0.0, 0.0, 1.0))
+    lost(empty, patch)
+    assert empty.ops.tactile.register(target=ball.name) == {"FINISHED"}
+    found = patch["tactile"]["registration"].to_dict()
+    assert found["is_ambiguous"]
+    assert "poses are about as good" in capfd.readouterr().out
+    first = patch.matrix_world.copy()
+    assert patch.matrix_world.translation.length == pytest.approx(1.0, abs=0.01)
+    lost(empty, patch)
+    assert empty.ops.tactile.register(target=ball.name, pose=2) == {"FINISHED"}
+    assert apart(first, patch.matrix_world)[0] + apart(first, patch.matrix_world)[1] > 0.01
+
+
+def test_what_cannot_be_registered_gets_a_sentence_and_stays(empty, suzanne):
+    patch = touched(empty, suzanne, forehead(suzanne, empty))
+    truth = lost(empty, patch)
+    empty.ops.mesh.primitive_cube_add(size=0.05)
+    cube = empty.context.object
+    empty.context.view_layer.objects.active = patch
+    stays = np.array(patch.matrix_world)
+    for arguments, sentence in (
+        ({"target": cube.name}, "Vertices: wanted a mesh from"),
+        ({"target": "Nobody"}, "There is no object"),
+    ):
+        with pytest.raises(RuntimeError, match=sentence):
+            empty.ops.tactile.register(**arguments)
+        assert np.array_equal(patch.matrix_world, stays)
+        assert "registration" not in patch["tactile"]
+    assert truth is not None
+
+
+def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
+    place = forehead(suzanne, empty)
+    assert empty.ops.tactile.pick(target=suzanne.name, location=place, extent=0.3) == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="is that of its probe: it is known already"):
+        empty.ops.tactile.register(target=suzanne.name)
+    patch = extension.tactile_addon.probe.probe.patch_near(empty.context.object)
+    registration, report = (
+        extension.tactile_addon.comparison.register_operator,
+        extension.tactile_addon.touch.wording,
+    )
+    found = {"target": "A", "pose": 1, "residuals": [0.1, 0.2], "is_ambiguous": False}
+    assert report.registration_summary(found) == 'The contacts are 0.1 off "A" (root mean square)'
+    patch.parent = None
+    depsgraph = empty.context.evaluated_depsgraph_get()
+    with pytest.raises(ValueError, match=r"poses on .* take one of them"):
+        registration.register_patch(patch, suzanne, depsgraph, pose=99)

@@ -1,0 +1,403 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Verify Against Mesh of the installed extension in a real Blender, without a window."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from mathutils import Matrix
+from scenes import positions, values
+
+RADIUS = 2.0
+TOP = (0.3, -0.2, 1.9)
+TOUCH = {"target": "Sphere", "location": TOP, "extent": 0.6, "step": 0.06}
+
+
+def add_ball(bpy, radius=RADIUS, name="Sphere"):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=radius)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+@pytest.fixture
+def patch(empty):
+    """The patch of a finely faceted ball of radius 2, active, alone selected."""
+    add_ball(empty)
+    assert empty.ops.tactile.reconstruct(**TOUCH) == {"FINISHED"}
+    return empty.context.object
+
+
+def verified(bpy, patch, **arguments):
+    assert bpy.ops.tactile.verify(**arguments) == {"FINISHED"}
+    return patch["tactile"]["verification"].to_dict()
+
+
+def state(obj):
+    """All of a mesh object that a verification might change by mistake."""
+    names = sorted(obj.data.attributes.keys())
+    return (
+        obj.name,
+        [list(row) for row in obj.matrix_world],
+        [tuple(vertex.co) for vertex in obj.data.vertices],
+        names,
+        obj.data.materials.keys(),
+        sorted(obj.keys()),
+    )
+
+
+def activate(bpy, obj, *others):
+    bpy.ops.object.select_all(action="DESELECT")
+    for one in (obj, *others):
+        one.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+
+
+def test_by_default_the_mesh_that_was_touched(empty, patch):
+    ball = empty.data.objects["Sphere"]
+    before, report = state(ball), patch["tactile"].to_dict()
+    names, deviation = set(empty.data.objects.keys()), values(patch.data, "deviation")
+    found = verified(empty, patch)
+    assert found["target"] == "Sphere"
+    assert found["vertices"] == report["vertices"] > 200
+    assert found["vertex_distance_mean"] == pytest.approx(report["vertex_distance_mean"])
+    assert found["vertex_distance_max"] == pytest.approx(report["vertex_distance_max"])
+    assert 0.0 < found["vertex_distance_median"] <= found["vertex_distance_max"]
+    assert found["vertex_distance_mean"] <= found["vertex_distance_rms"] <= found["vertex_distance_max"]
+    assert found["contacts"] == report["contacts"] == 60
+    assert found["fit_error"] == pytest.approx(report["fit_error"])
+    assert found["extra_contours"] == 9
+    assert found["extra_points"] > 9 * 20
+    assert found["extra_fit_error"] < 0.005
+    assert found["total_absolute_curvature"] == pytest.approx(report["total_absolute_curvature"])
+    assert found["overlap"] == 1.0
+    # Nothing else has changed: not the ball, not the rest of the report, not the deviation.
+    after = patch["tactile"].to_dict()
+    assert after.pop("verification") == found
+    assert after == report
+    assert state(ball) == before
+    assert set(empty.data.objects.keys()) == names
+    assert values(patch.data, "deviation") == pytest.approx(deviation, abs=1e-6)
+
+
+def test_another_mesh_of_known_distance_by_name_and_by_selection(empty, patch):
+    """A ball 0.01 larger about the same center is 0.01 outside the patch."""
+    other, report = add_ball(empty, RADIUS + 0.01, "Larger"), patch["tactile"].to_dict()
+    activate(empty, patch)
+    named = verified(empty, patch, target="Larger")
+    assert named["target"] == "Larger"
+    assert named["vertex_distance_mean"] == pytest.approx(0.01, rel=0.05)
+    assert named["extra_fit_error"] == pytest.approx(0.01, rel=0.1)
+    assert values(patch.data, "deviation").mean() == pytest.approx(-0.01, rel=0.1)
+    assert patch["tactile"]["status"] == "uncertain"
+    activate(empty, patch, other)
+    selected = verified(empty, patch)
+    assert selected == named
+    # Against the ball that was touched all is as it was.
+    activate(empty, patch)
+    assert verified(empty, patch)["target"] == "Sphere"
+    assert [patch["tactile"][key] for key in ("status", "message")] == [report["status"], report["message"]]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 40.0])
+def test_patch_and_mesh_moved_turned_and_in_another_unit(empty, patch, scale):
+    one = verified(empty, patch)
+    turn = Matrix.Rotation(0.7, 4, (1.0, 2.0, -0.5))
+    move = Matrix.Translation((3.0 * scale, -scale, 0.5 * scale)) @ turn @ Matrix.Scale(scale, 4)
+    ball = empty.data.objects["Sphere"]
+    for obj in (ball, patch):
+        obj.matrix_world = move @ obj.matrix_world
+    empty.context.view_layer.update()
+    other = verified(empty, patch)
+    assert set(one) == set(other)
+    for key, value in one.items():
+        if isinstance(value, float):
+            expected = value * (scale if "distance" in key or "error" in key else 1.0)
+            assert other[key] == pytest.approx(expected, rel=0.02, abs=2e-6 * scale), key
+    assert other["vertices"] == pytest.approx(one["vertices"], abs=2)
+    # A scan in the patch's old unit, as its mesh has it, is the same thing too.
+    ball.data.transform(Matrix.Scale(1.0 / scale, 4))
+    ball.matrix_world = ball.matrix_world @ Matrix.Scale(scale, 4)
+    empty.context.view_layer.update()
+    again = verified(empty, patch)
+    assert again["vertex_distance_mean"] == pytest.approx(other["vertex_distance_mean"], rel=0.02)
+
+
+def test_a_patch_moved_off_its_mesh(empty, patch):
+    patch.matrix_world = Matrix.Translation(0.05 * patch.matrix_world.col[2].xyz) @ patch.matrix_world
+    empty.context.view_layer.update()
+    found = verified(empty, patch)
+    assert found["vertex_distance_max"] == pytest.approx(0.05, rel=0.05)
+    assert found["contact_distance_max"] < 1e-3
+    assert values(patch.data, "deviation").mean() == pytest.approx(0.05, rel=0.05)
+
+
+def test_the_scenes_unit_is_the_panels(empty, patch, extension):
+    addon = extension.tactile_addon
+    settings = empty.context.scene.unit_settings
+    settings.system, settings.scale_length, settings.length_unit = "METRIC", 0.001, "MILLIMETERS"
+    found = verified(empty, patch)
+    unit = addon.touch.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
+    head, *rows, points = addon.touch.wording.verification_table(found, unit)
+    assert head == ("Distance", "Mesh", "Contacts")
+    assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
+    assert all(cell.endswith(" mm") for row in rows for cell in row[1:])
+    assert rows[0][1] == f"{found['vertex_distance_mean']:.3g} mm"
+    assert points == ("Points", str(found["vertices"]), "60")
+    assert dict(addon.touch.wording.verification_rows(found, unit))["Overlap"] == "100 %"
+
+
+def test_what_is_written_on_the_mesh_where_that_is_asked_for(empty, patch):
+    ball = empty.data.objects["Sphere"]
+    ball.data.attributes.new("patch_overlap", "FLOAT", "FACE")  # of another kind: makes room
+    before = state(ball)
+    found = verified(empty, patch, write=True)
+    after = state(ball)
+    assert set(after[3]) - set(before[3]) == {"patch_distance"}
+    assert after[:3] == before[:3]
+    distance, overlap = values(ball.data, "patch_distance"), values(ball.data, "patch_overlap") == 1
+    assert overlap.sum() == found["vertices"]
+    assert distance[overlap].mean() == pytest.approx(found["vertex_distance_mean"], rel=1e-5)
+    assert distance[overlap].max() == pytest.approx(found["vertex_distance_max"], rel=1e-5)
+    assert (distance[~overlap] == -1.0).all()
+    at = positions(ball.data)[overlap]
+    assert np.linalg.norm(at - patch["tactile"]["frame"]["origin"], axis=1).max() < 0.7
+
+
+def test_half_covered_and_nothing_below(empty, patch, capfd):
+    cut = add_ball(empty, name="Half").data
+    point = np.array(patch["tactile"]["frame"]["origin"])
+    across = np.cross(point, (1.0, 0.0, 0.0))
+    at = np.array([vertex.co for vertex in cut.vertices])
+    empty.ops.object.mode_set(mode="EDIT")
+    empty.ops.mesh.select_all(action="SELECT")
+    empty.ops.mesh.bisect(plane_co=point, plane_no=across, clear_inner=True)
+    empty.ops.object.mode_set(mode="OBJECT")
+    assert len(cut.vertices) < 0.6 * len(at)
+    activate(empty, patch)
+    found = verified(empty, patch, target="Half", write=True)
+    assert found["overlap"] == pytest.approx(0.5, abs=0.03)
+    overlap = values(empty.data.objects["Half"].data, "patch_overlap") == 1
+    assert found["vertices"] == overlap.sum() < patch["tactile"]["vertices"]
+    assert "it covers 5" in capfd.readouterr().out.replace("covers 4", "covers 5")
+    add_ball(empty, 0.1, "Far")
+    activate(empty, patch)
+    found = verified(empty, patch, target="Far")
+    assert (found["vertices"], found["extra_contours"], found["overlap"]) == (0, 0, 0.0)
+    assert 'Nothing of "Far" is below the patch' in capfd.readouterr().out
+
+
+def test_layers_hidden_from_a_finger_do_not_count(empty, patch):
+    alone = verified(empty, patch)
+    for i, radius in enumerate((0.99, 0.95)):  # inner walls, which face outward too
+        add_ball(empty, radius * RADIUS, f"Wall {i}")
+    empty.context.view_layer.objects.active = empty.data.objects["Sphere"]
+    for obj in empty.data.objects:
+        obj.select_set(obj.name in ("Sphere", "Wall 0", "Wall 1"))
+    empty.ops.object.join()
+    activate(empty, patch)
+    nested = verified(empty, patch, target="Sphere")
+    assert nested == pytest.approx(alone)
+
+
+def test_a_coarse_mesh_has_no_vertices_over_the_patch(empty, capfd):
+    empty.ops.mesh.primitive_plane_add(size=10.0)
+    assert empty.ops.tactile.reconstruct(location=(0.5, 0.2, 0.0)) == {"FINISHED"}
+    found = verified(empty, empty.context.object)
+    assert (found["vertices"], found["overlap"], found["extra_contours"]) == (0, 1.0, 9)
+    assert found["extra_fit_error"] == pytest.approx(0.0, abs=1e-5)
+    assert "vertex_distance_mean" not in found
+    assert 'No vertex of "Plane" is over the patch, of which it covers 100 %' in capfd.readouterr().out
+
+
+def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patch, capfd):
+    ball = empty.data.objects["Sphere"]
+    at = positions(ball.data)
+    away = np.linalg.norm(at - np.array(patch["tactile"]["frame"]["origin"]), axis=1)
+    at *= 1.0 + 0.05 * np.clip(1.0 - away / 0.5, 0.0, 1.0)[:, None]
+    ball.data.vertices.foreach_set("co", at.ravel())  # by the attribute, Blender would keep its old tree
+    ball.data.update()
+    found = verified(empty, patch)
+    assert patch["tactile"]["status"] == "uncertain"
+    message = patch["tactile"]["message"]
+    share = 100.0 * found["vertex_distance_mean"] / patch["tactile"]["radius"]
+    assert message.startswith(f"The mesh is {share:.3g} % of the radius off the patch in the mean")
+    assert f"Warning: {message}" in capfd.readouterr().out
+
+
+def test_a_probes_patch_by_the_probe_and_until_it_is_touched_again(empty):
+    add_ball(empty)
+    empty.ops.tactile.pick(target="Sphere", location=TOP, extent=0.6, new=True)
+    probe = empty.context.object
+    (patch,) = probe.children
+    verified(empty, patch)
+    digest = probe.tactile_probe.digest
+    empty.context.view_layer.update()
+    assert "verification" in patch["tactile"]
+    assert probe.tactile_probe.digest == digest
+    verified(empty, patch, write=True)  # changes the target, but not its shape
+    empty.context.view_layer.update()
+    assert "verification" in patch["tactile"]
+    probe.tactile_probe.extent = 0.5
+    assert "verification" not in patch["tactile"]
+
+
+def test_a_linked_copy_keeps_its_own_deviation(empty, patch):
+    copy = patch.copy()
+    empty.context.collection.objects.link(copy)
+    add_ball(empty, RADIUS + 0.01, "Larger")
+    activate(empty, patch)
+    deviation = values(copy.data, "deviation")
+    verified(empty, patch, target="Larger")
+    assert patch.data != copy.data
+    assert (values(copy.data, "deviation") == deviation).all()
+
+
+def several(bpy, patch):
+    activate(bpy, patch, add_ball(bpy, name="One"), add_ball(bpy, name="Two"))
+
+
+def of_a_later_version(bpy, patch):
+    patch["tactile_reconstruction"] = patch["tactile_reconstruction"].replace('"version": 2', '"version": 3')
+
+
+def with_modifier(bpy, patch):
+    bpy.data.objects["Sphere"].modifiers.new("Subdivision", "SUBSURF")
+    return {"write": True}
+
+
+def scaled(*scale):
+    def spoil(bpy, patch):
+        patch.scale = scale
+        bpy.context.view_layer.update()
+
+    return spoil
+
+
+def no_source(bpy, patch):
+    bpy.data.objects.remove(bpy.data.objects["Sphere"])
+
+
+def with_empty(bpy, patch):
+    bpy.data.objects.new("Nothing", None)
+    return {"target": "Nothing"}
+
+
+def with_no_faces(bpy, patch):
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Bare", bpy.data.meshes.new("Bare")))
+    return {"target": "Bare"}
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (lambda bpy, patch: {"target": "Nobody"}, 'There is no object "Nobody"'),
+        (no_source, 'There is no object "Sphere"'),
+        (with_empty, '"Nothing" is no mesh'),
+        (with_no_faces, '"Bare" has no faces'),
+        (several, "2 meshes are selected: select one besides the patch"),
+        (of_a_later_version, "cannot be read any more: touch again .version: wanted 2, got 3"),
+        (with_modifier, 'The modifiers of "Sphere" make or take away vertices'),
+        (scaled(1.0, 2.0, 1.0), "is stretched, mirrored or scaled to nothing"),
+        (scaled(-1.0, 1.0, 1.0), "is stretched, mirrored or scaled to nothing"),
+        (scaled(-1.0, -1.0, -1.0), "is stretched, mirrored or scaled to nothing"),
+        (scaled(0.0, 0.0, 0.0), "is stretched, mirrored or scaled to nothing"),
+    ],
+)
+def test_bad_input_gets_a_sentence_and_changes_nothing(empty, patch, spoil, sentence):
+    arguments = spoil(empty, patch) or {}
+    record, objects = patch["tactile"].to_dict(), [o for o in empty.data.objects if o.type == "MESH"]
+    before = [state(obj) for obj in objects]
+    with pytest.raises(RuntimeError, match=sentence):
+        empty.ops.tactile.verify(**arguments)
+    assert patch["tactile"].to_dict() == record
+    assert [state(obj) for obj in objects] == before
+
+
+def test_linked_data_is_not_written(empty, patch, tmp_path):
+    path = str(tmp_path / "library.blend")
+    empty.ops.wm.save_as_mainfile(filepath=path)
+    empty.ops.wm.read_homefile(use_empty=True)
+    with empty.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.objects = ["Sphere", "Sphere Patch"]
+    for obj in wanted.objects:
+        empty.context.scene.collection.objects.link(obj)
+    linked = empty.data.objects["Sphere Patch"]
+    empty.context.view_layer.objects.active = linked
+    with pytest.raises(RuntimeError, match="comes from a library: make it local, or override it"):
+        empty.ops.tactile.verify()
+    ball = empty.data.objects["Sphere"]
+    empty.context.view_layer.objects.active = ball
+    assert empty.ops.tactile.reconstruct(location=TOP, extent=0.6) == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="cannot be changed: leave its Edit Mode, or make it local"):
+        empty.ops.tactile.verify(write=True)
+    assert empty.ops.tactile.verify() == {"FINISHED"}
+
+
+def test_without_a_patch_and_in_edit_mode_the_button_is_gray(empty, patch):
+    empty.context.view_layer.objects.active = empty.data.objects["Sphere"]
+    assert not empty.ops.tactile.verify.poll()
+    empty.ops.object.mode_set(mode="EDIT")
+    assert not empty.ops.tactile.verify.poll()
+    empty.ops.object.mode_set(mode="OBJECT")
+    activate(empty, patch)
+    assert empty.ops.tactile.verify.poll()
+    activate(empty, patch.children[0])  # by its contours
+    assert empty.ops.tactile.verify.poll()
+
+
+def test_one_undo_takes_all_of_it_back(empty, patch):
+    add_ball(empty, RADIUS + 0.01, "Larger")
+    activate(empty, patch)
+    name, deviation, status = patch.name, values(patch.data, "deviation"), patch["tactile"]["status"]
+    empty.ops.ed.undo_push(message="before")
+    empty.ops.tactile.verify("EXEC_DEFAULT", True, target="Larger", write=True)
+    assert "patch_distance" in empty.data.objects["Larger"].data.attributes
+    empty.ops.ed.undo_push(message="after")
+    empty.ops.ed.undo()
+    if "verification" in empty.data.objects[name]["tactile"]:  # a script's own push was one more
+        empty.ops.ed.undo()
+    patch = empty.data.objects[name]
+    assert "verification" not in patch["tactile"]
+    assert patch["tactile"]["status"] == status
+    assert (values(patch.data, "deviation") == deviation).all()
+    assert "patch_distance" not in empty.data.objects["Larger"].data.attributes
+    empty.ops.ed.redo()
+    assert empty.data.objects[name]["tactile"]["verification"]["target"] == "Larger"
+
+
+def test_from_the_shell(empty, command, tmp_path):
+    ball, report, table = (tmp_path / name for name in ("ball.ply", "report.json", "table.csv"))
+    add_ball(empty)
+    empty.ops.wm.ply_export(filepath=str(ball))
+    words = ["reconstruct", ball, "--location", *TOP, "--extent", 0.6]
+    code, out, _ = command(*words, "--json", report, "--verify", table)
+    assert code == 0
+    assert "(6) on more curves" in out
+    assert "100 % of the area" in out
+    found = json.loads(report.read_text())["verification"]
+    (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())
+    assert [row[key] for key in ("patch", "source", "target", "status")] == [
+        "ball Patch",
+        "ball",
+        "ball",
+        "ok",
+    ]
+    for key, value in found.items():
+        if key != "target":
+            length = "distance" in key or "error" in key
+            assert float(row[f"{key} [unit of the file]" if length else key]) == value
+    assert math.isclose(found["overlap"], 1.0)
+    code, _, err = command(*words, "--verify", tmp_path / "no" / "table.csv")
+    assert (code, 'to write "table.csv" to' in err) == (1, True)
+    # Where no vertex is over the patch the cells are empty.
+    empty.ops.wm.read_homefile(use_empty=True)
+    empty.ops.mesh.primitive_plane_add(size=10.0)
+    assert command("reconstruct", "--location", 0.5, 0.2, 0, "--extent", 1, "--verify", table)[0] == 0
+    (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())
+    cells = [row[key] for key in ("vertices", "vertex_distance_mean [unit of the file]", "contacts")]
+    assert cells == ["0", "", "72"]

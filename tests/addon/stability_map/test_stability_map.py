@@ -1,0 +1,345 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stability maps by the installed extension in a real Blender, without a window.
+
+Progress, Esc and what happens to the scene meanwhile are in tests/gui/stability.py.
+"""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+import bmesh
+from mathutils import Matrix
+from scenes import datablocks, made, positions, values
+
+import core
+
+PATCH, _, CREASE, EDGE, _, NOTHING = range(6)
+QUANTITIES = ("error", "height_std", "condition_number", "blind_share")
+
+
+def stability_map(bpy, **arguments):
+    """Runs the operator; the painted copy and its record."""
+    return made(bpy.ops.tactile.stability_map, "tactile_map", **arguments)
+
+
+def grid(bpy, count, size=2.0):
+    """A square sheet of count x count faces."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=count, y_subdivisions=count, size=size)
+    return bpy.context.object
+
+
+def edited(bpy, **cuts):
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.subdivide(**cuts)
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_a_ball_is_alike_all_over(empty, ball):
+    painted, record = stability_map(empty, spacing=0.4, degree=4)
+    assert record["points"] == record["touched"] == record["patches"]
+    assert record["in_doubt"] == 0
+    assert not any(record["refused"].values())
+    mesh = painted.data
+    assert not values(mesh, "reason").any()
+    error, std = values(mesh, "error"), values(mesh, "height_std")
+    assert error.min() > 0.0
+    assert error.max() < 0.001  # facets are 0.0006 inside the ball
+    assert std.max() < 2.0 * std.min()
+    assert values(mesh, "blind_share") == pytest.approx(3 / 14)
+    assert values(mesh, "condition_number").min() > 1.0
+    assert record["error_median"] == pytest.approx(np.median(error), rel=0.2)
+
+
+def test_what_a_map_says_is_what_a_touch_says(empty, ball):
+    """At every vertex, so that one of them is touched with the same inputs by the other operator."""
+    inputs = {"extent": 0.8, "step": 0.08, "plane_count": 4, "degree": 5}
+    painted, _ = stability_map(empty, spacing=0.01, **inputs)
+    for vertex in (700, 1200):
+        place = ball.data.vertices[vertex].co
+        normal = ball.data.vertices[vertex].normal
+        empty.ops.tactile.reconstruct(target=ball.name, location=place, outward=normal, **inputs)
+        report = empty.context.object["tactile"].to_dict()
+        for name in ("height_std", "condition_number"):
+            assert values(painted.data, name)[vertex] == pytest.approx(report[name], rel=1e-4), name
+        assert values(painted.data, "blind_share")[vertex] == pytest.approx(report["blind"] / 20)
+
+
+def test_a_cube_has_patches_on_its_faces_and_none_on_its_edges(empty):
+    empty.ops.mesh.primitive_cube_add(size=2.0)
+    edited(empty, number_cuts=19)
+    painted, record = stability_map(empty, spacing=0.01)
+    mesh = painted.data
+    assert record["points"] == len(mesh.vertices)
+    on_edge = np.count_nonzero(np.abs(positions(mesh)) > 0.999, axis=1) > 1
+    assert np.all(values(mesh, "reason")[on_edge] == CREASE)
+    assert np.all(values(mesh, "reason")[~on_edge] == PATCH)
+    assert values(mesh, "error")[~on_edge].max() < 1e-5
+    assert record["refused"]["crease"] == np.count_nonzero(on_edge)
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+def test_what_is_refused_has_no_value_and_a_color_of_its_own(empty, name):
+    empty.ops.mesh.primitive_cube_add(size=2.0)
+    edited(empty, number_cuts=9)
+    painted, _ = stability_map(empty, spacing=0.01)
+    painted.tactile_map_colors = name
+    refused = values(painted.data, "reason") == CREASE
+    assert np.all(values(painted.data, name)[refused] == -1.0)
+    assert values(painted.data, name)[~refused].min() >= 0.0
+    shades = values(painted.data, "stability_color", "color", 4)
+    assert np.ptp(shades[refused], axis=0).max() == 0.0
+    assert shades[refused].max(axis=0)[:3].max() < 0.1
+    assert shades[~refused].min(axis=0)[0] > 0.4
+
+
+def test_a_sheet_is_refused_at_its_border_and_around_a_hole(empty):
+    obj = grid(empty, 40)
+    mesh = bmesh.new()
+    mesh.from_mesh(obj.data)
+    inside = [v for v in mesh.verts if v.co.length < 0.3]
+    bmesh.ops.delete(mesh, geom=inside, context="VERTS")
+    mesh.to_mesh(obj.data)
+    mesh.free()
+    painted, record = stability_map(empty, spacing=0.01, extent=0.25, step=0.05)
+    co, reason = positions(painted.data), values(painted.data, "reason")
+    border = 1.0 - np.abs(co[:, :2]).max(axis=1)
+    to_hole = np.linalg.norm(co, axis=1) - 0.3
+    assert np.all(reason[border < 1e-6] == EDGE)
+    assert np.all(reason[to_hole < 0.03] == EDGE)
+    assert np.all(reason[(border > 0.11) & (to_hole > 0.15)] == PATCH)
+    assert record["refused"]["edge"] == np.count_nonzero(reason == EDGE)
+
+
+def test_each_of_nested_walls_is_compared_with_itself(empty, ball):
+    """Balls of which the inner is nearer than the extent."""
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=1.9)
+    ball.select_set(True)
+    empty.ops.object.join()
+    painted, record = stability_map(empty, spacing=0.3, extent=0.5)
+    assert record["patches"] == record["points"]
+    radii = np.linalg.norm(positions(painted.data), axis=1)
+    error = values(painted.data, "error")
+    for wall in (radii > 1.95, radii < 1.95):
+        assert error[wall].max() < 0.004
+
+
+def test_a_bump_between_the_curves_shows_as_error(empty):
+    """What no curve has felt makes no doubt, but it is an error."""
+    obj = grid(empty, 120)
+    co = positions(obj.data)
+    away = np.hypot(co[:, 0] - 0.26, co[:, 1] - 0.15)
+    co[:, 2] = 0.1 * np.exp(-((away / 0.05) ** 2))
+    obj.data.vertices.foreach_set("co", co.astype(np.float32).ravel())
+    obj.data.update()
+    painted, _ = stability_map(empty, spacing=0.05, extent=0.4, step=0.05)
+    error, ok = values(painted.data, "error"), values(painted.data, "reason") == PATCH
+    assert error[ok & (away > 0.15) & (away < 0.4)].max() > 5e-3
+    assert error[ok & (away > 0.9)].max() < 1e-6
+
+
+def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
+    ball.data.attributes.new("error", "BOOLEAN", "FACE")  # in the way, and of another type
+    ball.data.materials.append(empty.data.materials.new("Own"))
+    before = (ball.data.attributes.keys(), ball.data.materials.keys(), positions(ball.data).tolist())
+    faces = [tuple(face.vertices) for face in ball.data.polygons]
+    ball.modifiers.new("Wave", "SUBSURF").levels = 1
+    ball.location, ball.rotation_euler, ball.scale = (3.0, 1.0, -2.0), (0.3, 1.0, 2.0), (1.0, 2.0, -0.5)
+    painted, record = stability_map(empty, spacing=1.0)
+    assert before == (
+        ball.data.attributes.keys(),
+        ball.data.materials.keys(),
+        positions(ball.data).tolist(),
+    )
+    assert faces == [tuple(face.vertices) for face in ball.data.polygons]
+    assert [c.name for c in painted.users_collection] == ["Tactile Patches"]
+    assert (painted.name, record["painted"], record["source"]) == ("Sphere Stability",) * 2 + ("Sphere",)
+    assert np.array(painted.matrix_world) == pytest.approx(np.array(ball.matrix_world), abs=1e-5)
+    assert empty.context.view_layer.objects.active == painted
+    mesh = painted.data
+    assert len(mesh.polygons) == 4 * len(ball.data.polygons) - 128 * 2  # triangles make three
+    for name in QUANTITIES:
+        assert mesh.attributes[name].data_type == "FLOAT"
+        assert np.isfinite(values(mesh, name)).all()
+    assert mesh.attributes["reason"].data_type == "INT"
+    assert set(values(mesh, "reason")) <= set(range(6))
+    assert mesh.color_attributes.active_color.name == "stability_color"
+    assert [material.name for material in mesh.materials] == ["Tactile Stability"]
+
+
+def test_lengths_are_those_of_the_world(empty, ball):
+    _, small = stability_map(empty, spacing=0.4, extent=0.5)
+    ball.scale, ball.location, ball.rotation_euler = (10.0, 10.0, 10.0), (1e4, 0.0, 0.0), (1.0, 2.0, 3.0)
+    _, large = stability_map(empty, target="Sphere", spacing=4.0, extent=5.0)
+    assert large["points"] == pytest.approx(small["points"], rel=0.05)
+    for name in ("error_median", "height_std_median"):
+        assert large[name] == pytest.approx(10.0 * small[name], rel=0.05)
+
+
+def test_the_copy_lies_in_its_target_even_where_that_is_sheared(empty, ball):
+    parent = empty.data.objects.new("Parent", None)
+    empty.context.collection.objects.link(parent)
+    ball.parent, ball.rotation_euler = parent, (0.5, 0.6, 0.7)
+    parent.scale = (1.0, 3.0, 0.5)
+    empty.context.view_layer.update()
+    painted, _ = stability_map(empty, spacing=1.0)
+    matrices = [np.array(obj.matrix_world) for obj in (ball, painted)]
+    places = [positions(obj.data) @ m[:3, :3].T for obj, m in zip((ball, painted), matrices, strict=True)]
+    assert places[1] == pytest.approx(places[0], abs=1e-5)
+
+
+def test_touched_points_are_a_spacing_apart_and_leave_no_gap():
+    points = np.random.default_rng(3).normal(size=(4000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    chosen = [i for i in core.spaced(points, 0.1, np.random.default_rng(0)) if i is not None]
+    tree = cKDTree(points[chosen])
+    assert not tree.query_pairs(0.1)
+    assert tree.query(points)[0].max() < 0.15
+    # A part of them covers all of it as well.
+    part = cKDTree(points[chosen[: len(chosen) // 4]])
+    assert part.query(points)[0].max() < 0.6
+
+
+def test_the_same_seed_gives_the_same_map(empty, ball):
+    one, two, other = (
+        stability_map(empty, target="Sphere", spacing=0.7, noise=0.01, seed=seed)[0] for seed in (1, 1, 2)
+    )
+    assert np.array_equal(values(one.data, "height_std"), values(two.data, "height_std"))
+    assert not np.array_equal(values(one.data, "height_std"), values(other.data, "height_std"))
+
+
+@pytest.mark.parametrize("method", ["tagc", "quadratic-variation", "least-squares"])
+def test_the_papers_methods_have_their_maps(empty, ball, method):
+    _, record = stability_map(empty, spacing=2.0, method=method)
+    assert record["method"] == method
+    assert record["patches"] == record["points"] > 5
+
+
+def test_one_undo_step(empty, ball):
+    empty.context.preferences.edit.use_global_undo = True
+    empty.ops.ed.undo_push(message="Ball")
+    before = datablocks(empty)
+    # By its name with "EXEC_DEFAULT" and undo, as a button calls it.
+    empty.ops.tactile.stability_map("EXEC_DEFAULT", True, spacing=1.0)
+    assert "Sphere Stability" in empty.data.objects
+    empty.ops.ed.undo()
+    assert datablocks(empty) == before
+
+
+def test_a_vertex_without_a_face_is_not_touched(empty, ball):
+    ball.data.vertices.add(1)
+    ball.data.vertices[-1].co = (0.0, 0.0, 2.5)
+    painted, record = stability_map(empty, spacing=0.5)
+    assert record["refused"]["nothing"] == 0
+    assert values(painted.data, "reason")[-1] == PATCH  # of the nearest touch
+
+
+def test_faces_of_no_area_are_nothing_to_feel(empty):
+    obj = grid(empty, 4)
+    co = positions(obj.data)
+    co[:, 1] = 0.0
+    obj.data.vertices.foreach_set("co", co.astype(np.float32).ravel())
+    obj.data.update()
+    painted, record = stability_map(empty, spacing=0.01, extent=0.2)
+    assert record["patches"] == 0
+    assert np.all(values(painted.data, "reason") == NOTHING)
+    assert "error_median" not in record
+    for name in (*QUANTITIES, "reason"):
+        painted.tactile_map_colors = name
+        assert painted["tactile_map"]["color_limit"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"spacing": -0.1}, "The spacing is a length"),
+        ({"spacing": np.nan}, "The spacing is a length"),
+        ({"extent": 50.0}, "longer than"),
+        ({"extent": 0.1, "step": 0.2}, "The step 0.2 is longer"),
+        ({"extent": 0.1, "step": 0.09}, "of the 3 contacts it needs"),
+        ({"noise": -1.0}, "lengths of 0 or more"),
+        ({"azimuths": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "run in one direction"),
+        ({"tilts": (1.6, 0.0, 0.0, 0.0, 0.0, 0.0)}, "Tilt: wanted less than 90 degrees"),
+        ({"degree": 1}, "Degree: wanted"),
+        ({"weight": -1.0}, "Weight: wanted"),
+        ({"target": "Nobody"}, 'There is no object "Nobody"'),
+    ],
+)
+def test_bad_arguments_are_refused_with_a_sentence(empty, ball, arguments, sentence):
+    before = datablocks(empty)
+    with pytest.raises(RuntimeError, match=f"^Error: .*{sentence}"):
+        empty.ops.tactile.stability_map(**arguments)
+    assert datablocks(empty) == before
+
+
+def make_faceless(bpy, obj):
+    obj.data.clear_geometry()
+    obj.data.vertices.add(3)
+
+
+def make_curve(bpy, obj):
+    obj.name = "Ball"
+    bpy.ops.curve.primitive_bezier_circle_add()
+    bpy.context.object.name = "Sphere"
+
+
+def make_infinite(bpy, obj):
+    obj.data.vertices[5].co.x = np.nan
+
+
+def make_nowhere(bpy, obj):
+    obj.location.y = np.nan
+
+
+def make_flat(bpy, obj):
+    obj.scale.z = 0.0
+
+
+def make_disabled(bpy, obj):
+    obj.hide_viewport = True
+
+
+def make_disabled_with_a_probe(bpy, obj):
+    """Which keeps it in Blender's evaluation, without a mesh."""
+    bpy.ops.tactile.pick(target=obj.name, location=(0.0, 0.0, 2.0))
+    obj.hide_viewport = True
+
+
+def make_distant(bpy, obj):
+    obj.data.transform(Matrix.Translation((1e7, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (make_faceless, "no faces to touch"),
+        (make_curve, '"Sphere" is no mesh: select a mesh object, or convert this one'),
+        (make_infinite, "no finite place"),
+        (make_nowhere, "reaches farther than"),
+        (make_flat, "scaled to nothing"),
+        (make_disabled, "disabled in viewports"),
+        (make_disabled_with_a_probe, "disabled in viewports"),
+        (make_distant, "apart in single precision"),
+    ],
+)
+def test_what_cannot_be_touched_is_refused_with_a_sentence(empty, ball, spoil, sentence):
+    spoil(empty, ball)
+    before = datablocks(empty)
+    with pytest.raises(RuntimeError, match=sentence):
+        empty.ops.tactile.stability_map(target="Sphere", extent=0.1)
+    assert datablocks(empty) == before
+
+
+def test_a_map_and_a_patch_lead_back_to_what_was_touched(empty, ball):
+    _, record = stability_map(empty, spacing=1.0)
+    again, _ = stability_map(empty, spacing=1.0)  # the map is active, and no target
+    assert again["tactile_map"]["source"] == record["source"] == "Sphere"
+    empty.ops.tactile.reconstruct(location=(0.0, 0.0, 2.0))
+    assert empty.context.object["tactile"]["source"] == "Sphere"
+
+
+def test_edit_mode_is_to_be_left_first(empty, ball):
+    empty.ops.object.mode_set(mode="EDIT")
+    assert not empty.ops.tactile.stability_map.poll()

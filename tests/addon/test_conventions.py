@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What users of Blender expect of extensions: tooltips, reasons, units, a manual, a tab of their choice."""
+
+import re
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+
+
+def interfaces(bpy):
+    """The RNA of all operators, and of what a probe has, with the properties in them."""
+    found = [getattr(bpy.ops.tactile, name).get_rna_type() for name in dir(bpy.ops.tactile)]
+    found.append(bpy.context.object.tactile_probe.bl_rna)
+    for rna in found:
+        own = [p for p in rna.properties if p.identifier not in ("rna_type", "name") and not p.is_hidden]
+        yield rna, own
+    yield (
+        None,
+        [bpy.types.Object.bl_rna.properties[name] for name in ("tactile_colors", "tactile_map_colors")],
+    )
+
+
+def test_all_has_a_tooltip_of_one_sentence_without_a_full_stop(empty):
+    empty.ops.mesh.primitive_cube_add()
+    seen = 0
+    for rna, properties in interfaces(empty):
+        internal = rna is not None and rna.identifier == "TACTILE_OT_drag"  # behind the handles
+        for thing in [*filter(None, [rna]), *([] if internal else properties)]:
+            if thing is not rna or "_OT_" in rna.identifier:
+                seen += 1
+                assert re.search(r"\w", thing.description), thing.identifier
+                assert not thing.description.endswith("."), thing.description
+    assert seen > 80
+
+
+def test_lengths_and_angles_know_their_units(empty):
+    empty.ops.mesh.primitive_cube_add()
+    for _, properties in interfaces(empty):
+        for known in properties:
+            if known.identifier in ("extent", "step", "noise", "spacing"):
+                assert (known.subtype, known.unit) == ("DISTANCE", "LENGTH"), known.identifier
+            if known.identifier in ("azimuths", "tilts"):
+                assert known.unit == "ROTATION"
+
+
+def test_what_cannot_run_says_why(empty):
+    def refused(name):
+        with pytest.raises(RuntimeError) as caught:
+            getattr(empty.ops.tactile, name)()
+        return str(caught.value).partition(".poll() ")[2]
+
+    on_probes = ("add_plane", "add_planes", "remove_plane", "update", "delete")
+    assert {refused(name) for name in on_probes} == {"Select a probe, or pick a reference point first"}
+    assert refused("show_colors") == "Use it in a 3D viewport"
+    for name in ("verify", "register", "export_contacts", "export_patch"):
+        assert refused(name).startswith("Select a ")
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
+    empty.ops.tactile.pick(location=(0.0, 0.0, 1.0), plane_count=6)
+    assert refused("add_plane") == "Six planes are the most: remove one first"
+    for _ in range(3):
+        empty.ops.tactile.remove_plane()
+    assert refused("remove_plane") == "A patch needs three planes"
+    empty.context.view_layer.objects.active = empty.data.objects["Sphere"]
+    empty.ops.object.mode_set(mode="EDIT")
+    assert refused("pick") == "Points are picked in Object Mode: leave this mode first"
+    empty.ops.object.mode_set(mode="OBJECT")
+
+
+def test_online_manual_opens_the_page_that_comes_along_at_the_place(extension, empty):
+    prefix, pages = extension.tactile_addon.panel.manual_map()
+    page = Path(unquote(urlsplit(prefix).path))
+    headings = set(re.findall(r'id="([^"]+)"', page.read_text(encoding="utf-8")))
+    assert {anchor.removeprefix("#") for _, anchor in pages} <= headings
+    for picture in re.findall(r'src="([^"]+)"', page.read_text(encoding="utf-8")):
+        assert (page.parent / picture).is_file()
+    assert (prefix, pages) in list(empty.utils.manual_map())
+
+
+def test_the_tab_is_where_the_preferences_have_it(extension, empty):
+    panel = extension.tactile_addon.panel
+    names = [each.__name__ for each in panel.PANELS]
+    preferences = empty.context.preferences.addons[extension.__name__].preferences
+
+    def tabs():
+        return {getattr(empty.types, name).bl_category for name in names}
+
+    assert tabs() == {"Tactile"}
+    preferences.tab = "Edit"
+    assert tabs() == {"Edit"}
+    panel.restore_tab()
+    assert tabs() == {"Edit"}
+    preferences.tab = ""
+    assert tabs() == {"Tactile"}
+    preferences.tab = "Tactile"

@@ -1,0 +1,219 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured normals as slopes in the Bayesian fit: they show what curves alone cannot."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import surfaces
+from scipy.spatial.transform import Rotation
+
+from core import Contour, reconstruct, reconstruct_many
+from core.bayes import evidence, linear_system, posterior
+from core.bayes.measured_slopes import slope_equations
+from core.patch.monge import monomials
+
+PLANES = surfaces.planes((0, 60, 120))
+HIDDEN = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})  # zero in these planes
+EXACT = [
+    surfaces.pear(),
+    surfaces.torus(40, 20, 0.6),
+    surfaces.quartic(),
+    surfaces.bottle_neck(),
+    surfaces.sine(),
+    surfaces.monkey_saddle(),
+    HIDDEN,
+]
+
+
+def touched(surface, noise=0.0, seed=0):
+    return surface.track(PLANES, noise=noise, rng=seed)
+
+
+def measured(contours, std, seed=0):
+    """The same with their normals measured: turned by normal deviations about two axes across them."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for c in contours:
+        off = rng.normal(0.0, std, c.normals.shape)
+        off -= np.sum(off * c.normals, axis=1, keepdims=True) * c.normals
+        found.append(replace(c, normals=c.normals + off, normal_std=std))
+    return found
+
+
+def same(one, other, rel=1e-9):
+    assert other.frame.axes == pytest.approx(one.frame.axes, abs=rel)
+    assert other.patch.coefficients == pytest.approx(one.patch.coefficients, rel=rel, abs=1e-12)
+    assert other.posterior.covariance == pytest.approx(one.posterior.covariance, rel=rel, abs=1e-12)
+
+
+@pytest.mark.parametrize(("noise", "std"), [(0.0, 0.0), (0.02, 0.01), (0.05, 0.05)])
+def test_a_monkey_saddle_hidden_from_its_planes_shows_in_normals(noise, std):
+    contours = touched(HIDDEN, noise)
+    without, with_normals = HIDDEN.fit(contours), HIDDEN.fit(measured(contours, std))
+    assert (without.blind, with_normals.blind) == (3, 0)
+    assert "invisible" not in with_normals.message
+    assert surfaces.off_data(HIDDEN, with_normals) < 0.1 * surfaces.off_data(HIDDEN, without)
+
+
+@pytest.mark.parametrize("surface", EXACT[:5], ids=["pear", "torus", "quartic", "neck", "sine"])
+def test_good_normals_make_no_surface_worse(surface):
+    contours = touched(surface, 0.05)
+    without, with_normals = surface.fit(contours), surface.fit(measured(contours, 0.01))
+    assert surfaces.off_data(surface, with_normals) < 1.1 * surfaces.off_data(surface, without)
+    assert with_normals.mean_height_std < without.mean_height_std
+
+
+def test_noise_in_normals_is_counted():
+    """90 % intervals over seven surfaces, three noises and four seeds."""
+    covered = []
+    for surface in EXACT:
+        for noise, std in ((0.05, 0.01), (0.05, 0.05), (0.1, 0.05)):
+            for seed in range(4):
+                r = surface.fit(measured(touched(surface, noise, seed), std, seed))
+                points, heights = surfaces.heights_over(surface, r, 60)
+                miss = np.abs(r.patch.height(*points.T) - heights)
+                covered.append(np.mean(miss <= 1.645 * r.height_std(*points.T)))
+    assert 0.85 < np.mean(covered) < 0.97
+
+
+def test_the_worse_the_normals_the_less_they_count():
+    contours = touched(HIDDEN, 0.02)
+    stds = [HIDDEN.fit(measured(contours, std)).mean_height_std for std in (0.01, 0.05, 0.2)]
+    assert stds[0] < stds[1] < stds[2]
+    useless = HIDDEN.fit([replace(c, normal_std=1e3) for c in contours])
+    assert useless.patch.height(5.0, 5.0) == pytest.approx(
+        HIDDEN.fit(contours).patch.height(5.0, 5.0), abs=1e-3
+    )
+
+
+def test_without_a_deviation_normals_change_nothing():
+    surface = surfaces.pear()
+    contours = touched(surface, 0.05)
+    bare = [replace(c, normals=None) for c in contours]
+    one, other = surface.fit(contours), surface.fit(bare)
+    assert np.array_equal(one.posterior.covariance, other.posterior.covariance)
+    assert np.array_equal(one.patch.coefficients, other.patch.coefficients)
+
+
+@pytest.mark.parametrize("method", ["tagc", "quadratic-variation", "least-squares"])
+def test_the_papers_methods_ignore_them(method):
+    surface = surfaces.pear()
+    contours = touched(surface, 0.05)
+    one, other = (surface.fit(c, method=method) for c in (contours, measured(contours, 0.01)))
+    assert np.array_equal(one.patch.coefficients, other.patch.coefficients)
+    assert one.mean_height_std == other.mean_height_std
+
+
+def test_touches_with_and_without_normals_in_one_call_are_as_alone():
+    surface = surfaces.torus(40, 20, 0.6)
+    contours = touched(surface, 0.05)
+    some = [*measured(contours[:1], 0.02), *contours[1:]]
+    touches = [contours, measured(contours, 0.02), some, contours]
+    results = reconstruct_many([surface.point] * 4, touches, outward=[surface.normal] * 4)
+    for r, c in zip(results, touches, strict=True):
+        same(surface.fit(c), r)
+    assert results[2].mean_height_std < results[0].mean_height_std
+
+
+def test_they_turn_and_scale_with_the_contacts():
+    surface = surfaces.torus(40, 20, 0.6)
+    contours = measured(touched(surface, 0.05), 0.03)
+    turn = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix()
+    moved = [
+        Contour(1e3 * c.points @ turn.T, normals=7.0 * c.normals @ turn.T, noise=50.0, normal_std=0.03)
+        for c in contours
+    ]
+    one = surface.fit(contours)
+    other = reconstruct(1e3 * turn @ surface.point, moved, outward=turn @ surface.normal)
+    assert other.frame.axes == pytest.approx(turn @ one.frame.axes, abs=1e-7)
+    x, y = one.domain.grid(50)[0].T
+    assert other.patch.height(1e3 * x, 1e3 * y) / 1e3 == pytest.approx(one.patch.height(x, y), abs=1e-7)
+    assert other.height_std(1e3 * x, 1e3 * y) / 1e3 == pytest.approx(one.height_std(x, y), rel=1e-5)
+
+
+def test_the_order_and_the_side_of_normals_make_no_difference():
+    surface = surfaces.pear()
+    contours = measured(touched(surface, 0.05), 0.03)
+    order = np.random.default_rng(1).permutation(25)
+    side = np.random.default_rng(2).choice([-1.0, 1.0], (25, 1))
+    shuffled = [replace(c, points=c.points[order], normals=(side * c.normals)[order]) for c in contours]
+    one, other = surface.fit(contours), surface.fit(shuffled)
+    assert np.abs(np.sum(other.frame.axes * one.frame.axes, axis=0)) == pytest.approx(np.ones(3))
+    assert other.mean_height_std == pytest.approx(one.mean_height_std)
+
+
+def test_slopes_are_the_derivatives_of_the_heights():
+    """Of a surface with these coefficients exact normals are met exactly; by finite differences."""
+    rng = np.random.default_rng(3)
+    local, b, h = rng.uniform(-0.8, 0.8, (1, 9, 3)), 0.2 * rng.normal(size=27), 1e-6
+    x, y, _ = local[0].T
+
+    def height(x, y):
+        return monomials(x, y, posterior.TERMS) @ b
+
+    dx = (height(x + h, y) - height(x - h, y)) / (2.0 * h)
+    dy = (height(x, y + h) - height(x, y - h)) / (2.0 * h)
+    normals = np.column_stack([-dx, -dy, np.ones(9)])
+    normals /= 0.05 * np.linalg.norm(normals, axis=1, keepdims=True)
+    slopes, steepness = slope_equations(normals[None], local, np.ones((1, 9)))
+    assert slopes[0] @ b == pytest.approx(steepness[0], abs=1e-6)
+    up = np.column_stack([dx, dy, -np.ones(9)])
+    # A change of slope counts by the angle that it turns the normal by: in units of 0.05 radians.
+    for direction in rng.normal(size=(5, 27)):
+        misses = slopes[0] @ (1e-5 * direction)
+        change = np.column_stack([
+            (monomials(x + h, y, posterior.TERMS) - monomials(x - h, y, posterior.TERMS)) @ direction,
+            (monomials(x, y + h, posterior.TERMS) - monomials(x, y - h, posterior.TERMS)) @ direction,
+        ]) / (2.0 * h)  # fmt: skip
+        turned = np.column_stack([up[:, :2] + 1e-5 * change, -np.ones(9)])
+        cross = np.linalg.norm(np.cross(up, turned), axis=1)
+        angles = cross / np.linalg.norm(up, axis=1) / np.linalg.norm(turned, axis=1)
+        assert np.hypot(misses[:9], misses[9:]) == pytest.approx(angles / 0.05, rel=1e-3, abs=1e-9)
+
+
+def test_without_slopes_both_likelihoods_are_one():
+    """But for the free terms' weak prior."""
+    rng = np.random.default_rng(4)
+    local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
+    weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
+    alone = linear_system.linear_system(local, weights, nothing, local[:, :0])
+    data = evidence.restricted(alone.basis, alone.heights, weights)
+    empty = alone._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
+    one, other = (linear_system.hyperparameters(s, data, weights, np.array([2e-3])) for s in (alone, empty))
+    for a, b in zip(one, other, strict=True):
+        assert b == pytest.approx(a, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"normal_std": 0.1}, "normal_std: wanted measured normals that it is of, got none"),
+        ({"normal_std": -0.1, "normals": np.ones((3, 3))}, "normal_std: wanted a finite number of 0 or more"),
+        ({"normal_std": np.nan, "normals": np.ones((3, 3))}, "normal_std: wanted a finite number"),
+        ({"normal_std": 0.1, "normals": np.ones((2, 3))}, r"normals: wanted shape \(3, 3\), got \(2, 3\)"),
+        ({"normal_std": 0.1, "normals": np.full((3, 3), np.nan)}, "normals: wanted finite numbers"),
+        (
+            {"normal_std": 0.1, "normals": [[0, 0, 1], [0, 0, 0], [0, 0, 1]]},
+            r"wanted directions .* got \(0, 0, 0\)",
+        ),
+    ],
+)
+def test_normals_that_are_none_are_refused_with_a_sentence(options, words):
+    with pytest.raises(ValueError, match=words):
+        Contour(np.eye(3), **options)
+
+
+def test_normals_of_any_length_and_along_the_tangent_plane_leave_finite_numbers():
+    surface = surfaces.pear()
+    contours = touched(surface)
+    for normals in (
+        1e300 * contours[0].normals,
+        1e-300 * contours[0].normals,
+        contours[0].points - surface.point + 1e-9,
+    ):
+        odd = [replace(contours[0], normals=normals, normal_std=0.01), *contours[1:]]
+        r = surface.fit(odd)
+        assert np.isfinite(r.patch.coefficients).all()
+        assert np.isfinite(r.mean_height_std)

@@ -1,0 +1,296 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Bayesian fit: its algebra, its accuracy, and that it knows what it cannot see."""
+
+import numpy as np
+import pytest
+import surfaces
+from scipy.spatial.transform import Rotation
+
+from core import Contour, SamplingPlane, reconstruct, suggest_plane, track
+from core.bayes import evidence, posterior
+from core.patch.monge import monomials
+
+EXTENT = 12.0
+
+
+THREE = surfaces.UPRIGHT
+FIVE = surfaces.planes((5, 41, 77, 113, 149))
+
+
+def touched(surface, planes=THREE, noise=0.0, seed=0, extent=EXTENT, **options):
+    contours = surface.track(planes, extent=extent, step=extent / 12, noise=noise, rng=seed)
+    return surface.fit(contours, **options)
+
+
+def test_turning_coefficients_about_the_normal_turns_the_surface():
+    b, (x, y) = np.random.default_rng(0).normal(size=27), np.random.default_rng(1).normal(size=(2, 9))
+    c, s = np.cos(0.7), np.sin(0.7)
+    turned = monomials(c * x + s * y, c * y - s * x, posterior.TERMS) @ posterior._turn(0.7) @ b
+    assert turned == pytest.approx(monomials(x, y, posterior.TERMS) @ b, rel=1e-9)
+
+
+def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
+    rng = np.random.default_rng(2)
+    mean = np.concatenate([[0.0, 0.0, 0.2, 0.0, 0.3], rng.normal(size=22)])
+    whole = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)))
+    x, y = rng.uniform(-1.0, 1.0, (2, 200_000))
+    inside = np.hypot(x, y) < posterior.DISK
+    x, y = x[inside], y[inside]
+    for degree in (3, 4, 5):
+        fixed = monomials(x, y, posterior.TERMS[2:5]) @ mean[2:5]
+        basis = monomials(x, y, posterior.TERMS[5 : posterior.terms_to(degree)])
+        wanted = np.linalg.lstsq(basis, whole.height(x, y) - fixed, rcond=None)[0]
+        assert whole.patch(degree).coefficients == pytest.approx(wanted, abs=0.05)
+        assert [whole.patch(degree).k1, whole.patch(degree).k2] == [0.4, 0.6]
+    assert whole.patch(6).coefficients == pytest.approx(mean[5:])
+    assert len(whole.patch(2).coefficients) == 0
+
+
+@pytest.mark.parametrize(
+    ("surface", "bound", "curvature"),
+    [
+        (surfaces.plane(), 1e-9, 1e-9),
+        (surfaces.sphere(25), 0.005, 3e-4),
+        (surfaces.cylinder(20), 0.01, 6e-4),
+        (surfaces.bottle_neck(), 0.01, 4e-4),
+        (surfaces.pear(), 0.01, 1e-4),
+        (surfaces.torus(40, 20, 0.6), 0.03, 3e-4),
+        (surfaces.quartic(), 0.06, 3e-4),
+        (surfaces.sine(), 0.06, 1e-3),
+        (surfaces.ellipsoid(35, 25, 20, 0.6, 0.5), 0.1, 1e-3),
+    ],
+    ids=["plane", "sphere", "cylinder", "bottle neck", "pear", "torus", "quartic", "sine", "ellipsoid"],
+)
+@pytest.mark.parametrize("planes", [THREE, surfaces.TILTED], ids=["upright", "tilted"])
+def test_exact_surfaces(surface, bound, curvature, planes):
+    r = touched(surface, planes)
+    assert surfaces.off_data(surface, r) < bound
+    assert [r.patch.k1, r.patch.k2] == pytest.approx([surface.k1, surface.k2], abs=curvature)
+    assert r.frame.axes[:, 2] @ surface.normal > np.cos(np.radians(0.2))
+    assert r.status == "ok"
+
+
+@pytest.mark.parametrize("surface", [surfaces.quartic(), surfaces.sine()], ids=["quartic", "sine"])
+def test_curvatures_and_normal_converge_with_the_square_of_the_extent(surface):
+    results = [touched(surface, FIVE, extent=extent, degree=6) for extent in (1.0, 0.5, 0.25)]
+    misses = np.array([[r.patch.k1 - surface.k1, r.patch.k2 - surface.k2] for r in results])
+    tilts = np.array([np.linalg.norm(np.cross(r.frame.axes[:, 2], surface.normal)) for r in results])
+    for errors in (np.abs(misses).max(axis=1), tilts):
+        assert errors[:-1] / errors[1:] == pytest.approx([4.0, 4.0], rel=0.1)
+
+
+def test_noise_averages_out_and_the_frame_is_better_than_the_papers():
+    s = surfaces.cylinder(20)
+    worst = {"bayes": [], "tagc": []}
+    for seed in range(20):
+        for method, errors in worst.items():
+            r = touched(s, noise=0.1, seed=seed, method=method)
+            errors.append(max(abs(r.patch.k1 - s.k1), abs(r.patch.k2 - s.k2)))
+    assert np.median(worst["bayes"]) < 1.4e-3
+    assert np.median(worst["bayes"]) < 0.4 * np.median(worst["tagc"])
+
+
+@pytest.mark.parametrize("planes", [THREE, surfaces.planes((13, 48, 93))], ids=["even", "uneven"])
+def test_intervals_cover_surfaces_drawn_from_the_prior(planes):
+    """90 % intervals of height_std, over 60 surfaces with every term to degree 6."""
+    rng = np.random.default_rng(3)
+    length = 10.0
+    covered = []
+    for seed in range(60):
+        waviness = 0.6 * np.exp(0.5 * rng.normal())
+        sizes = evidence.SCALE * waviness ** (posterior.ORDERS - 1.0) * rng.normal(size=27)
+        b = np.where(posterior.ORDERS <= 2, [0.3], 1.0) * sizes * length ** (1.0 - posterior.ORDERS)
+        s = surfaces.graph(dict(zip(map(tuple, posterior.TERMS[2:].tolist()), b[2:], strict=True)))
+        r = touched(s, planes, noise=0.03, seed=seed, extent=length, degree=6)
+        points, heights = surfaces.heights_over(s, r, 60)
+        miss = np.abs(r.patch.height(*points.T) - heights)
+        covered.append(np.mean(miss <= 1.645 * r.height_std(*points.T)))
+    assert 0.85 < np.mean(covered) < 0.97
+
+
+def test_height_std_is_zero_at_the_point_and_grows_with_noise_and_between_the_curves():
+    s = surfaces.pear()
+    fine, coarse = touched(s, noise=0.01), touched(s, noise=0.3)
+    assert fine.height_std(0.0, 0.0) == pytest.approx(0.0, abs=1e-12)
+    assert fine.height_std(np.zeros((2, 3)), 1.0).shape == (2, 3)
+    assert coarse.mean_height_std > 5 * fine.mean_height_std
+    assert coarse.posterior.noise * coarse.radius > 0.25
+    x, y = fine.contacts[-1, :2]
+    angle = np.arctan2(y, x) + np.radians(30)
+    between = fine.height_std(*(np.hypot(x, y) * np.array([np.cos(angle), np.sin(angle)])))
+    assert between > 1.5 * fine.height_std(x, y)
+
+
+def test_height_and_its_deviation_are_those_of_the_surface_whatever_the_degree_of_the_patch():
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    two, six = touched(s, degree=2), touched(s, degree=6)
+    assert [two.patch.k1, two.patch.k2] == [six.patch.k1, six.patch.k2]
+    assert surfaces.off_data(s, two) > 2 * surfaces.off_data(s, six)
+    assert two.mean_height_std == six.mean_height_std
+    x, y = two.domain.grid(50)[0].T
+    assert two.height(x, y) == pytest.approx(six.patch.height(x, y), abs=1e-9)
+    assert np.array_equal(two.height(x, y), six.height(x, y))
+
+
+@pytest.mark.parametrize(
+    ("planes", "degree", "blind", "terms"),
+    [
+        (THREE, 4, 3, 14),
+        (THREE, 6, 10, 27),
+        (THREE, 3, 1, 9),
+        (THREE, 2, 0, 5),
+        (surfaces.planes((0, 45, 90, 135)), 4, 1, 14),
+        (FIVE, 4, 0, 14),
+    ],
+)
+def test_blind_directions_are_counted_and_named(planes, degree, blind, terms):
+    """m planes through the normal hide (d - m + 1)(d - m + 2) / 2 of the terms to degree d (DESIGN, 2)."""
+    r = touched(surfaces.torus(40, 20, 0.6), planes, noise=0.02, degree=degree)
+    assert r.posterior.blind(degree) == blind
+    named = f"{blind} of {terms} coefficients {'is' if blind == 1 else 'are'} invisible to these planes"
+    assert (named in r.message) == (blind > 0)
+
+
+def test_the_noise_given_is_the_least_that_is_found():
+    s = surfaces.pear()
+    r = touched(s, noise=0.02)
+    contours = s.track(THREE, extent=EXTENT, step=EXTENT / 12, noise=0.02, rng=0)
+    rough = s.fit(contours, noise=0.2)
+    assert r.posterior.noise * r.radius < 0.05
+    assert rough.posterior.noise * rough.radius == pytest.approx(0.2, rel=0.05)
+
+
+def test_a_patch_known_to_two_hundredths_of_its_radius_at_best_is_uncertain():
+    s = surfaces.plane()
+    r = touched(s, noise=1.0)
+    assert r.status == "uncertain"
+    assert r.mean_height_std > 0.02 * r.radius
+    assert "% of the radius" in r.message and "add sampling planes" in r.message
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_following_the_suggested_plane_shows_a_monkey_saddle(noise):
+    """(3 x^2 y - y^3) / 900 is zero in the planes at 0, 60 and 120 degrees."""
+    s = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})
+    lengths = {"extent": 13.0, "step": 13.0 / 12.0, "noise": noise}
+    contours = s.track(surfaces.planes((0, 60, 120)), rng=0, **lengths)
+    before = s.fit(contours)
+    plane, _ = suggest_plane(before)
+    axes = before.frame.axes
+    contours += track(s, s.point, axes[:, 2], [plane], rng=1, tangent=axes[:, 0], **lengths)
+    after = s.fit(contours)
+    assert surfaces.off_data(s, before) > 0.2
+    assert surfaces.off_data(s, after) < 0.02
+
+
+def test_many_contacts_suggest_what_fewer_of_less_noise_do(monkeypatch):
+    s = surfaces.pear()
+    contours = track(s, s.point, s.normal, THREE, extent=12, step=0.1, noise=0.03, rng=0)
+    r = reconstruct(s.point, contours, outward=s.normal)
+    plane, expected = suggest_plane(r)
+    monkeypatch.setattr("core.reconstruction.next_plane.MOST", 1000)
+    all_of_them = suggest_plane(r)
+    assert plane == all_of_them[0]
+    assert expected == pytest.approx(all_of_them[1], rel=0.01)
+
+
+def test_thousands_of_contacts_suggest_a_plane():
+    s = surfaces.pear()
+    contours = track(s, s.point, s.normal, THREE, extent=12, step=0.005)
+    r = reconstruct(s.point, contours, outward=s.normal)
+    assert 200 < len(r.contacts) <= 300  # means of 14,000
+    assert 0.0 < suggest_plane(r)[1] < r.mean_height_std
+
+
+@pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.torus(40, 20, 0.6)], ids=["pear", "torus"])
+def test_the_suggested_plane_brings_what_was_expected_and_no_other_much_more(surface):
+    contours = surface.track(THREE, noise=0.03, rng=0)
+    before = surface.fit(contours, degree=6)
+    plane, expected = suggest_plane(before)
+    axes = before.frame.axes
+
+    def after(azimuth):
+        lengths = {"extent": 12, "step": 1, "noise": 0.03, "tangent": axes[:, 0]}
+        more = track(surface, surface.point, axes[:, 2], [SamplingPlane(azimuth)], rng=1, **lengths)
+        r = surface.fit(contours + more, degree=6)
+        return r.mean_height_std
+
+    assert expected < 0.8 * before.mean_height_std
+    assert after(plane.azimuth) == pytest.approx(expected, rel=0.3)
+    others = [after(a) for a in np.radians(np.arange(0.0, 180.0, 15.0))]
+    assert after(plane.azimuth) < 1.15 * min(others)
+
+
+def test_the_degree_is_what_the_contacts_show():
+    assert touched(surfaces.plane(), degree="auto").patch.degree == 2
+    assert touched(surfaces.plane(), noise=0.05, degree="auto").patch.degree == 2
+    assert touched(surfaces.sphere(25), degree="auto").patch.degree == 4
+    wavy = surfaces.graph({(2, 0): -0.02, (0, 2): 0.01, (5, 0): 4e-6, (6, 0): -3e-7})
+    assert touched(wavy, FIVE, degree="auto").patch.degree == 6
+    assert touched(surfaces.sphere(25), method="quadratic-variation", degree="auto").patch.degree == 4
+
+
+@pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.bottle_neck(), surfaces.plane()])
+def test_one_contact_in_twenty_off_by_a_millimeter_does_not_double_the_error(surface):
+    rng = np.random.default_rng(5)
+    clean, spoilt, unweighted = [], [], []
+    for seed in range(10):
+        contours = surface.track(THREE, noise=0.02, rng=seed)
+        clean.append(surfaces.off_data(surface, surface.fit(contours)))
+        for _ in range(4):
+            c, k = rng.integers(3), rng.choice(np.delete(np.arange(25), 12))
+            points = contours[c].points.copy()
+            points[k] += rng.choice([-1.0, 1.0]) * contours[c].normals[k]
+            contours[c] = Contour(points, noise=0.02, normals=contours[c].normals)
+        spoilt.append(surfaces.off_data(surface, surface.fit(contours)))
+        quadric = surface.fit(contours, method="quadratic-variation", weight=1e5)
+        unweighted.append(surfaces.off_data(surface, quadric))
+    assert np.median(spoilt) < 1.5 * np.median(clean)
+    assert np.max(np.divide(spoilt, clean)) < 2.0
+    assert np.median(unweighted) > 3 * np.median(spoilt)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize(
+    "surface",
+    [surfaces.sphere(25), surfaces.plane(), surfaces.monkey_saddle()],
+    ids=["sphere", "plane", "monkey"],
+)
+def test_umbilics_turn_and_scale_with_the_data(surface, noise):
+    contours = surface.track(THREE, extent=9, step=1, noise=noise, rng=2)
+    turn, scale = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix(), 1e3
+    one = surface.fit(contours, noise=noise)
+    other = reconstruct(
+        scale * turn @ surface.point,
+        [Contour(scale * c.points @ turn.T) for c in contours],
+        outward=turn @ surface.normal,
+        noise=scale * noise,
+    )
+    assert other.frame.axes == pytest.approx(turn @ one.frame.axes, abs=1e-7)
+    x, y = one.domain.grid(50)[0].T
+    assert other.patch.height(scale * x, scale * y) / scale == pytest.approx(one.patch.height(x, y), abs=1e-7)
+    assert other.height_std(scale * x, scale * y) / scale == pytest.approx(one.height_std(x, y), rel=1e-5)
+    tangent = THREE[0].axes(surface.normal)[:, 0]
+    assert one.frame.axes[:, 0] @ tangent > (0.0 if noise else np.cos(np.radians(0.1)))
+
+
+def test_the_order_of_contacts_and_curves_makes_no_difference_but_for_the_axes_sign():
+    s = surfaces.torus(40, 20, 0.6)
+    contours = s.track(THREE, noise=0.02, rng=4)
+    one = s.fit(contours)
+    shuffled = [Contour(np.random.default_rng(0).permutation(c.points), noise=0.02) for c in contours[::-1]]
+    other = s.fit(shuffled)
+    assert [other.patch.k1, other.patch.k2] == pytest.approx([one.patch.k1, one.patch.k2])
+    assert np.abs(np.sum(other.frame.axes * one.frame.axes, axis=0)) == pytest.approx(np.ones(3))
+
+
+def test_few_contacts_are_enough_for_a_finite_answer():
+    """Three contacts a curve, to one side of the point: 9 equations for 27 coefficients."""
+    s = np.array([0.3, 0.6, 1.0])
+    curves = [
+        Contour(np.column_stack([s * np.cos(a), s * np.sin(a), -0.1 * s**2])) for a in (0.0, 1.0, 2.0, 4.0)
+    ]
+    r = reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
+    assert [r.patch.k1, r.patch.k2] == pytest.approx([-0.2, -0.2], abs=0.02)
+    assert np.isfinite(r.height_std(*r.domain.grid(50)[0].T)).all()

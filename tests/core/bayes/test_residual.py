@@ -1,0 +1,289 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The residual of real surfaces: its algebra, that it is gone where nobody asks for it, and its intervals."""
+
+import json
+
+import numpy as np
+import pytest
+import surfaces
+from scipy.spatial.transform import Rotation
+
+from core import (
+    Contour,
+    from_dict,
+    reconstruct,
+    reconstruct_many,
+    suggest_plane,
+    to_dict,
+)
+from core.bayes import residual_evidence
+from core.bayes.evidence import FREE_PRECISION, USUAL_WAVINESS, prior_variances
+from core.bayes.linear_system import prior_mean
+from core.bayes.posterior import DISK, FREE, TERMS, nodes
+from core.bayes.residual_evidence import Touch, fitted, system_of
+from core.bayes.rough_fit import SCALE
+from core.patch.monge import exponents, monomials
+from core.patch.residual import kernel, weighted_kernel
+from core.reconstruction.deviations import mean_height_stds
+from core.reconstruction.next_plane import AZIMUTHS, _lost
+
+EXTENT = 12.0
+OUTWARD = np.array([0.0, 0.0, 1.0])
+REACHES = np.linspace(-1.0, 1.0, 25)
+
+
+def rough(seed, size=0.02):
+    """A function of points (n, 2) in unit radius: a bowl and a Matern process of order 3/2, a rougher one."""
+    rng = np.random.default_rng(seed)
+    waves = rng.normal(size=(400, 2)) * np.sqrt(3.0 / rng.chisquare(3.0, (400, 1))) / 0.5
+    phases, k = rng.uniform(0.0, 2.0 * np.pi, 400), rng.uniform(-0.5, 0.5, 2)
+
+    def height(p):
+        texture = np.sqrt(2.0 / 400.0) * size * np.cos(p @ waves.T + phases).sum(axis=1)
+        return p**2 @ k / 2.0 + texture
+
+    at_origin = height(np.zeros((1, 2)))
+    return lambda p: height(np.asarray(p)) - at_origin
+
+
+def contours_of(height, azimuths=(0, 60, 120), noise=0.0, seed=0):
+    rng, contours = np.random.default_rng(seed), []
+    for azimuth in np.radians(azimuths):
+        flat = REACHES[:, None] * [np.cos(azimuth), np.sin(azimuth)]
+        z = height(flat) + noise * rng.normal(size=len(flat)) * (REACHES != 0.0)
+        contours.append(Contour(EXTENT * np.column_stack([flat, z]), noise=EXTENT * noise))
+    return contours
+
+
+def touched(seed=0, **options):
+    height = rough(seed)
+    return height, reconstruct(np.zeros(3), contours_of(height, **options), outward=OUTWARD)
+
+
+def over(r, count=60):
+    return r.domain.grid(count)[0]
+
+
+def test_derivatives_are_those_of_the_height():
+    residual, h = touched()[1].residual, 1e-4
+    rng = np.random.default_rng(0)
+    # At places, where Matern's second derivatives are not smooth, beside them, and at the point.
+    points = np.vstack([residual.places[5:8], rng.uniform(-0.7, 0.7, (9, 2)), np.zeros((1, 2))])
+    x, y = points.T
+
+    def at(dx, dy):
+        return residual.height(x + dx * h, y + dy * h)
+
+    d = residual.derivatives(x, y)
+    near = {"abs": 5e-4 * np.abs(d.xx).max()}
+    assert d.z == pytest.approx(at(0, 0), abs=1e-12)
+    assert d.x == pytest.approx((at(1, 0) - at(-1, 0)) / (2 * h), abs=1e-6)
+    assert d.y == pytest.approx((at(0, 1) - at(0, -1)) / (2 * h), abs=1e-6)
+    assert d.xx == pytest.approx((at(1, 0) - 2 * at(0, 0) + at(-1, 0)) / h**2, **near)
+    assert d.yy == pytest.approx((at(0, 1) - 2 * at(0, 0) + at(0, -1)) / h**2, **near)
+    mixed = at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)
+    assert d.xy == pytest.approx(mixed / (4 * h**2), **near)
+
+
+@pytest.mark.parametrize("noise", [7e-4, 5e-3])
+def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
+    _, r = touched(noise=noise)
+    contacts, (x, y, z) = r.contacts / r.radius, r.contacts.T / r.radius
+    sizes, expected = np.array([[4e-4, 9e-4]]), prior_mean(-0.3, 0.2)
+    touch = Touch(contacts, np.ones(len(x)), noise, noise, expected, None)
+    residual, _ = fitted(touch, system_of(touch), sizes[0], noise)
+    variances = np.concatenate(
+        [np.full(FREE, 1.0 / FREE_PRECISION), prior_variances(np.array(USUAL_WAVINESS))]
+    )
+    places, points = contacts[:, :2], over(r) / r.radius
+    basis, wanted = monomials(x, y, TERMS), monomials(*points.T, TERMS)
+
+    def covariance(p, q, basis_p, basis_q):
+        return (basis_p * variances) @ basis_q.T + kernel(p, q, sizes[0])
+
+    seen = covariance(places, places, basis, basis) + noise**2 * np.eye(len(x))
+    shared = covariance(points, places, wanted, basis)
+    mean = shared @ np.linalg.solve(seen, z - basis @ expected)
+    left = covariance(points, points, wanted, wanted) - shared @ np.linalg.solve(seen, shared.T)
+    assert residual.height(*points.T) == pytest.approx(mean, abs=1e-5)
+    assert residual.height_std(*points.T) ** 2 == pytest.approx(np.diag(left), rel=1e-2, abs=1e-8)
+    assert residual.height_covariance(points, points) == pytest.approx(left, abs=1e-7)
+
+
+def test_the_patch_is_that_of_the_surface_over_a_disk():
+    """Its curvatures are those of a quartic fitted to heights of r; and their deviations cover the truth."""
+    covered = []
+    for seed in range(25):
+        height, r = touched(seed, azimuths=(0, 45, 90, 135))
+        x, y = SCALE * r.radius * np.array(nodes()[:2]) / DISK
+        terms, shares = exponents(0, 4), np.sqrt(nodes()[2])[:, None]
+        at = shares * monomials(x, y, terms)
+        b = np.linalg.lstsq(at, shares[:, 0] * r.height(x, y), rcond=None)[0][1:]
+        assert [2.0 * b[2], 2.0 * b[4]] == pytest.approx([r.patch.k1, r.patch.k2], abs=0.02 / r.radius)
+        assert np.hypot(b[0], b[1]) < 0.01 and abs(b[3]) < 0.02 / r.radius
+        flat = r.frame.to_world(np.column_stack([x, y, r.height(x, y)]))[:, :2]
+        true = r.frame.to_local(np.column_stack([flat, EXTENT * height(flat / EXTENT)]))
+        at = shares * monomials(*true[:, :2].T, terms)
+        b = np.linalg.lstsq(at, shares[:, 0] * true[:, 2], rcond=None)[0][1:]
+        off = np.abs([2.0 * b[2] - r.patch.k1, 2.0 * b[4] - r.patch.k2])
+        covered.append(off <= 1.645 * np.array([r.k1_std, r.k2_std]))
+    assert 0.7 < np.mean(covered) <= 1.0
+
+
+def test_a_weighted_kernel_is_the_kernel_times_weights():
+    rng, sizes = np.random.default_rng(0), np.array([2e-4, 3e-4])
+    p, q, weights = rng.uniform(-1.0, 1.0, (900, 2)), rng.uniform(-1.0, 1.0, (70, 2)), rng.normal(size=70)
+    assert weighted_kernel(p, q, sizes, weights) == pytest.approx(kernel(p, q, sizes) @ weights, abs=1e-14)
+
+
+def test_grid_points_that_are_not_tried_would_change_nothing(monkeypatch):
+    few = touched(3)[1].residual
+    monkeypatch.setattr(residual_evidence, "NEGLIGIBLE", np.inf)
+    all_of_them = touched(3)[1].residual
+    assert few.variances == pytest.approx(all_of_them.variances, rel=0.01)
+    assert few.noise == pytest.approx(all_of_them.noise, rel=0.01)
+
+
+def test_the_point_is_a_contact_like_the_others():
+    """On a rough surface, as on a mesh's vertex, it may be off what is around it as they are."""
+    _, r = touched()
+    noise = r.radius * r.residual.noise
+    assert abs(r.height(0.0, 0.0)) < 3.0 * noise
+    assert 0.1 * noise < r.height_std(0.0, 0.0) <= noise
+
+
+def test_a_point_above_its_surroundings_bends_no_curvature():
+    """As where a vertex of facets is touched: all contacts but the point are lower by a noticeable length."""
+    for seed in range(4):
+        _, r = touched(seed)
+        lower = []
+        for contour in r.contours:
+            is_point = (contour.points == r.frame.origin).all(axis=1)
+            lower.append(Contour(contour.points - np.where(is_point, 0.0, 1e-3 * EXTENT)[:, None] * OUTWARD))
+        other = reconstruct(r.frame.origin, lower, outward=OUTWARD)
+        off = np.abs([other.patch.k1 - r.patch.k1, other.patch.k2 - r.patch.k2])
+        assert off.max() < 0.03 / r.radius
+    assert r.height(np.zeros((2, 3)), 1.0).shape == (2, 3)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [surfaces.plane(), surfaces.sphere(25), surfaces.bottle_neck(), surfaces.pear(), surfaces.sine()],
+)
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.1])
+def test_exact_surfaces_ask_for_none(surface, noise):
+    contours = surface.track(surfaces.UPRIGHT, extent=EXTENT, step=1.0, noise=noise, rng=3)
+    r = surface.fit(contours)
+    assert r.residual is None
+    x, y = over(r).T
+    assert r.height(x, y) == pytest.approx(surface.fit(contours, degree=6).patch.height(x, y), abs=1e-9)
+
+
+def test_white_noise_that_nobody_told_of_is_no_residual():
+    s, sizes = surfaces.sphere(25), []
+    for seed in range(10):
+        contours = s.track(surfaces.UPRIGHT, extent=EXTENT, step=1.0, noise=0.1, rng=seed)
+        r = s.fit([Contour(c.points) for c in contours])
+        sizes.append(0.0 if r.residual is None else r.residual.size)
+    assert sizes.count(0.0) >= 8 and max(sizes) < 0.02
+
+
+@pytest.mark.parametrize("azimuths", [(0, 60, 120), (0, 36, 72, 108, 144)], ids=["three", "five"])
+def test_heights_are_nearer_and_intervals_true_on_rough_surfaces(azimuths):
+    covered, errors = [], []
+    for seed in range(25):
+        height, r = touched(seed, azimuths=azimuths)
+        flat = over(r)
+        at = r.frame.to_world(np.column_stack([flat, r.height(*flat.T)]))
+        off = np.abs(at[:, 2] - EXTENT * height(at[:, :2] / EXTENT)) * r.frame.axes[2, 2]
+        covered.append(np.mean(off <= 1.645 * r.height_std(*flat.T)))
+        sextic = r.radius * r.posterior.height(*flat.T / r.radius)
+        at = r.frame.to_world(np.column_stack([flat, sextic]))
+        errors.append([off.mean(), np.abs(at[:, 2] - EXTENT * height(at[:, :2] / EXTENT)).mean()])
+        assert r.residual is not None and 0.002 < r.residual.size < 0.2
+    ours, sextics = np.mean(errors, axis=0)
+    assert 0.8 < np.mean(covered) < 0.97
+    assert ours < 0.9 * sextics
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e4])
+def test_it_moves_with_its_contacts(scale):
+    height = rough(1)
+    contours = contours_of(height)
+    one = reconstruct(np.zeros(3), contours, outward=OUTWARD)
+    turn, shift = Rotation.from_rotvec([0.4, -0.9, 0.3]).as_matrix(), scale * np.array([30.0, -20.0, 10.0])
+    moved = [Contour(scale * c.points @ turn.T + shift, noise=0.0) for c in contours]
+    other = reconstruct(shift, moved, outward=turn @ OUTWARD)
+    x, y = over(one).T
+    assert other.residual.size == pytest.approx(one.residual.size, rel=1e-5)
+    assert other.height(scale * x, scale * y) / scale == pytest.approx(one.height(x, y), abs=1e-7 * EXTENT)
+    assert other.height_std(scale * x, scale * y) / scale == pytest.approx(
+        one.height_std(x, y), rel=1e-4, abs=1e-9
+    )
+
+
+def test_a_stack_of_rough_and_smooth_touches_gives_what_each_gives_alone():
+    smooth = surfaces.graph({(2, 0): -0.02, (0, 2): 0.0075})
+    exact = smooth.track(surfaces.UPRIGHT, extent=EXTENT, step=1.5)
+    touches = [
+        contours_of(rough(0)),
+        exact,
+        contours_of(rough(2), (0, 45, 90, 135)),
+        exact,
+        contours_of(rough(3)),
+    ]
+    points, outward = (
+        [np.zeros(3), smooth.point, *3 * [np.zeros(3)]],
+        [OUTWARD, smooth.normal, *3 * [OUTWARD]],
+    )
+    points[3], outward[3] = smooth.point, smooth.normal
+    found = reconstruct_many(points, touches, outward=outward)
+    alone = [reconstruct(*each, outward=n) for *each, n in zip(points, touches, outward, strict=True)]
+    assert [r.residual is None for r in found] == [False, True, False, True, False]
+    for one, other in zip(found, alone, strict=True):
+        x, y = over(other).T
+        assert one.height(x, y) == pytest.approx(other.height(x, y), abs=1e-6)
+        assert one.height_std(x, y) == pytest.approx(other.height_std(x, y), rel=1e-5, abs=1e-9)
+    assert mean_height_stds(found) == pytest.approx([r.mean_height_std for r in alone], rel=1e-5)
+
+
+def test_more_contacts_than_places_say_as_much():
+    height = rough(4)
+    r = reconstruct(np.zeros(3), contours_of(height), outward=OUTWARD)
+    azimuths = np.radians([0, 60, 120])
+    along = np.linspace(-1.0, 1.0, 201)[:, None]
+    dense = [along * [np.cos(a), np.sin(a)] for a in azimuths]
+    contours = [Contour(EXTENT * np.column_stack([p, height(p)]), noise=0.0) for p in dense]
+    many = reconstruct(np.zeros(3), contours, outward=OUTWARD)
+    assert len(many.residual.places) < len(many.contacts)
+    flat = over(r)
+    assert many.height(*flat.T) == pytest.approx(r.height(*flat.T), abs=0.03 * EXTENT)
+    assert 0.5 < many.mean_height_std / r.mean_height_std < 2.0
+
+
+def test_the_suggested_plane_keeps_what_it_promises():
+    height, r = touched(5)
+    plane, expected = suggest_plane(r)
+    direction = r.frame.axes @ [np.cos(plane.azimuth), np.sin(plane.azimuth), 0.0]
+    azimuth = np.degrees(np.arctan2(direction[1], direction[0]))
+    after = reconstruct(np.zeros(3), contours_of(height, (0, 60, 120, azimuth)), outward=OUTWARD)
+    assert expected < 0.95 * r.mean_height_std
+    assert after.mean_height_std == pytest.approx(expected, rel=0.35)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_suggested_plane_tells_as_much_as_any_of_all(seed):
+    r = touched(seed, azimuths=(0, 50, 130))[1]
+    points, weights = r.domain.nodes
+    told = _lost(r, points / r.radius, AZIMUTHS) @ weights
+    chosen = np.argmin(np.abs(AZIMUTHS - suggest_plane(r)[0].azimuth))
+    assert told[chosen] >= 0.97 * told.max()
+
+
+def test_it_goes_into_json_and_back():
+    _, r = touched()
+    again = from_dict(json.loads(json.dumps(to_dict(r))))
+    x, y = over(r).T
+    assert again.height(x, y) == pytest.approx(r.height(x, y), abs=1e-9)
+    assert again.height_std(x, y) == pytest.approx(r.height_std(x, y), rel=1e-9)

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The closed spline domain and its grid."""
+
+import numpy as np
+import pytest
+
+from core.patch.domain import closed_spline_domain
+
+
+def circle(angles, radius=1.0):
+    a = np.radians(angles)
+    return radius * np.column_stack([np.cos(a), np.sin(a)])
+
+
+SIXTH = np.arange(0, 360, 60)
+UNEVEN = circle([0, 35, 80, 180, 215, 260])
+STUBBY = circle(SIXTH) * np.array([1, 1, 0.4, 1, 0.7, 1])[:, None]
+
+
+def test_six_even_ends_make_nearly_a_disk():
+    domain = closed_spline_domain(circle(SIXTH, 12.0), 12.0)
+    assert domain.area == pytest.approx(np.pi * 144, rel=0.02)
+    assert np.linalg.norm(domain.boundary(500), axis=1) == pytest.approx(12.0, rel=0.01)
+
+
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_the_boundary_passes_through_the_ends_in_any_order(ends):
+    rng = np.random.default_rng(0)
+    domain = closed_spline_domain(rng.permutation(ends), 1.0)
+    azimuth = np.arctan2(ends[:, 1], ends[:, 0]) % (2 * np.pi)
+    fine = domain.boundary(36000)
+    nearest = fine[np.round(azimuth * 36000 / (2 * np.pi)).astype(int) % 36000]
+    assert nearest == pytest.approx(ends, abs=2e-4)
+    for inside, factor in ((True, 0.999), (False, 1.001)):
+        assert np.all(domain.contains(*(factor * ends).T) == inside)
+    assert bool(domain.contains(0.0, 0.0))
+
+
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_grid_cells_fill_the_area(ends):
+    domain = closed_spline_domain(ends, 1.0)
+    points, h = domain.grid(600)
+    assert len(points) == pytest.approx(600, rel=0.05)
+    assert len(points) * h**2 == pytest.approx(domain.area, rel=0.05)
+    assert np.all(domain.contains(*points.T))
+    assert np.unique(np.round(np.diff(np.unique(points[:, 0])) / h, 6)).tolist() == [1.0]
+
+
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_nodes_take_means_over_the_domain(ends):
+    domain = closed_spline_domain(ends, 1.0)
+    points, weights = domain.nodes
+    assert np.all(domain.contains(*points.T))
+    dense = domain.grid(40000)[0]
+    for i, j in [(0, 0), (2, 0), (1, 1), (0, 3), (4, 0), (2, 2)]:
+        moment = np.mean(dense[:, 0] ** i * dense[:, 1] ** j)
+        assert weights @ (points[:, 0] ** i * points[:, 1] ** j) == pytest.approx(moment, abs=2e-3)
+
+
+@pytest.mark.parametrize("short", [0.02, 0.1, 0.2])
+def test_beside_a_short_end_the_boundary_turns_back_nowhere(short):
+    """The spline does, so its azimuth does not say how far out the boundary is."""
+    ends = circle(SIXTH) * np.array([1, 1, short, 1, 0.6, 1])[:, None]
+    domain = closed_spline_domain(ends, 1.0)
+    radii = np.linalg.norm(domain.boundary(3600), axis=1)
+    assert radii[::600] == pytest.approx([1, 1, short, 1, 0.6, 1], abs=2e-3)
+    assert np.abs(np.diff(radii)).max() < 0.02
+    ring = domain.boundary(1000)
+    x, y = ring.T
+    shoelace = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+    assert domain.area == pytest.approx(shoelace, rel=1e-3)
+
+
+def test_a_curve_that_ends_at_the_point_is_no_end():
+    domain = closed_spline_domain(np.vstack([circle(SIXTH), [[1e-5, 0.0]], circle([0])]), 1.0)
+    assert len(domain.ends) == 6
+
+
+def test_fewer_than_three_ends_bound_nothing():
+    for ends in (circle([0, 180]), circle([0, 0, 180, 180]), [[0, 0], [0, 0], [1, 0]]):
+        with pytest.raises(ValueError, match="ends: wanted three or more apart"):
+            closed_spline_domain(ends, 1.0)
+
+
+def test_lengths_scale():
+    small, large = closed_spline_domain(STUBBY, 1.0), closed_spline_domain(STUBBY * 1e6, 1e6)
+    assert large.area == pytest.approx(small.area * 1e12)
+    assert large.boundary(50) == pytest.approx(small.boundary(50) * 1e6)
+
+
+@pytest.mark.parametrize("others", [[(-1.0, 0.2), (-0.9, -0.3)], [(0.9, 0.1), (0.8, -0.1)]])
+def test_two_ends_in_one_direction_bound_what_the_farther_does(others):
+    """As where a curve comes back over itself; the spline through both would turn back."""
+    domain = closed_spline_domain([(1.0, 0.5), (0.02, 0.01), (0.5, 0.25), *others], 1.0)
+    azimuths, radii = domain._polar
+    assert np.isfinite(radii).all()
+    assert (np.diff(azimuths) > 0.0).all()
+    assert np.isfinite(domain.area)
+    assert domain.contains(0.5, 0.25)

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Extent and step by themselves: how far curves grow, what ends them, how many contacts they get."""
+
+import numpy as np
+import pytest
+import surfaces
+
+import core
+from core.reconstruction.result import DOUBTFUL_STD
+
+PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
+UP = (0.0, 0.0, 1.0)
+
+
+def bowl_with(height, gradient):
+    """A paraboloid, plus something of which the gradient is given; its level is the height above it."""
+    return surfaces.Exact(
+        lambda x, y, z: z + (x * x + y * y) / 80.0 - height(x, y),
+        lambda p: np.array([*(p[:2] / 40.0 - gradient(*p[:2])), 1.0]),
+        np.zeros(3),
+        -1.0 / 40.0,
+        -1.0 / 40.0,
+    )
+
+
+def rib(at, high, wide):
+    """A ridge along y, where x is `at`."""
+    return bowl_with(
+        lambda x, y: high * np.exp(-(((x - at) / wide) ** 2)),
+        lambda x, y: (-2.0 * (x - at) / wide**2 * high * np.exp(-(((x - at) / wide) ** 2)), 0.0),
+    )
+
+
+def explore(surface, point=(0.0, 0.0, 0.0), normal=UP, planes=PLANES, farthest=30.0, **more):
+    return core.explore(surface, point, normal, planes, farthest=farthest, **more)
+
+
+def reach(contour, point=(0.0, 0.0, 0.0)):
+    """How far a contour goes before the point, and after it."""
+    at = int(np.argmin(np.linalg.norm(contour.points - point, axis=1)))
+    lengths = np.linalg.norm(np.diff(contour.points, axis=0), axis=1)
+    return lengths[:at].sum(), lengths[at:].sum()
+
+
+def true_error(surface, found):
+    """The mean |dz| over the domain; the reference point is the origin."""
+    points, weights = found.result.domain.nodes
+    world = found.result.frame.to_world(np.column_stack([points, found.result.patch.height(*points.T)]))
+    return float(weights @ np.abs(surface.level(*world.T)))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("radius", [20.0, 35.0])
+def test_on_a_sphere_the_patch_is_large_and_as_good_as_it_says(radius, noise):
+    ball = surfaces.sphere(radius)
+    found = explore(ball, ball.point, ball.normal, farthest=2.0 * radius, noise=noise, rng=1)
+    r = found.result
+    assert 0.6 * radius < r.radius < radius
+    assert r.mean_height_std < DOUBTFUL_STD * r.radius
+    points, weights = r.domain.nodes
+    center = ball.point - radius * ball.normal
+    world = r.frame.to_world(np.column_stack([points, r.patch.height(*points.T)]))
+    off = weights @ np.abs(np.linalg.norm(world - center, axis=1) - radius)
+    assert off < 3.0 * r.mean_height_std
+
+
+def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
+    found = explore(surfaces.plane(), noise=0.01, rng=0)
+    assert found.extent == pytest.approx(30.0)
+    assert found.step == pytest.approx(30.0 / 12.0)
+    assert {stop for contour in found.contours for stop in contour.stops} == {core.EXTENT}
+
+
+def test_curves_end_before_a_rib_and_go_on_elsewhere():
+    surface = rib(at=9.0, high=0.8, wide=1.0)
+    found = explore(surface)
+    for contour in found.contours:
+        assert contour.points[:, 0].max() < 8.5  # the rib rises from there
+    assert core.UNEXPLAINED in found.contours[0].stops
+    before, after = reach(found.contours[0])
+    assert after < 8.5 < before
+    assert true_error(surface, found) < 3.0 * found.result.mean_height_std
+
+
+def test_what_ends_a_curve_otherwise_still_does():
+    half = surfaces.plane()
+
+    class Table:
+        def ray_cast(self, origin, direction, distance):
+            hit = half.ray_cast(origin, direction, distance)
+            return None if hit is None or hit[0][0] > 5.0 else hit
+
+    found = explore(Table())
+    assert found.contours[0].stops == (core.EXTENT, core.NO_CONTACT)
+    assert reach(found.contours[0])[0] == pytest.approx(30.0, rel=0.05)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_size_does_not_matter(factor):
+    surface = rib(at=9.0, high=0.8, wide=1.0)
+
+    class Scaled:
+        def ray_cast(self, origin, direction, distance):
+            hit = surface.ray_cast([v / factor for v in origin], direction, distance / factor)
+            return None if hit is None else (tuple(factor * v for v in hit[0]), hit[1])
+
+    one, other = explore(surface), explore(Scaled(), farthest=30.0 * factor)
+    assert (other.extent, other.step) == pytest.approx((factor * one.extent, factor * one.step), rel=1e-6)
+    assert [c.stops for c in other.contours] == [c.stops for c in one.contours]
+    assert other.result.patch.k1 * factor == pytest.approx(one.result.patch.k1, rel=1e-3)
+
+
+def test_more_contacts_where_they_tell_something():
+    quiet, noisy = (
+        explore(rib(at=50.0, high=0.8, wide=1.0), extent=10.0, noise=noise, rng=3) for noise in (0.0, 0.2)
+    )
+    assert len(noisy.result.contacts) >= 2 * len(quiet.result.contacts)
+    assert noisy.extent == quiet.extent == 10.0
+
+
+def test_given_lengths_are_those_of_track_and_reconstruct():
+    ball = surfaces.sphere(20.0)
+    found = explore(ball, ball.point, ball.normal, extent=8.0, step=0.8, noise=0.02, rng=5, degree=3)
+    contours = core.track(ball, ball.point, ball.normal, PLANES, extent=8.0, step=0.8, noise=0.02, rng=5)
+    r = core.reconstruct(ball.point, contours, outward=ball.normal, degree=3)
+    assert np.array_equal(found.result.patch.coefficients, r.patch.coefficients)
+    assert (found.extent, found.step) == (8.0, 0.8)
+
+
+def test_numbers_are_taken_as_track_takes_them():
+    found = explore(surfaces.plane(), farthest="30", step="2")
+    assert (found.extent, found.step) == (30.0, 2.0)
+
+
+def test_a_given_step_is_kept_where_the_extent_is_free():
+    ball = surfaces.sphere(20.0)
+    found = explore(ball, ball.point, ball.normal, step=1.5)
+    assert found.step == 1.5
+    gaps = np.concatenate([np.linalg.norm(np.diff(c.points, axis=0), axis=1) for c in found.contours])
+    assert gaps == pytest.approx(1.5, rel=2e-3)
+    assert found.extent > 8.0
+
+
+def test_the_size_is_that_of_the_default_fit_whatever_the_method():
+    surface = rib(at=9.0, high=0.8, wide=1.0)
+    ends = [[c.points[[0, -1]] for c in explore(surface, method=m).contours] for m in ("bayes", "tagc")]
+    assert np.allclose(*ends, atol=1e-9)
+
+
+def test_where_nothing_is_explained_the_patch_is_small_and_says_how_good_it_is():
+    ripple = bowl_with(
+        lambda x, y: 0.15 * np.sin(4.0 * x) * np.sin(3.0 * y),
+        lambda x, y: (0.6 * np.cos(4.0 * x) * np.sin(3.0 * y), 0.45 * np.sin(4.0 * x) * np.cos(3.0 * y)),
+    )
+    found = explore(ripple, farthest=20.0)
+    assert found.extent <= 5.0
+    assert (
+        found.result.status == "uncertain" or true_error(ripple, found) < 3.0 * found.result.mean_height_std
+    )
+
+
+def test_a_point_beside_an_edge_is_refused_as_ever():
+    class Sliver:
+        def ray_cast(self, origin, direction, distance):
+            hit = surfaces.plane().ray_cast(origin, direction, distance)
+            return None if hit is None or abs(hit[0][0]) > 0.01 else hit
+
+    with pytest.raises(core.DegenerateCurvesError, match="contacts it needs"):
+        explore(Sliver())
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"extent": "far"}, "extent: wanted a finite number above 0, got 'far'"),
+        ({"step": -1.0}, "step: wanted a finite number above 0, got -1"),
+        ({"farthest": 0.0}, "farthest: wanted a finite number above 0, got 0"),
+        ({"step": 40.0}, "step: wanted no more than the extent 30, got 40"),
+        ({"method": "magic", "extent": 8.0}, "method: wanted one of .*, got 'magic'"),
+    ],
+)
+def test_bad_arguments_are_named(more, message):
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        explore(surfaces.plane(), **more)

@@ -1,0 +1,384 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The whole way from contours to a patch: exactness, equivariance, and what is refused."""
+
+import importlib
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import surfaces
+from scipy.spatial.transform import Rotation
+from surfaces import TILTED, UPRIGHT
+
+from core import (
+    METHODS,
+    Contour,
+    DegenerateCurvesError,
+    SamplingPlane,
+    distances,
+    mean_height_stds,
+    overlapped,
+    reconstruct,
+    reconstruct_many,
+    track,
+)
+
+
+@pytest.mark.parametrize("planes", [UPRIGHT, TILTED], ids=["upright", "tilted"])
+@pytest.mark.parametrize("method", ["tagc", "quadratic-variation"])
+@pytest.mark.parametrize(
+    "surface",
+    [
+        surfaces.plane(),
+        surfaces.sphere(25),
+        surfaces.cylinder(20),
+        surfaces.torus(40, 20, 0.6),
+        surfaces.torus(40, 20, 2.6),
+        surfaces.ellipsoid(35, 25, 20, 0.6, 0.5),
+        surfaces.bottle_neck(),
+        surfaces.quartic(),
+    ],
+    ids=["plane", "sphere", "cylinder", "torus outer", "torus inner", "ellipsoid", "bottle neck", "quartic"],
+)
+def test_exact_surfaces_of_paper_size(surface, method, planes):
+    """The errors these methods have on 12 mm patches: 2 % of the radius, 2.5 % on the sphere, whose rim least
+    |K| flattens, 4 % where the ellipsoid's radius is down to 18 mm; the curvatures to 0.0025 / mm."""
+    contours = surface.track(planes)
+    r = surface.fit(contours, method=method)
+    flattened = method == "tagc" and surface.k2 - surface.k1 < 1e-6 and surface.k2 < 0.0
+    bound = 0.04 if surface.k1 < -0.05 else 0.025 if flattened else 0.02
+    assert surfaces.off_data(surface, r) < bound * r.radius
+    assert [r.patch.k1, r.patch.k2] == pytest.approx([surface.k1, surface.k2], abs=2.5e-3)
+    assert r.fit_error == pytest.approx(
+        np.mean(np.abs(r.patch.height(*r.contacts[:, :2].T) - r.contacts[:, 2]))
+    )
+    assert len(r.contacts) == 72
+    assert r.status in ("ok", "uncertain")
+
+
+def test_a_quartic_along_its_own_curves_is_seen_by_least_squares_in_the_true_frame():
+    """Three curves hide three of the nine directions, whatever the noise: the condition number tells."""
+    s = surfaces.quartic()
+    five = surfaces.planes((5, 41, 77, 113, 149))
+    contours = s.track(five, extent=12, step=0.1)
+    r = s.fit(contours, method="least-squares")
+    assert r.condition_number < 100
+    assert r.status == "ok"
+    assert surfaces.off_data(s, r) < 0.05
+    assert r.patch.coefficients[:4] == pytest.approx([2e-4, -3e-4, 1e-4, 2e-4], abs=2e-4)
+    three = s.fit(contours[::2], method="least-squares")
+    assert three.condition_number > 1e3
+    assert three.status == "uncertain"
+
+
+def test_degree_2_is_the_quadric_alone():
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    contours = s.track(UPRIGHT, extent=5, step=0.5)
+    results = [s.fit(contours, method=m, degree=2) for m in METHODS]
+    for r in results:
+        assert r.patch.degree == 2
+        assert r.patch.height(1.0, 2.0) == pytest.approx(r.patch.k1 / 2 + 2 * r.patch.k2)
+
+
+@pytest.mark.parametrize("degree", [3, 5, 6])
+def test_other_degrees(degree):
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    contours = s.track(UPRIGHT)
+    r = s.fit(contours, degree=degree)
+    assert r.patch.degree == degree
+    assert surfaces.off_data(s, r) < 0.04 * r.radius
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
+def test_rotating_scaling_and_moving_the_data_moves_the_result(method, scale):
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    contours = s.track(TILTED, noise=0.02, rng=1)
+    turn = Rotation.from_rotvec([0.5, -1.1, 0.8]).as_matrix()
+    shift = scale * np.array([30.0, -20.0, 10.0])
+
+    def moved(p):
+        return scale * np.asarray(p) @ turn.T + shift
+
+    one = s.fit(contours, method=method)
+    other = reconstruct(
+        moved(s.point), [Contour(moved(c.points)) for c in contours], outward=turn @ s.normal, method=method
+    )
+    assert other.frame.axes == pytest.approx(turn @ one.frame.axes, abs=1e-9)
+    assert other.frame.origin == pytest.approx(moved(s.point))
+    assert other.radius == pytest.approx(scale * one.radius)
+    assert [other.patch.k1, other.patch.k2] == pytest.approx(
+        [one.patch.k1 / scale, one.patch.k2 / scale], rel=1e-7
+    )
+    assert other.domain.area == pytest.approx(scale**2 * one.domain.area)
+    if method == "least-squares":
+        # Its blind directions multiply rounding by the condition number, 1e4: on the data it is the same.
+        x, y = one.contacts[:, :2].T
+    else:
+        x, y = one.domain.grid(100)[0].T
+    # An optimizer stops within its tolerance, not within rounding.
+    tolerance = {"bayes": 1e-9, "tagc": 1e-4, "quadratic-variation": 1e-9, "least-squares": 1e-6}[method]
+    heights = other.patch.height(scale * x, scale * y) / scale
+    assert heights == pytest.approx(one.patch.height(x, y), abs=tolerance * one.radius)
+    assert other.status == one.status
+
+
+@pytest.mark.parametrize("surface", [surfaces.sphere(25), surfaces.plane()], ids=["sphere", "plane"])
+def test_umbilics_turn_with_the_data_too(surface):
+    contours = surface.track(UPRIGHT, noise=0.02, rng=2)
+    turn = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix()
+    one = surface.fit(contours, method="quadratic-variation")
+    turned = [Contour(c.points @ turn.T) for c in contours]
+    other = reconstruct(
+        turn @ surface.point, turned, outward=turn @ surface.normal, method="quadratic-variation"
+    )
+    assert other.frame.axes == pytest.approx(turn @ one.frame.axes, abs=1e-9)
+
+
+def test_distances_of_mesh_vertices_over_the_domain():
+    """A ball's far side and its inner wall lie over the domain too, but are not the patch's."""
+    ball = surfaces.sphere(25)
+    contours = ball.track(UPRIGHT, extent=8, step=0.8)
+    r = ball.fit(contours, weight=1e5)
+    directions = np.random.default_rng(0).normal(size=(20000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    vertices, normals = np.vstack([25 * directions, 22 * directions]), np.vstack([directions, -directions])
+    over = overlapped(r.geometry, vertices, normals)
+    expected = 20000 * (1 - np.cos(8 / 25)) / 2
+    assert len(over) == pytest.approx(expected, rel=0.15)
+    assert np.linalg.norm(vertices[over], axis=1) == pytest.approx(25.0)
+    assert distances(r.patch, r.frame.to_local(vertices[over])).mean() < 0.05
+
+
+def test_four_to_six_planes_and_curves_that_are_not_planar():
+    s = surfaces.torus(40, 20, 0.6)
+    for count in (4, 5, 6):
+        planes = [SamplingPlane(a) for a in np.pi * np.arange(count) / count]
+        contours = s.track(planes, extent=10, step=1)
+        assert surfaces.off_data(s, s.fit(contours)) < 0.15
+    # A finger that swerves: the contour of one plane, continued in another one's.
+    one, other = s.track([SamplingPlane(0.1), SamplingPlane(0.35)], extent=10, step=1)
+    swerving = Contour(np.vstack([one.points[:11], other.points[11:]]))
+    rest = s.track([SamplingPlane(1.2), SamplingPlane(2.3)], extent=10, step=1)
+    r = s.fit([swerving, *rest])
+    assert surfaces.off_data(s, r) < 0.5
+
+
+GOOD = track(
+    surfaces.sphere(25), surfaces.sphere(25).point, surfaces.sphere(25).normal, UPRIGHT, extent=5, step=1
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"method": "magic"},
+            "method: wanted one of bayes, tagc, quadratic-variation, least-squares, got 'magic'",
+        ),
+        ({"solver": "slow"}, "solver: wanted one of fast, descent, got 'slow'"),
+        ({"degree": 7}, 'degree: wanted a whole number from 2 to 6 or "auto", got 7'),
+        ({"degree": 3.5}, 'degree: wanted a whole number from 2 to 6 or "auto", got 3.5'),
+        ({"degree": "high"}, 'degree: wanted a whole number from 2 to 6 or "auto", got .high'),
+        ({"weight": 0}, "weight: wanted a finite number above 0, got 0"),
+        ({"noise": -1}, "noise: wanted a finite number of 0 or more, got -1"),
+        ({"outward": (0, 0, 0)}, "outward: wanted a vector with a direction"),
+        ({"point": (np.nan, 0, 0)}, "point: wanted finite numbers"),
+        ({"point": (0, 0, 1e60)}, r"point: wanted numbers up to 1e\+50, got larger ones"),
+        ({"point": (0, 0, 10**400)}, "point: wanted numbers of shape"),
+        ({"point": np.array([1j, 0, 0])}, "point: wanted numbers of shape"),
+        ({"method": np.array(["bayes", "tagc"])}, "method: wanted one of"),
+        ({"degree": np.array([4, 5])}, "degree: wanted a whole number"),
+        ({"weight": np.array([1.0])}, r"weight: wanted a finite number above 0, got array\(\[1.\]\)"),
+        ({"weight": 10**400}, "weight: wanted a finite number above 0, got 1000"),
+        ({"weight": 1e60}, r"weight: wanted a number up to 1e\+50, got 1e\+60"),
+        ({"contours": None}, "contours: wanted a list, got None"),
+        ({"contours": [GOOD[0].points]}, "contours: wanted a list of Contour, got array"),
+    ],
+)
+def test_bad_arguments_are_named(change, message):
+    given = {"point": surfaces.sphere(25).point, "contours": GOOD, "outward": surfaces.sphere(25).normal}
+    with pytest.raises(ValueError, match=message) as caught:
+        reconstruct(**(given | change))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_touch_without_curves_and_whole_numbers_of_numpy():
+    ball = surfaces.sphere(25)
+    with pytest.raises(DegenerateCurvesError, match="three curves are needed, got 0"):
+        ball.fit([])
+    assert ball.fit(GOOD, degree=np.int64(5)).patch.degree == 5
+
+
+def test_a_sensor_that_knows_nothing_leaves_a_patch_in_doubt():
+    ball = surfaces.sphere(25)
+    r = ball.fit(GOOD, noise=1e20)
+    assert r.status == "uncertain"
+    assert np.isfinite([r.mean_height_std, r.patch.k1, r.patch.k2]).all()
+
+
+def test_a_weight_beyond_all_measure_leaves_the_contacts_alone():
+    ball = surfaces.sphere(25)
+    errors = [
+        ball.fit(GOOD, method="tagc", degree=6, weight=weight).fit_error for weight in (1e12, 1e20, 1e50)
+    ]
+    assert errors == pytest.approx(errors[:1] * 3, rel=1e-6)
+
+
+def test_curves_that_rounding_far_from_the_origin_spoils_are_refused():
+    ball = surfaces.sphere(25)
+    far = ball.point + 1e17
+    with pytest.raises(DegenerateCurvesError, match="16 apart in double precision, too coarse for curves of"):
+        reconstruct(far, [Contour(2000.0 * (c.points - ball.point) + far) for c in GOOD], outward=ball.normal)
+
+
+def test_lengths_too_small_to_be_raised_to_the_sixth_power_are_none():
+    ball = surfaces.sphere(25)
+    curves = [Contour(1e-60 * c.points) for c in GOOD]
+    with pytest.raises(DegenerateCurvesError, match="curve 1 has 0 of the 3 contacts"):
+        reconstruct(1e-60 * ball.point, curves, outward=ball.normal)
+
+
+MANY = [
+    (surface, planes, noise)
+    for surface in (
+        surfaces.sphere(25),
+        surfaces.torus(40, 20, 0.6),
+        surfaces.bottle_neck(),
+        surfaces.plane(),
+    )
+    for planes in (UPRIGHT, TILTED, surfaces.planes((0, 45, 90, 135)))
+    for noise in (0.0, 0.05)
+]
+
+
+@pytest.mark.parametrize("options", [{}, {"degree": "auto"}, {"method": "tagc"}, {"noise": 0.3}])
+def test_many_at_once_are_what_they_are_one_by_one(options):
+    """Touches that differ in curves, contacts and outliers, so that their stacks have gaps."""
+    rng = np.random.default_rng(7)
+    points, outward, touches = [], [], []
+    for i, (s, planes, noise) in enumerate(MANY):
+        contours = s.track(
+            planes,
+            extent=rng.uniform(6, 12),
+            step=rng.uniform(0.7, 1.5),
+            noise=noise,
+            rng=i,
+        )
+        if i % 3 == 0:
+            contours[1].points[2] += 1.0
+        if i % 5 == 0:
+            contours[2] = Contour(contours[2].points[:-3], noise=noise)
+        points.append(s.point)
+        outward.append(s.normal)
+        touches.append(contours)
+    many = reconstruct_many(points, touches, outward=outward, **options)
+    for point, up, contours, one_of_many in zip(points, outward, touches, many, strict=True):
+        one = reconstruct(point, contours, outward=up, **options)
+        assert one_of_many.frame.axes == pytest.approx(one.frame.axes, abs=1e-9)
+        assert one_of_many.radius == pytest.approx(one.radius, rel=1e-12)
+        assert one_of_many.contacts == pytest.approx(one.contacts, abs=1e-9)
+        assert one_of_many.patch.degree == one.patch.degree
+        x, y = one.domain.grid(60)[0].T
+        assert one_of_many.patch.height(x, y) == pytest.approx(one.patch.height(x, y), abs=1e-7)
+        assert one_of_many.height_std(x, y) == pytest.approx(one.height_std(x, y), rel=1e-6)
+        assert one_of_many.domain.area == pytest.approx(one.domain.area)
+        assert one_of_many.status == one.status
+
+
+def test_a_touch_that_carries_nothing_does_not_spoil_the_others():
+    ball = surfaces.sphere(25)
+    results = reconstruct_many([ball.point] * 4, [GOOD, GOOD[:2], [], GOOD], outward=[ball.normal] * 4)
+    assert [isinstance(r, DegenerateCurvesError) for r in results] == [False, True, True, False]
+    assert "three curves are needed, got 2" in str(results[1])
+    assert results[0].patch.k1 == pytest.approx(-0.04, abs=1e-3)
+    assert reconstruct_many(np.empty((0, 3)), [], outward=np.empty((0, 3))) == []
+    assert mean_height_stds([]) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"points": [(0, 0, 0)] * 2}, "contours_list: wanted 2 lists of contours, got 1"),
+        ({"points": (0, 0, 0)}, r"points: wanted shape \(n, 3\), got \(3,\)"),
+        ({"outward": (0, 0, 1)}, r"outward: wanted shape \(1, 3\), got \(3,\)"),
+        ({"outward": [(0, 0, 0)]}, "outward: wanted a vector with a direction"),
+        ({"contours_list": 5}, "contours_list: wanted a list, got 5"),
+        ({"contours_list": [[GOOD[0].points]]}, "contours: wanted a list of Contour, got array"),
+        ({"degree": 9}, "degree: wanted a whole number"),
+    ],
+)
+def test_bad_arguments_of_many_are_named(change, message):
+    given = {"points": [surfaces.sphere(25).point], "outward": [surfaces.sphere(25).normal]}
+    with pytest.raises(ValueError, match=message):
+        reconstruct_many(**(given | {"contours_list": [GOOD]} | change))
+
+
+def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():
+    s = np.linspace(0.1, 1.0, 9)
+    curves = [Contour(np.column_stack([s, bend * s * (1.0 - s), 0.0 * s])) for bend in (-0.1, 0.0, 0.1)]
+    with pytest.raises(DegenerateCurvesError, match="fewer than three places apart"):
+        reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
+
+
+def test_no_numbers_but_finite_ones_come_out_of_random_curves():
+    rng = np.random.default_rng(6)
+    for _ in range(200):
+        curves = [
+            Contour(rng.normal(size=(rng.integers(3, 12), 3)) * 10.0 ** rng.uniform(-8, 8)) for _ in range(3)
+        ]
+        try:
+            r = reconstruct((0, 0, 0), curves, outward=rng.normal(size=3), method=METHODS[rng.integers(4)])
+        except DegenerateCurvesError:
+            continue
+        numbers = [
+            r.fit_error,
+            r.mean_height_std,
+            r.total_absolute_curvature,
+            r.condition_number,
+            r.patch.k1,
+            r.patch.k2,
+            r.radius,
+        ]
+        assert np.isfinite([*numbers, *r.patch.coefficients, r.domain.area]).all()
+
+
+def test_importing_core_imports_neither_blender_nor_scipy():
+    """scipy would make enabling the extension slow, and nothing in core may need Blender."""
+    code = "import sys, core; sys.exit(bool({'bpy', 'mathutils', 'scipy'} & set(sys.modules)))"
+    root = Path(__file__).resolve().parents[3]
+    assert subprocess.run([sys.executable, "-c", code], cwd=root).returncode == 0
+
+
+def test_short_curves_beside_a_long_one_cost_the_fit_what_they_have(monkeypatch):
+    module = importlib.import_module("core.reconstruction")
+    seen, fit = [], module.joint_fit
+    monkeypatch.setattr(module, "joint_fit", lambda c, *rest: seen.append(c.shape) or fit(c, *rest))
+    s = surfaces.pear()
+    contours = s.track(surfaces.planes((0, 60, 120)))
+    short = [replace(c, points=c.points[len(c.points) // 2 - 4 :][:8], normals=None) for c in contours[1:]]
+    reconstruct(s.point, [contours[0], *short, *short], outward=s.normal)
+    assert seen == [(1, sum(len(c.points) - 1 for c in (contours[0], *short, *short)), 3)]
+
+
+def test_masked_contacts_are_refused():
+    points = np.ma.masked_array(np.arange(12.0).reshape(4, 3), mask=False)
+    assert Contour(points).points.shape == (4, 3)
+    points[1] = np.ma.masked
+    with pytest.raises(ValueError, match="points: wanted numbers, got masked ones among them: take them out"):
+        Contour(points)
+
+
+@pytest.mark.parametrize("method", ["bayes", "tagc", "quadratic-variation", "least-squares"])
+def test_a_caller_who_has_numpy_raise_gets_the_same_fit(method):
+    s = surfaces.monkey_saddle()
+    contours = s.track(surfaces.planes((0, 60, 120)), noise=1e-3, rng=1)
+    wanted = reconstruct(s.point, contours, outward=s.normal, method=method)
+    with np.errstate(all="raise"):
+        found = reconstruct(s.point, contours, outward=s.normal, method=method)
+        assert (found.status, found.mean_height_std) == (wanted.status, wanted.mean_height_std)
+    assert np.array_equal(found.patch.coefficients, wanted.patch.coefficients)

@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A reconstruction as plain values and back."""
+
+import json
+
+import numpy as np
+import pytest
+import surfaces
+
+from core import (
+    METHODS,
+    Contour,
+    from_dict,
+    reconstruct,
+    suggest_plane,
+    to_dict,
+)
+
+SURFACE = surfaces.torus(40, 20, 0.6)
+
+
+def touched(noise=0.05, **options):
+    return SURFACE.fit(SURFACE.track(surfaces.planes((0, 60, 120)), noise=noise, rng=1), **options)
+
+
+RESULTS = [touched(method=method) for method in METHODS]
+RESULTS += [touched(degree=2), touched(degree=6), touched(noise=1.0), touched(degree="auto")]
+
+
+@pytest.mark.parametrize("r", RESULTS)
+def test_through_json_and_back_it_is_the_same_to_the_last_bit(r):
+    text = json.dumps(to_dict(r), allow_nan=False)
+    again = from_dict(json.loads(text))
+    assert json.dumps(to_dict(again), allow_nan=False) == text
+    x, y = r.domain.grid(80)[0].T
+    for name in ("height", "height_std"):
+        assert np.array_equal(getattr(again, name)(x, y), getattr(r, name)(x, y))
+    assert np.array_equal(again.domain.boundary(50), r.domain.boundary(50))
+    assert np.array_equal(again.contacts, r.contacts)
+    for one, other in zip(again.contours, r.contours, strict=True):
+        for key, value in vars(one).items():
+            assert np.array_equal(value, vars(other)[key]), key
+    for name in ("method", "status", "message", "blind", "radius", "converged", "mean_height_std"):
+        assert getattr(again, name) == getattr(r, name)
+    for name in ("fit_error", "total_absolute_curvature", "condition_number"):
+        assert getattr(again, name) == getattr(r, name)
+    assert suggest_plane(again) == suggest_plane(r)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_far_from_the_origin_it_is_the_same_too(method):
+    shift = np.eye(4)
+    shift[:3, 3] = 4e5, -3e5, 1e5
+    r = RESULTS[METHODS.index(method)].moved(shift)
+    again = from_dict(json.loads(json.dumps(to_dict(r))))
+    assert len(again.contacts) == len(r.contacts) == 72
+    assert np.array_equal(again.contacts, r.contacts)
+
+
+def test_it_says_what_it_is():
+    d = to_dict(RESULTS[0])
+    assert d["version"] == 2
+    assert d["status"] == RESULTS[0].status
+    assert len(d["contours"]) == 3
+    assert len(d["contours"][0]["points"]) == 25
+
+
+def damaged(path, value):
+    d = json.loads(json.dumps(to_dict(RESULTS[0])))
+    *inner, last = path
+    place = d
+    for key in inner:
+        place = place[key]
+    if value is None:
+        del place[last]
+    else:
+        place[last] = value
+    return d
+
+
+KEYS = sorted(set(to_dict(RESULTS[0])) - {"status", "message"})
+
+
+@pytest.mark.parametrize("key", KEYS)
+@pytest.mark.parametrize("value", [None, "ball", float("nan"), [], {}, [[1.0]], [{}], -1], ids=str)
+def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
+    if key == "converged" and value is not None:
+        return
+    with pytest.raises(ValueError, match=r": wanted "):
+        from_dict(damaged([key], value))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        (["version"], 3, "version: wanted 2, got 3: this was written by another release"),
+        (["geometry", "radius"], None, "radius: wanted it in the dict of a reconstruction, got none"),
+        (["geometry", "radius"], 1e-300, "radius: wanted a finite number of 1e-50 or more"),
+        (["method"], "magic", "method: wanted one of bayes"),
+        (["geometry", "frame", "axes"], np.diag([1, 1, -1]).tolist(), "axes: wanted a right-handed frame"),
+        (["geometry", "frame", "axes"], np.diag([2, 2, 2]).tolist(), "axes: wanted a right-handed frame"),
+        (["geometry", "frame", "origin"], [0, 0], "origin: wanted shape"),
+        (["geometry", "polynomial", "k1"], "flat", "k1: wanted a finite number"),
+        (["patch", "coefficients"], [1.0, 2.0], "coefficients: wanted 0, 4, 9, 15, 22 of them, got 2"),
+        (["geometry", "domain"], [[0, 0], [1, 1]], "three or more"),
+        (["contours"], [], "contours: wanted a list of some"),
+        (["contours", 0, "points"], [1, 2], "points: wanted shape"),
+        (["contours", 0, "noise"], -1.0, "noise: wanted a finite number of 0 or more"),
+        (["misses"], [[0.0, 0.0]], "misses: wanted shape"),
+        (["geometry", "residual"], {"places": 3}, "places: wanted shape"),
+        (["posterior", "covariance"], [[1.0]], "covariance: wanted shape"),
+        (["posterior", "mean"], None, "mean: wanted it in the dict"),
+    ],
+)
+def test_what_is_wrong_is_named(path, value, words):
+    with pytest.raises(ValueError, match=words):
+        from_dict(damaged(path, value))
+
+
+@pytest.mark.parametrize("value", [None, 3, "{}", [1, 2]])
+def test_what_is_no_dict_is_refused(value):
+    with pytest.raises(ValueError, match="version: wanted it in a dict"):
+        from_dict(value)
+
+
+@pytest.mark.parametrize("sign", ["negative", "skew"])
+def test_a_covariance_that_is_none_is_refused(sign):
+    d = to_dict(touched())
+    covariance = np.array(d["posterior"]["covariance"])
+    d["posterior"]["covariance"] = (-covariance if sign == "negative" else np.triu(covariance)).tolist()
+    with pytest.raises(ValueError, match="covariance: wanted a symmetric matrix without negative"):
+        from_dict(d)
+
+
+def rough():
+    """A dict with a residual, of contacts on waves that no sextic follows."""
+    t, contours = np.linspace(-1.0, 1.0, 31), []
+    for a in np.radians((0.0, 60.0, 120.0)):
+        x, y = t * np.cos(a), t * np.sin(a)
+        contours.append(Contour(np.column_stack([x, y, 0.01 * np.sin(9.0 * x + 4.0 * y)])))
+    return to_dict(reconstruct((0, 0, 0), contours, outward=(0, 0, 1)))
+
+
+@pytest.mark.parametrize(
+    ("key", "change", "words"),
+    [
+        ("variances", lambda v: v * [-1.0, 1.0], "residual: wanted variances and noise above 0"),
+        ("variances", lambda v: 0.0 * v, "residual: wanted variances and noise above 0"),
+        ("noise", lambda v: -v, "residual: wanted variances and noise above 0"),
+        ("places", lambda v: 1e300 * v, "residual: wanted .* places on the unit disk"),
+        ("factor", lambda v: 0.0 * v, "factor: wanted a lower triangle"),
+        ("factor", lambda v: v - np.diag(v.diagonal()), "factor: wanted a lower triangle"),
+        ("factor", lambda v: v + 1e-3, "factor: wanted a lower triangle"),
+        ("factor", lambda v: v[:-1], "factor: wanted shape"),
+    ],
+)
+def test_a_damaged_residual_is_refused(key, change, words):
+    d = rough()
+    residual = d["geometry"]["residual"]
+    assert from_dict(d).residual is not None
+    residual[key] = change(np.array(residual[key])).tolist()
+    with pytest.raises(ValueError, match=words):
+        from_dict(d)

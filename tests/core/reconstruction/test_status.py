@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When a patch is in doubt, that it says so, why, and what to do; and that it does not where all is well."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import surfaces
+
+from core import METHODS, Contour, reconstruct
+from core.contours.curves import curves_through, misses, stacked
+
+EXTENT = 12.0
+
+
+def contours_of(surface, degrees=(13, 73, 133), noise=0.05, seed=0, extent=EXTENT, count=12):
+    lengths = {"extent": extent, "step": extent / count}
+    return surface.track(surfaces.planes(degrees), noise=noise, rng=seed, **lengths)
+
+
+def moved(contour, shift):
+    return replace(contour, points=contour.points + shift)
+
+
+@pytest.mark.parametrize(
+    "surface", [surfaces.pear(), surfaces.sphere(30), surfaces.plane(), surfaces.saddle()]
+)
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_where_all_is_well_no_warning(surface, noise):
+    for seed in range(5):
+        r = surface.fit(contours_of(surface, noise=noise, seed=seed))
+        assert r.status == "ok", r.message
+        assert r.message.startswith("The patch describes its contacts.")
+        assert "3 of 14 coefficients are invisible" in r.message
+
+
+def test_heights_that_are_good_to_little():
+    s = surfaces.pear()
+    r = s.fit(contours_of(s, noise=1.5))
+    assert r.status == "uncertain"
+    assert f"Heights are good to {100 * r.mean_height_std / r.radius:.1f} % of the radius" in r.message
+    assert "shorter extent, or add sampling planes" in r.message
+
+
+def test_least_squares_with_upright_planes():
+    s = surfaces.pear()
+    r = s.fit(contours_of(s), method="least-squares")
+    assert (r.status, r.condition_number > 1e3) == ("uncertain", True)
+    assert "do not determine the surface between the curves" in r.message
+
+
+def test_a_descent_that_has_not_come_to_an_end():
+    s = surfaces.pear()
+    r = replace(s.fit(contours_of(s), method="tagc"), converged=False)
+    assert r.status == "not_converged"
+    assert "use the fast solver, or a smaller weight" in r.message
+
+
+def test_a_curve_that_misses_the_point_is_named_with_its_distance():
+    s = surfaces.pear()
+    contours = contours_of(s, noise=0.02)
+    across = np.cross(contours[1].points[-1] - contours[1].points[0], s.normal)
+    across *= 0.4 / np.linalg.norm(across)
+    contours[1] = moved(contours[1], across)
+    r = s.fit(contours)
+    assert r.status == "uncertain"
+    assert r.message.startswith("Curve 2 passes the reference point at 0.4")
+    assert "set the point where the curves meet" in r.message
+
+
+def test_misses_are_distances_across_the_curve_with_their_scatter():
+    rng = np.random.default_rng(3)
+    t = np.linspace(-1.0, 1.0, 11)
+    curve = np.column_stack([t, np.zeros_like(t), -0.2 * t**2])
+    found = []
+    for _ in range(200):
+        noisy = curve + rng.normal(0.0, 0.01, (len(curve), 1)) * [0.0, 0.0, 1.0] + [0.0, 0.0, 0.05]
+        contours = [Contour(noisy), Contour(noisy[:, [1, 0, 2]]), Contour(noisy[:2])]
+        curves = curves_through(*stacked(np.zeros((1, 3)), [contours])).at(0)
+        found.append(misses(curves))
+    distances, stds = np.mean(found, axis=0).T
+    assert distances[0] == pytest.approx(0.05, abs=0.002)
+    assert np.std(np.array(found)[:, 0, 0]) == pytest.approx(stds[0], rel=0.2)
+    assert (distances[2], stds[2]) == (0.0, 0.0)  # too few to tell
+
+
+def test_principal_directions_that_may_be_far_off():
+    s = surfaces.ellipsoid(30, 28, 27, 0.4, 0.5)  # curvatures that hardly differ
+    turned = []
+    for seed in range(20):
+        r = s.fit(contours_of(s, degrees=(13, 33, 53), noise=0.1, seed=seed))
+        if "principal directions" in r.message:
+            assert r.status == "uncertain"
+            assert "take a longer extent, or add sampling planes" in r.message
+            turned.append(seed)
+    assert len(turned) > 10
+
+
+def test_the_frame_is_hardly_ever_off_by_more_than_the_angle_that_is_told():
+    s = surfaces.pear()
+    exact = s.fit(contours_of(s, noise=0.0)).frame.axes
+    angles, told = [], []
+    for seed in range(60):
+        r = s.fit(contours_of(s, noise=0.1, seed=seed))
+        angles.append(np.arccos(min(1.0, abs(exact[:, 0] @ r.frame.axes[:, 0]))))
+        told.append(r.posterior.turn())
+    assert np.mean(np.array(angles) <= told) > 0.9
+    assert np.mean(told) < 4.0 * np.sqrt(np.mean(np.square(angles)))
+
+
+@pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.ellipsoid(30, 28, 27, 0.4, 0.5)])
+@pytest.mark.parametrize("degrees", [(13, 73, 133), (13, 33, 53)])
+def test_the_angle_told_is_a_quantile_of_the_posterior(surface, degrees):
+    r = surface.fit(contours_of(surface, degrees=degrees, noise=0.1))
+    mean, covariance = r.posterior.mean[:5], r.posterior.covariance[:5, :5]
+    drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, 40_000)
+    x, y, xx, xy, yy = drawn.T
+    angles = np.where(
+        2.0 * np.hypot(yy - xx, xy) <= 0.05, 0.0, np.hypot(np.hypot(x, y), 0.5 * np.arctan2(abs(xy), yy - xx))
+    )
+    assert r.posterior.turn() == pytest.approx(np.quantile(angles, 0.95), rel=0.1)
+
+
+def cut_short(contours, point):
+    """The first of them reaches a fifth of the extent."""
+    near = np.linalg.norm(contours[0].points - point, axis=1) < 0.2 * EXTENT + 0.1
+    return [Contour(contours[0].points[near], noise=contours[0].noise), *contours[1:]]
+
+
+def test_the_curvature_known_least_is_that_along_a_short_curve():
+    s = surfaces.pear()
+    contours = cut_short(contours_of(s), s.point)
+    r = s.fit(contours)
+    azimuth = np.arctan2(*(r.frame.axes[:, 1::-1].T @ (contours[0].points[-1] - s.point)))
+    along, across = np.cos(azimuth), np.sin(azimuth)
+    terms = 2.0 * np.array([along**2, along * across, across**2])
+    std = np.sqrt(terms @ r.posterior.covariance[2:5, 2:5] @ terms)
+    assert r.posterior.curvature_std() == pytest.approx(std, rel=0.05)
+    assert s.fit(contours_of(s)).posterior.curvature_std() < 0.1 * std
+
+
+def test_a_curve_shorter_than_a_quarter_of_the_radius_leaves_doubt():
+    s = surfaces.torus(40, 20, 2.6)
+    open_curvature = 0
+    for seed in range(10):
+        contours = contours_of(s, seed=seed)
+        assert s.fit(contours).status == "ok"
+        r = s.fit(cut_short(contours, s.point))
+        assert r.status == "uncertain"  # whichever doubt comes first
+        if (
+            f"Curvatures are good to {r.posterior.curvature_std() / r.radius:.2g} in the direction"
+            in r.message
+        ):
+            assert "known least: take a longer extent, or add sampling planes" in r.message
+            open_curvature += 1
+    assert open_curvature > 2
+
+
+def test_an_umbilic_has_no_directions_to_be_wrong():
+    s = surfaces.sphere(30)
+    assert s.fit(contours_of(s, noise=0.01)).posterior.turn() == 0.0
+
+
+@pytest.mark.parametrize("method", METHODS[1:])
+@pytest.mark.parametrize("surface", [surfaces.sphere(35), surfaces.pear(), surfaces.cylinder(20)])
+def test_height_std_of_the_papers_methods_counts_what_they_are_off_the_likeliest_surface(method, surface):
+    r = surface.fit(contours_of(surface, noise=0.02), method=method)
+    points, heights = surfaces.heights_over(surface, r, 100)
+    x, y = points.T
+    off = r.radius * r.posterior.height(x / r.radius, y / r.radius) - r.patch.height(x, y)
+    std = r.radius * r.posterior.height_std(x / r.radius, y / r.radius)
+    assert r.height_std(x, y) == pytest.approx(np.hypot(off, std))
+    assert np.mean(np.abs(r.patch.height(x, y) - heights)) < 3.0 * r.mean_height_std
+
+
+def test_single_precision_far_from_the_origin_is_refused_and_near_it_taken():
+    s = surfaces.pear()
+    contours = contours_of(s)
+    shift = np.array([0.6, -0.48, 0.64]) * EXTENT
+
+    def at(extents):
+        points = [(c.points + extents * shift).astype(np.float32) for c in contours]
+        return reconstruct(s.point + extents * shift, [Contour(p) for p in points], outward=s.normal)
+
+    near, far = at(0.0), at(1e4)
+    assert far.patch.k1 == pytest.approx(near.patch.k1, rel=0.05)
+    with pytest.raises(ValueError, match=r"points: numbers of single precision are 0\.5 apart here"):
+        at(1e6)
