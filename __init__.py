@@ -20,6 +20,6 @@ def reconstruction_of(obj):
 
     Raises ValueError, with a sentence, where there is none.
     """
-    from .tactile_addon.probe import probe
+    from .tactile_addon.probes import probe
 
     return probe.reconstruction_of(obj)

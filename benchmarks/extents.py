@@ -94,7 +94,7 @@ def _touched(extension, obj, depsgraph, place, extent):
     except ValueError:
         return None
     touched = add_on.touch.touch_object.verify(touched)
-    off = add_on.touch.mesh_error.height_error(touched.surface, touched.result)
+    off = extension.core.height_error(touched.result, touched.surface)
     return touched.report | {"fit": touched.result.status}, off
 
 

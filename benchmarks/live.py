@@ -97,8 +97,8 @@ def main():
     clock.wrap(addon.touch.touch_object, "reconstruction_report", "fit")
     clock.wrap(addon.scene.patch_object, "rewrite", "mesh write")
     # As in a window, where what is dear waits for the end of the gesture.
-    update = addon.probe.probe.update
-    addon.probe.change_handlers.update = lambda probe, depsgraph, complete: update(
+    update = addon.probes.probe.update
+    addon.probes.change_handlers.update = lambda probe, depsgraph, complete: update(
         probe, depsgraph, complete=False
     )
     columns = ("faces", "patch vertices", *STAGES, "first touch", "end of a gesture")

@@ -56,7 +56,7 @@ def main():
     for name, stage in (("track", "tracking"), ("reconstruct_many", "fit"), ("with_height_stds", "fit")):
         clock.wrap(addon.stability_map.stability.core, name, stage)
     clock.wrap(addon.stability_map.stability.StabilityMap, "_note", "noting")
-    clock.wrap(addon.stability_map.stability, "height_error", "error")
+    clock.wrap(addon.stability_map.stability.core, "height_error", "error")
     columns = ("faces", "points", "points/s", "tracking", "fit", "error", "thinning, paint", "once, s")
     with blender.quiet():
         rows = [measure(bpy, clock, *case) for case in CASES]

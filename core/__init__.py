@@ -28,6 +28,7 @@ from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
+from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
 from .scan.sampling import spaced
 from .scan.verification import reachable, verify
@@ -57,7 +58,9 @@ __all__ = [
     "explore",
     "fit_error",
     "from_dict",
+    "height_error",
     "in_running_order",
+    "judged_by_mesh",
     "mean_height_stds",
     "overlapped",
     "reachable",

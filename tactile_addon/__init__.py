@@ -7,7 +7,7 @@ import bpy
 from . import command_line, panel
 from .comparison import register_operator, verify_operator
 from .files import contact_operators
-from .probe import change_handlers, operators, probe, probe_operators
+from .probes import change_handlers, operators, probe, probe_operators
 from .stability_map import map_object, map_operator
 from .viewport import gizmos, overlay, pick
 

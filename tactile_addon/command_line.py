@@ -16,7 +16,6 @@ from .comparison.register_operator import register_patch
 from .comparison.verify_operator import verify_patch
 from .files import contact_file, measured, mesh_file, whole_file
 from .scene import patch_object
-from .stability_map import map_object
 from .stability_map.map_report import map_readable
 from .touch.settings import METHODS, SOLVERS
 from .touch.units import ADAPTIVE, METERS
@@ -92,7 +91,7 @@ def _add_map(command):
     add("--spacing", type=float, help=help)
     _add_inputs(add)
     command.set_defaults(operator=bpy.ops.tactile.stability_map, more={"progress": True})
-    command.set_defaults(record=map_object.RECORD, words=map_readable)
+    command.set_defaults(record=patch_object.MAP_RECORD, words=map_readable)
 
 
 def _add_verify(add):

@@ -10,9 +10,9 @@ from bpy.props import StringProperty
 
 from .comparison.register_operator import TACTILE_OT_register
 from .comparison.verify_operator import TACTILE_OT_verify
-from .probe import probe
-from .probe.operators import TACTILE_OT_reconstruct
-from .probe.probe_operators import (
+from .probes import probe
+from .probes.operators import TACTILE_OT_reconstruct
+from .probes.probe_operators import (
     TACTILE_OT_add_plane,
     TACTILE_OT_add_planes,
     TACTILE_OT_delete,
@@ -21,7 +21,7 @@ from .probe.probe_operators import (
     TACTILE_OT_update,
     shows_colors,
 )
-from .stability_map import map_object
+from .scene import patch_object
 from .stability_map.map_operator import TACTILE_OT_stability_map
 from .stability_map.map_report import map_rows, median_rows
 from .touch import units
@@ -125,10 +125,10 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
 
     def draw_active(self, context, layout, obj):
         layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
-        if obj is None or map_object.RECORD not in obj:
+        if obj is None or patch_object.MAP_RECORD not in obj:
             return
         _draw_colors(context, layout, obj, "tactile_map_colors")
-        record = obj[map_object.RECORD]
+        record = obj[patch_object.MAP_RECORD]
         box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
         _draw_rows(box, map_rows(record, unit))
         medians = median_rows(record, unit)

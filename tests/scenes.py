@@ -5,6 +5,9 @@
 import bpy
 import numpy as np
 
+# Words of a command that touches the ball of the fixture `files`.
+PLACE = ["--location", "0.3", "-2e-1", "1.9", "--extent", "0.6"]
+
 
 def made(operator, record="tactile", **arguments):
     """The object with such a record that an operator makes, and the record."""

@@ -44,7 +44,7 @@ def sentences(node):
 
 def messages():
     for folder in ("core", "tactile_addon"):
-        for path in sorted((ROOT / folder).glob("*.py")):
+        for path in sorted((ROOT / folder).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text())):
                 for found in sentences(node):
                     for part in (found.body, found.orelse) if isinstance(found, ast.IfExp) else (found,):

@@ -13,7 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 BUILD = Path(__file__).resolve().parents[1] / "build"
-RESOURCES = BUILD / "blender-{}.{}".format(*sys.version_info)
+# Tests that run beside each other each have a Blender of their own.
+RESOURCES = BUILD / ("blender-{}.{}".format(*sys.version_info) + os.environ.get("PYTEST_XDIST_WORKER", ""))
 os.environ["BLENDER_USER_RESOURCES"] = str(RESOURCES)
 
 

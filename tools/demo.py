@@ -142,10 +142,10 @@ def _color_bar(extension, put, limit, unit):
     points = np.array([(x, BAR_REACH * y, 0.0) for y in at for x in (0.0, 0.2)])
     corners = 2 * np.arange(BAR_STEPS)[:, None]
     triangles = np.vstack([corners + corner for corner in ((0, 1, 3), (0, 3, 2))])
-    colors = module.colors.diverging(np.repeat(at, 2), 1.0)
-    attributes = [(module.patch_object.COLOR, "FLOAT_COLOR", colors)]
+    colors = module.scene.colors.diverging(np.repeat(at, 2), 1.0)
+    attributes = [(module.scene.patch_object.COLOR, "FLOAT_COLOR", colors)]
     strip = bpy.data.meshes.new("Color Bar")
-    module.mesh_data.fill(strip, points, triangles, attributes)
+    module.scene.mesh_data.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])
     put.add("Color Bar", strip, 2.35, 0.0)
     put.text("Gaussian curvature", 1.6, BAR_REACH + 0.45, 0.18)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from .posterior import FREE, ORDERS, TERMS
+from ..patch.monge import TERMS
+from .posterior import FREE, ORDERS
 
 POWERS = ORDERS[FREE:] - 1.0  # Powers of the waviness, one for each term.
 # Chosen with benchmarks.accuracy.

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..patch.monge import monomials
+from ..patch.monge import TERMS, monomials
 from .evidence import (
     FREE_PRECISION,
     SCALE,
@@ -20,7 +20,7 @@ from .evidence import (
     prior_variances,
 )
 from .measured_slopes import slope_equations
-from .posterior import FREE, TERMS, Posterior
+from .posterior import FREE, Posterior
 
 
 class System(NamedTuple):

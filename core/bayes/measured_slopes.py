@@ -10,8 +10,7 @@ m, and so is b . (-z_x, -z_y, 1). Both are linear in the coefficients.
 import numpy as np
 
 from ..arguments import Array
-from ..patch.monge import derived_monomials
-from .posterior import TERMS
+from ..patch.monge import TERMS, derived_monomials
 
 SLOPE_MISFIT = 1e-2  # radians: no surface is a polynomial, so no slope is better known
 

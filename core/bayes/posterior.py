@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
-from ..patch.monge import MongePatch, exponents, monomials
+from ..patch.monge import DEGREE, TERMS, MongePatch, monomials
 
-DEGREE = 6
-TERMS = exponents(1, DEGREE)
 ORDERS = TERMS.sum(axis=1).astype(float)
 FREE = 5  # x, y, x^2, xy, y^2 have no prior
 DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L

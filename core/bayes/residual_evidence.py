@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..patch.monge import monomials
+from ..patch.monge import TERMS, monomials
 from ..patch.residual import Residual, kernels, places_factor, solved
 from .evidence import FREE_PRECISION, USUAL_WAVINESS, prior_variances
 from .measured_slopes import slope_equations
-from .posterior import FREE, TERMS, Posterior
+from .posterior import FREE, Posterior
 
 # Chosen with benchmarks.real.
 MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.

@@ -15,11 +15,11 @@ import numpy as np
 
 from ..arguments import Array
 from ..patch import residual as beside
-from ..patch.monge import exponents, monomials
+from ..patch.monge import TERMS, exponents, monomials
 from ..patch.residual import Residual, kernel, kernels, weighted_kernel, whitened
 from .joint_fit import turned
 from .linear_system import prior_mean
-from .posterior import DISK, FREE, TERMS, Posterior, nodes
+from .posterior import DISK, FREE, Posterior, nodes
 from .residual_evidence import MISFIT, Touch, asking, fitted, sizes, system_of
 
 SCALE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.

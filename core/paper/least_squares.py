@@ -12,10 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arguments import Array
-from ..patch.domain import Domain
+from ..patch.domain import GRID, Domain
 from ..patch.monge import MongePatch, derived_monomials, exponents, monomials
-
-GRID = 600  # points of (8) over the domain
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
 
+GRID = 600  # Points of the grid (8) over a domain.
 SAMPLES = 1024  # Samples of the boundary, whose radius is then good to 1e-5.
 ALONG, ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
 

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, finite_array
 from ..contours.local_geometry import Frame
-from ..paper.least_squares import GRID
-from .domain import Domain
+from .domain import GRID, Domain
 from .monge import Derivatives, HeightField, MongePatch
 from .residual import Residual
 from .triangulation import patch_mesh

@@ -21,6 +21,10 @@ def exponents(lowest: int, highest: int) -> NDArray[np.intp]:
     return array
 
 
+DEGREE = 6  # The default fit sees all terms up to this degree at once.
+TERMS = exponents(1, DEGREE)
+
+
 def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:
     """The terms (m, 2) at n points, (n, m)."""
     return derived_monomials(x, y, terms, [(0, 0)])[0].T

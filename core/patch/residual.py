@@ -21,8 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arguments import Array
-from ..bayes.posterior import TERMS
-from .monge import Derivatives, derived_monomials, monomials
+from .monge import TERMS, Derivatives, derived_monomials, monomials
 
 LENGTHS = np.array([0.4, 0.8])  # of the radius; with benchmarks.real
 BLOCK = 6000  # distances at once: they fit into a processor's cache

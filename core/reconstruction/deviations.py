@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arguments import Array
-from ..bayes.posterior import TERMS, coefficients_of
-from ..patch.monge import monomials
+from ..bayes.posterior import coefficients_of
+from ..patch.monge import TERMS, monomials
 from .result import Reconstruction
 
 

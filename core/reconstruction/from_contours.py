@@ -19,7 +19,7 @@ from ..arguments import (
     unit_vector,
 )
 from ..bayes.joint_fit import joint_fit
-from ..bayes.posterior import DEGREE, Posterior
+from ..bayes.posterior import Posterior
 from ..bayes.rough_fit import rough_fit
 from ..contours.contour import Contour
 from ..contours.curves import (
@@ -40,7 +40,7 @@ from ..contours.thinning import thinned
 from ..paper.by_method import PAPER_METHODS, SOLVERS, coefficients
 from ..patch.domain import Domain, closed_spline_domain
 from ..patch.geometry import Geometry
-from ..patch.monge import MongePatch
+from ..patch.monge import DEGREE, MongePatch
 from ..patch.residual import Residual
 from .result import Reconstruction
 

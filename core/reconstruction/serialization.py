@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..arguments import LARGEST, SMALLEST, Array, finite_array, number, shown
-from ..bayes.posterior import FREE, TERMS, Posterior, terms_to
+from ..bayes.posterior import FREE, Posterior, terms_to
 from ..contours.contour import Contour
 from ..contours.local_geometry import Frame
 from ..patch.domain import closed_spline_domain
 from ..patch.geometry import Geometry
-from ..patch.monge import MongePatch
+from ..patch.monge import TERMS, MongePatch
 from ..patch.residual import LENGTHS, Residual
 from .from_contours import METHODS
 from .result import Reconstruction

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arguments import Array, finite_array
 from ..contours.contour import SamplingPlane, Vector
 from ..contours.tracking import Surface, track
-from ..paper.least_squares import GRID
-from ..patch.domain import Domain
+from ..patch.domain import GRID, Domain
 from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 

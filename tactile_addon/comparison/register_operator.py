@@ -8,8 +8,8 @@ from bpy.props import IntProperty, StringProperty
 from mathutils import Matrix
 
 from ... import core
-from ..probe import probe
-from ..probe.operators import is_unlocked, report_error, target_object
+from ..probes import probe
+from ..probes.operators import is_unlocked, report_error, target_object
 from ..scene import patch_object
 from ..touch.surface import MeshSurface
 from ..touch.wording import registration_summary

@@ -7,9 +7,9 @@ import numpy as np
 from bpy.props import BoolProperty, StringProperty
 
 from ... import core
-from ..probe import probe
-from ..probe.change_handlers import is_pending
-from ..probe.operators import is_unlocked, report_error, target_object
+from ..probes import probe
+from ..probes.change_handlers import is_pending
+from ..probes.operators import is_unlocked, report_error, target_object
 from ..scene import mesh_data, patch_object
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import reachable

@@ -15,8 +15,8 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..probe import probe
-from ..probe.operators import make_active, report_error
+from ..probes import probe
+from ..probes.operators import make_active, report_error
 from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_solver
 from . import contact_file, measured

@@ -18,6 +18,7 @@ COLLECTION = "Tactile Patches"
 RECORD = "tactile"  # the patch object's custom property that holds the report,
 RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
 COLOR = "curvature_color"
+MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 # What the colors can show: attribute, name, description, and the power of length it is measured in.

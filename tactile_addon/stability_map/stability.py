@@ -10,7 +10,6 @@ import numpy as np
 
 from ... import core
 from ..touch.detached_mesh import MeshSnapshot
-from ..touch.mesh_error import height_error
 from ..touch.surface import coordinates, evaluated_object
 from ..touch.touch_object import STEPS, require_fine, require_lengths
 
@@ -139,7 +138,7 @@ class StabilityMap:
 
     def _note(self, number, result):
         self.reason[number] = KEYS.index("patch" if result.status == "ok" else "doubt")
-        off = height_error(self.surface, result)
+        off = core.height_error(result, self.surface)
         self.error[number] = NOTHING if off is None else off
         self.height_std[number] = result.mean_height_std
         self.condition_number[number] = result.condition_number

@@ -10,7 +10,6 @@ import numpy as np
 
 from ... import core
 from ...core.arguments import unit_vector
-from .mesh_error import height_error
 from .settings import MOST_PLANES, STEEPEST
 from .single_precision import require_single
 from .surface import MeshSurface
@@ -139,7 +138,7 @@ def verify(touched, most=None):
     clock, result, report = [perf_counter()], touched.result, touched.report
     found = _verification_report(touched.surface, result, most)
     # Where faces are large a pocket between the curves may have no vertex that lies over the patch.
-    offs = found.get("vertex_distance_mean"), height_error(touched.surface, result)
+    offs = found.get("vertex_distance_mean"), core.height_error(result, touched.surface)
     found |= judgment(result, max(off or 0.0 for off in offs), report["ended"])
     clock.append(perf_counter())
     plane = suggestion_report(result, np.array(report["axes"]))

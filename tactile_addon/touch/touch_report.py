@@ -7,7 +7,6 @@ from collections import Counter
 
 from ... import core
 
-BEYOND = 3.0  # times its own deviation, that a patch may be off the mesh in the mean
 CURVATURES = ("k1", "k2", "gaussian_curvature", "mean_curvature")
 ENDS = {
     core.UNEXPLAINED: "where the patch could not be trusted any more",
@@ -29,19 +28,9 @@ def ends(contours):
 
 
 def judgment(result, mean, ended):
-    """Status and message: the fit's own, unless it has no doubt and the mesh contradicts it.
-
-    mean : distance of the mesh; ended : what is added to the fit's own message
-    """
-    std, percent = result.mean_height_std, 100.0 / result.radius
-    if result.status != "ok" or mean <= BEYOND * std:
-        return {"status": result.status, "message": result.message + ended}
-    return {
-        "status": "uncertain",
-        "message": f"The mesh is {percent * mean:.3g} % of the radius off the patch in the mean, which "
-        f"expects {percent * std:.3g} %, for between the curves there is what they do not show: take a "
-        "shorter extent, or add sampling planes.",
-    }
+    """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message."""
+    status, message = core.judged_by_mesh(result, mean)
+    return {"status": status, "message": message + (ended if message == result.message else "")}
 
 
 def suggestion_report(result, reference):

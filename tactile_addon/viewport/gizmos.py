@@ -10,7 +10,7 @@ from bpy.props import EnumProperty, IntProperty
 from mathutils import Matrix, Vector
 from mathutils.geometry import intersect_line_plane
 
-from ..probe import probe
+from ..probes import probe
 from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.touch_object import plane_axes
 from .mouse import draw_hints, mouse_ray

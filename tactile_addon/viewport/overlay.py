@@ -8,7 +8,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ..probe import probe
+from ..probes import probe
 from ..scene import colors, patch_object
 from ..stability_map import map_object
 from ..touch import units
@@ -93,8 +93,8 @@ def draw_legend():
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["radius"], patch_object.POWERS[shown], low)
         _draw_box(context, *bar)
-    elif obj is not None and map_object.RECORD in obj and obj.visible_get():
-        record, shown = obj[map_object.RECORD], obj.tactile_map_colors
+    elif obj is not None and patch_object.MAP_RECORD in obj and obj.visible_get():
+        record, shown = obj[patch_object.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["spacing"], map_object.POWERS[shown], 0.0)
         if shown == "reason":

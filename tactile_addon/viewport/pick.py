@@ -5,8 +5,8 @@
 import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
 
-from ..probe import probe
-from ..probe.operators import make_active, report_error, target_object
+from ..probes import probe
+from ..probes.operators import make_active, report_error, target_object
 from ..touch import units
 from ..touch.settings import NAMES, TouchSettings, draw_all, touch_arguments
 from ..touch.surface import MeshSurface

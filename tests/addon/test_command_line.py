@@ -5,8 +5,7 @@
 import json
 
 import pytest
-
-PLACE = ["--location", "0.3", "-2e-1", "1.9", "--extent", "0.6"]
+from scenes import PLACE
 
 
 def test_a_patch_from_every_kind_of_file(command, files):

@@ -110,7 +110,7 @@ def registered():
 
 def own():
     """What only the extension can tell of: how often it draws, its commands, whether its timer runs."""
-    addon, live = (sys.modules[f"{MODULE}.tactile_addon{name}"] for name in ("", ".live"))
+    addon, live = (sys.modules[f"{MODULE}.tactile_addon{name}"] for name in ("", ".probes.change_handlers"))
     return len(addon._drawings), len(addon._commands), bpy.app.timers.is_registered(live._settle)
 
 

@@ -10,8 +10,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 import surfaces
-from scenes import datablocks, made, positions, values
-from test_command_line import PLACE
+from scenes import PLACE, datablocks, made, positions, values
 
 from core import from_dict
 

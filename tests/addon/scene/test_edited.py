@@ -113,7 +113,7 @@ def test_a_patch_that_is_being_edited_is_not_touched_again(empty, extension, pro
     count = len(patch.data.polygons)
     assert not empty.ops.tactile.update.poll()
     with pytest.raises(ValueError, match="is being edited: leave its Edit Mode first"):
-        extension.tactile_addon.probe.probe.require_unlocked(probe)
+        extension.tactile_addon.probes.probe.require_unlocked(probe)
     empty.ops.object.mode_set(mode="OBJECT")
     assert len(patch.data.polygons) == count
     assert empty.ops.tactile.update() == {"FINISHED"}

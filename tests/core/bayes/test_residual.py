@@ -20,10 +20,10 @@ from core import (
 from core.bayes import residual_evidence
 from core.bayes.evidence import FREE_PRECISION, USUAL_WAVINESS, prior_variances
 from core.bayes.linear_system import prior_mean
-from core.bayes.posterior import DISK, FREE, TERMS, nodes
+from core.bayes.posterior import DISK, FREE, nodes
 from core.bayes.residual_evidence import Touch, fitted, system_of
 from core.bayes.rough_fit import SCALE
-from core.patch.monge import exponents, monomials
+from core.patch.monge import TERMS, exponents, monomials
 from core.patch.residual import kernel, weighted_kernel
 from core.reconstruction.deviations import mean_height_stds
 from core.reconstruction.next_plane import AZIMUTHS, _lost

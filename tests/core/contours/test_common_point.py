@@ -138,7 +138,7 @@ def bent(angle, count):
 
 
 def test_of_many_contacts_as_many_are_looked_at_as_tell_something(monkeypatch):
-    module = importlib.import_module("core.common_point")
+    module = importlib.import_module("core.contours.common_point")
     seen = []
     stacked = module.stacked
     monkeypatch.setattr(module, "stacked", lambda *given: seen.append(stacked(*given)) or seen[-1])

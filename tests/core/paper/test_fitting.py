@@ -9,7 +9,7 @@ from scipy.optimize import approx_fprime, minimize
 
 from core import METHODS, MongePatch, fit_error
 from core.paper import least_squares, tagc
-from core.patch.domain import Domain, closed_spline_domain
+from core.patch.domain import GRID, Domain, closed_spline_domain
 from core.patch.triangulation import triangulate
 
 PAPER_SIZE = {
@@ -85,7 +85,7 @@ def test_total_curvature_of_a_cap_is_the_area_of_its_normals():
 
 def test_quadratic_variation_is_a_minimum(data_and_domain):
     data, domain = data_and_domain
-    points, h = domain.grid(least_squares.GRID)
+    points, h = domain.grid(GRID)
 
     def objective(a):
         d = MongePatch(-0.5, 0.3, a).derivatives(*points.T)

@@ -6,7 +6,6 @@ import bpy
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 
 from ..scene import patch_object
-from ..stability_map import map_object
 from ..touch.settings import TouchSettings, draw_all, touch_arguments
 from ..touch.touch_object import touch, verify
 from ..touch.wording import sentence
@@ -96,7 +95,7 @@ def report_error(operator, error):
 def target_object(context, name):
     """The object to touch: by name, or the active one, or what the active patch or map was touched on."""
     obj = context.view_layer.objects.active
-    record = record_of(obj) or (obj and obj.get(map_object.RECORD))
+    record = record_of(obj) or (obj and obj.get(patch_object.MAP_RECORD))
     if not name and record is not None:
         name = record["source"]
     if name:

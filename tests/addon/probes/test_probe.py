@@ -6,6 +6,7 @@ Here every update is complete at once; gestures, which are completed when they e
 """
 
 import math
+import operator
 
 import numpy as np
 import pytest
@@ -467,7 +468,7 @@ NO_TARGET = "The probe has no target: choose the mesh to touch"
 def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
     empty, extension, ball, capfd, spoil, sentence, left
 ):
-    live = extension.tactile_addon.probe.change_handlers
+    live = extension.tactile_addon.probes.change_handlers
     probe, patch = pick(empty)
     before, there = state_but_status(patch), in_world(patch)
     spoil(empty, ball)
@@ -839,14 +840,15 @@ def counted(extension, monkeypatch):
     calls = {}
 
     def count(module, name):
-        function = getattr(getattr(extension.tactile_addon, module), name)
+        found = operator.attrgetter(module)(extension.tactile_addon)
+        function = getattr(found, name)
 
         def counting(*given, **named):
             calls[name] += 1
             return function(*given, **named)
 
         calls[name] = 0
-        monkeypatch.setattr(getattr(extension.tactile_addon, module), name, counting)
+        monkeypatch.setattr(found, name, counting)
         return calls
 
     return count
@@ -856,7 +858,7 @@ def test_where_there_is_no_probe_nothing_is_looked_at(empty, ball, counted):
     pick(empty)
     empty.ops.tactile.delete()
     update(empty)
-    calls = counted("live", "_concerned")
+    calls = counted("probes.change_handlers", "_concerned")
     for x in range(3):
         empty.ops.object.empty_add()
         empty.context.object.location.x = x
@@ -871,8 +873,8 @@ def test_what_no_probe_depends_on_costs_none_of_them_anything(empty, ball, count
     for turn in range(4):
         pick(empty, target="Sphere", location=Matrix.Rotation(turn, 3, "X") @ TOP)
     update(empty)
-    counted("live", "is_outdated"), counted("live", "update")
-    looked, calls = counted("probe", "_made"), counted("live", "may_be_outdated")
+    counted("probes.change_handlers", "is_outdated"), counted("probes.change_handlers", "update")
+    looked, calls = counted("probes.probe", "_made"), counted("probes.change_handlers", "may_be_outdated")
     empty.ops.object.empty_add()  # who is there has changed: whether their targets are is looked at
     assert (calls["is_outdated"], calls["update"]) == (0, 0)
     calls["may_be_outdated"] = looked["_made"] = 0
@@ -890,7 +892,7 @@ def test_a_change_touches_once_what_depends_on_it_and_nothing_else(empty, ball, 
     empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=RADIUS, location=(9, 0, 0))
     pick(empty, location=TOP + Vector((9, 0, 0)))
     update(empty)
-    calls, surfaces = counted("probe", "touch_at"), counted("surface", "size_of")
+    calls, surfaces = counted("probes.probe", "touch_at"), counted("touch.surface", "size_of")
     ball.scale = (1.1, 1.1, 1.1)
     update(empty)
     assert calls["touch_at"] == 3

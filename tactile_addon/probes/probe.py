@@ -18,7 +18,6 @@ from mathutils import Matrix, Vector
 
 from ..scene import patch_object
 from ..scene.family import children_of
-from ..stability_map import map_object
 from ..touch.settings import OVERRIDABLE, TouchSettings, changed, touch_arguments
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import touch, verify
@@ -95,7 +94,7 @@ def is_probe(obj):
 
 def is_result(obj):
     """Whether it is a patch, the contours of one, or a map."""
-    return any(key in obj for key in (patch_object.RECORD, patch_object.CONTOURS, map_object.RECORD))
+    return any(key in obj for key in (patch_object.RECORD, patch_object.CONTOURS, patch_object.MAP_RECORD))
 
 
 def patch_of(probe):

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a surface is from a patch all over it, vertices or none, and what that says of the patch."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..contours.tracking import Surface
+from ..reconstruction.result import Reconstruction
+
+SAMPLES = 15  # So many samples of a patch are compared with the mesh.
+LAYERS = 4  # A sample is compared with no more layers of the mesh.
+BEYOND = 3.0  # A mesh that is off by more than so many deviations contradicts the patch.
+
+
+def height_error(r: Reconstruction, surface: Surface) -> float | None:
+    """The mean distance in height of patch and surface over the domain; None where there is no surface."""
+    points, weights = r.domain.nodes
+    some = slice(None, None, len(points) // SAMPLES | 1)
+    points, weights = points[some], weights[some]
+    heights = r.height(points[:, 0], points[:, 1])
+    up = r.frame.axes[:, 2].tolist()
+    starts = r.frame.to_world(np.column_stack([points, heights])).tolist()
+    offs = [_height_off(surface, start, up, r.radius) for start in starts]
+    met = [i for i, off in enumerate(offs) if off is not None]
+    return float(np.average([offs[i] or 0.0 for i in met], weights=weights[met])) if met else None
+
+
+def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
+    """Status and message: the fit's own, unless it has no doubt and the mesh contradicts it.
+
+    mean : distance of the mesh from the patch, in the mean
+    """
+    std, percent = r.mean_height_std, 100.0 / r.radius
+    if r.status != "ok" or mean <= BEYOND * std:
+        return r.status, r.message
+    return "uncertain", (
+        f"The mesh is {percent * mean:.3g} % of the radius off the patch in the mean, which "
+        f"expects {percent * std:.3g} %, for between the curves there is what they do not show: take a "
+        "shorter extent, or add sampling planes."
+    )
+
+
+def _height_off(surface: Surface, start: list[float], up: list[float], reach: float) -> float | None:
+    """How far along `up`, either way, the nearest layer is whose outside is up; None beyond `reach`.
+
+    Layers that are seen from within are another wall of the object, or its other side.
+    """
+    nearest = None
+    for sign in (1.0, -1.0):
+        gone = 0.0
+        for _ in range(LAYERS):
+            at = _along(start, up, sign * gone)
+            hit = surface.ray_cast(at, _along([0.0, 0.0, 0.0], up, sign), reach - gone)
+            if hit is None:
+                break
+            gone = abs(_dot([a - b for a, b in zip(hit[0], start, strict=True)], up))
+            if _dot(hit[1], up) > 0.0:
+                nearest = reach = gone
+                break
+            gone += 1e-4 * reach
+            if gone >= reach:
+                break
+    return nearest
+
+
+def _along(start: list[float], up: list[float], distance: float) -> tuple[float, float, float]:
+    x, y, z = (a + distance * v for a, v in zip(start, up, strict=True))
+    return x, y, z
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return sum(v * w for v, w in zip(a, b, strict=True))

@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The house: each room imports from itself and from the rooms before it, and nothing in a circle."""
+
+import ast
+import re
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+# Ground floor first. What is in no room is below all rooms where it is listed, and above them where not.
+ROOMS = {
+    "core": ("arguments", "contours", "patch", "paper", "bayes", "reconstruction", "scan"),
+    "tactile_addon": ("touch", "scene", "probes", "stability_map", "files", "comparison", "viewport"),
+}
+MOST_FILES, MOST_LINES = 9, 250
+
+
+def modules(package):
+    """Dotted names from the package on, and paths."""
+    for path in sorted((ROOT / package).rglob("*.py")):
+        yield ".".join(path.relative_to(ROOT).with_suffix("").parts), path
+
+
+def imports(name, path):
+    """Dotted names of all that a module imports relatively, wherever in it."""
+    inside = name.split(".")
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = inside[: len(inside) - node.level] + (node.module.split(".") if node.module else [])
+            for alias in node.names:
+                full = [*base, alias.name]
+                is_module = (ROOT.joinpath(*full).with_suffix(".py")).exists()
+                yield ".".join(full if is_module else base)
+
+
+def floor(name):
+    package, *rest = name.split(".")
+    rooms = ROOMS[package]
+    return rooms.index(rest[0]) if rest and rest[0] in rooms else len(rooms)
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_no_import_goes_upward(package):
+    upward = [
+        (name, imported)
+        for name, path in modules(package)
+        for imported in imports(name, path)
+        if imported.startswith(f"{package}.") and floor(imported) > floor(name)
+    ]
+    assert not upward
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_no_import_goes_in_a_circle(package):
+    graph = {name: set(imports(name, path)) for name, path in modules(package)}
+    TopologicalSorter(graph).prepare()  # raises CycleError, with the circle
+
+
+def test_core_knows_no_blender_and_the_add_on_imports_it_only_as_a_whole():
+    for name, path in modules("core"):
+        assert all(imported.startswith("core") for imported in imports(name, path)), name
+        assert "bpy" not in path.read_text().replace("without bpy", ""), name
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_rooms_and_modules_are_small(package):
+    for folder in [ROOT / package, *(p for p in (ROOT / package).iterdir() if p.is_dir())]:
+        files = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
+        assert len(files) <= MOST_FILES, folder
+    long = {name: len(path.read_text().splitlines()) for name, path in modules(package)}
+    assert not {name: lines for name, lines in long.items() if lines > MOST_LINES}
+
+
+def test_the_tree_for_contributors_is_that_of_the_files():
+    tree = (ROOT / "CONTRIBUTING.md").read_text().split("```")[3]
+    named = re.findall(r"^ +(\w+)/? ", tree, re.MULTILINE)
+    there = [p.stem for package in ROOMS for _, p in modules(package) if p.name != "__init__.py"]
+    assert sorted(named) == sorted(
+        [*there, *(r for rooms in ROOMS.values() for r in rooms if r != "arguments")]
+    )
