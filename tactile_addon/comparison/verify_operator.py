@@ -4,7 +4,7 @@
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import StringProperty
 
 from ... import core
 from ..probes import probe
@@ -16,23 +16,16 @@ from ..touch.touch_object import reachable
 from ..touch.touch_report import judgment
 from ..touch.wording import verification_summary
 
-DISTANCE, OVERLAP = "patch_distance", "patch_overlap"  # attributes of the mesh
-NOTHING = -1.0  # the distance of a vertex that does not count
 
-
-def verify_patch(patch, target, depsgraph, write=False):
+def verify_patch(patch, target, depsgraph):
     """Compares the patch object with the mesh object `target`; its record has the result as `verification`.
-
-    write : distance and overlap as attributes on the target, too
 
     Raises ValueError, with a sentence and nothing changed, where that cannot be done.
     """
     probe.require_unlocked(patch)
     patch_object.require_whole(patch)
     r, surface = patch_object.reconstruction_of(patch), MeshSurface(target, depsgraph)
-    if write:
-        _require_writable(target, depsgraph)
-    indices, vertices = reachable(surface, r)
+    _, vertices = reachable(surface, r)
     found = core.verify(r, surface, vertices)
     record = patch[patch_object.RECORD]
     points, normals = _vertices(patch.data, r, r.radius / record["radius"])
@@ -43,12 +36,6 @@ def verify_patch(patch, target, depsgraph, write=False):
     record["verification"] = {"target": target.name, **found}
     if record["status"] != "outdated":
         record.update(judgment(r, found.get("vertex_distance_mean", 0.0), record["ended"]))
-    if write:
-        distances = np.full(len(target.data.vertices), NOTHING)
-        distances[indices] = core.distances(r.geometry, r.frame.to_local(vertices))
-        mesh_data.write(target.data, DISTANCE, "FLOAT", distances)
-        mesh_data.write(target.data, OVERLAP, "BOOLEAN", distances != NOTHING)
-        target.data.update()
 
 
 def _vertices(mesh, r, scale):
@@ -57,18 +44,6 @@ def _vertices(mesh, r, scale):
     mesh.attributes["position"].data.foreach_get("vector", points.ravel())
     points = scale * points.astype(float)
     return points, r.geometry.normal(points[:, 0], points[:, 1])
-
-
-def _require_writable(target, depsgraph):
-    """Raises ValueError where the vertices that are felt have no attributes to write to."""
-    if not target.data.is_editable or target.data.is_editmode:
-        raise ValueError(
-            f'"{target.name}" cannot be changed: leave its Edit Mode, or make it local, to write on it'
-        )
-    if len(target.evaluated_get(depsgraph).data.vertices) != len(target.data.vertices):
-        raise ValueError(
-            f'The modifiers of "{target.name}" make or take away vertices: apply them to write on it'
-        )
 
 
 class TACTILE_OT_verify(bpy.types.Operator):
@@ -82,10 +57,6 @@ class TACTILE_OT_verify(bpy.types.Operator):
         name="Target",
         description="Name of the mesh object to compare with; empty for the other selected mesh, or for the "
         "one that was touched",
-    )
-    write: BoolProperty(
-        name="Write on the Mesh",
-        description="Keep the distance to the patch, and which vertices it overlaps, as attributes there",
     )
 
     @classmethod
@@ -105,7 +76,7 @@ class TACTILE_OT_verify(bpy.types.Operator):
             probe.refresh(found, context)
         try:
             target = target_object(context, self.target or selected_mesh(context))
-            verify_patch(patch, target, context.evaluated_depsgraph_get(), self.write)
+            verify_patch(patch, target, context.evaluated_depsgraph_get())
         except ValueError as error:
             return report_error(self, error)
         record = patch[patch_object.RECORD].to_dict()
@@ -117,7 +88,6 @@ class TACTILE_OT_verify(bpy.types.Operator):
         layout = self.layout
         layout.use_property_split = True
         layout.prop_search(self, "target", context.scene, "objects")
-        layout.prop(self, "write")
 
 
 def selected_mesh(context):

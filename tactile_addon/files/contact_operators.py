@@ -19,6 +19,7 @@ from ..probes import probe
 from ..probes.operators import make_active, report_error
 from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_solver
+from ..touch.wording import fit_summary
 from . import contact_file, measured
 
 UNITS = [
@@ -109,14 +110,11 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         except (OSError, ValueError) as error:
             return report_error(self, error)
         make_active(context, patch_object.insert(context.scene, touched))
-        result, report = touched.result, touched.report
-        summary = (
-            f"{report['message']} Curvatures {result.patch.k1:.4g} and {result.patch.k2:.4g}, "
-            f"{report['contacts']} contacts missed by {result.fit_error:.3g} in the mean"
-        )
+        report = touched.report
+        summary = fit_summary(report)
         if "misses" in report:
             summary += f", their common point by {max(report['misses']):.3g} at most"
-        self.report({"INFO"} if result.status == "ok" else {"WARNING"}, summary)
+        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
     def _given(self, name):

@@ -8,7 +8,7 @@ from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 from ..scene import patch_object
 from ..touch.settings import TouchSettings, draw_all, touch_arguments
 from ..touch.touch_object import touch, verify
-from ..touch.wording import sentence
+from ..touch.wording import fit_summary, sentence
 from .probe import lock_of, record_of
 
 
@@ -67,12 +67,8 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         touched = verify(touched)
         patch = patch_object.insert(context.scene, touched)
         make_active(context, patch)
-        result, report = touched.result, touched.report
-        summary = (
-            f"{report['message']} Curvatures {result.patch.k1:.4g} and {result.patch.k2:.4g}, "
-            f"{report['contacts']} contacts missed by {result.fit_error:.3g} in the mean"
-        )
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
+        report = touched.report
+        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, fit_summary(report))
         return {"FINISHED"}
 
     def draw(self, context):

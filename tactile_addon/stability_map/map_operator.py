@@ -39,11 +39,6 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         subtype="DISTANCE",
         soft_min=0.0,
     )
-    keep: BoolProperty(
-        name="Keep When Stopped",
-        description="Paint what has been touched so far when it is stopped by Esc",
-        default=True,
-    )
     progress: BoolProperty(
         name="Progress",
         description="Say on standard error how far it is, where there is no window to show it",
@@ -78,7 +73,7 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
             self._run()
             return self._finish(context)
         self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
-        context.workspace.status_text_set(_progress(self._map, self.keep))
+        context.workspace.status_text_set(_progress(self._map))
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -108,7 +103,7 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
             end = perf_counter() + SLICE
             for _ in self._steps:
                 if perf_counter() > end:
-                    context.workspace.status_text_set(_progress(self._map, self.keep))
+                    context.workspace.status_text_set(_progress(self._map))
                     return {"PASS_THROUGH"}
         except ValueError as error:
             self._leave(context)
@@ -117,8 +112,8 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         return self._finish(context)
 
     def _stopped(self, context):
-        """By Esc: with what there is so far, where that is wanted."""
-        if not self.keep or not self._map.done:
+        """Esc ends it with what there is so far."""
+        if not self._map.done:
             self._leave(context)
             self.report({"INFO"}, "Stopped: nothing was kept")
             return {"CANCELLED"}
@@ -164,18 +159,17 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(self, "target")
         draw_chosen(layout, self, "spacing")
-        layout.prop(self, "keep")
         layout.separator()
         draw_all(layout, self)
 
 
-def _progress(touched, keep):
+def _progress(touched):
     """What draws the status bar meanwhile; it may outlive the operator by a redraw."""
 
     def draw(header, context):
         layout, count = header.layout, len(touched.chosen)
         layout.label(text="", icon="EVENT_ESC")
-        layout.label(text=" Stop and Keep" if keep else " Stop")
+        layout.label(text=" Stop and Keep")
         row = layout.row()
         row.ui_units_x = 16
         row.progress(

@@ -32,7 +32,7 @@ METHODS = [
     ),
 ]
 SOLVERS = [
-    ("fast", "Fast", "Quasi-Newton minimization"),
+    ("fast", "Fast", "Newton's method"),
     ("descent", "Steepest Descent", "The paper's minimization, slower, to compare with"),
 ]
 AUTO = {  # literals, to be translated
@@ -182,8 +182,9 @@ def draw_chosen(layout, settings, name):
 
 def draw_sensor(layout, settings):
     draw_chosen(layout, settings, "step")
-    for name in ("noise", "seed"):
-        layout.prop(settings, name)
+    layout.prop(settings, "noise")
+    if settings.noise:
+        layout.prop(settings, "seed")
 
 
 def draw_solver(layout, settings):
@@ -191,8 +192,6 @@ def draw_solver(layout, settings):
     draw_chosen(layout, settings, "degree")
     if settings.method in ("tagc", "quadratic-variation"):
         layout.prop(settings, "weight")
-    if settings.method == "tagc":
-        layout.prop(settings, "solver")
 
 
 def draw_all(layout, settings):

@@ -87,6 +87,14 @@ def sentence(error):
     return words[:1].upper() + words[1:]
 
 
+def fit_summary(report):
+    """The fit in a sentence: its status, the curvatures, and how far its contacts are missed."""
+    return (
+        f"{report['message']} Curvatures {report['k1']:.4g} and {report['k2']:.4g}, "
+        f"{report['contacts']} contacts missed by {report['fit_error']:.3g} in the mean"
+    )
+
+
 def _verification(report):
     if "curves" in report:
         return "there is none"

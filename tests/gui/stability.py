@@ -133,25 +133,20 @@ def by_button():
 def by_escape():
     before = data_blocks()
     activate("Suzanne")
-    for keep in (False, True):
-        yield from start(target="Suzanne", spacing=0.02, keep=keep)
-        yield 1.5
-        check("it is under way", running())
-        gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "Escape")
-        yield from until(lambda: not running(), 10)
-        check(f"Esc ends it, keep {keep}", is_clean())
-        if not keep:
-            check("... and leaves nothing", data_blocks() == before, data_blocks())
-            check("... and says so", "Stopped: nothing was kept" in last_report(), last_report())
-            continue
-        (painted,) = maps() or [None]
-        if check("... and keeps what is done", painted is not None, data_blocks()):
-            record = painted["tactile_map"].to_dict()
-            check("... which is a part", 0 < record["touched"] < record["points"], record["touched"])
-            picture("map_part")
-            gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
-            yield 1
-            check("... in one step of undo", data_blocks() == before, data_blocks())
+    yield from start(target="Suzanne", spacing=0.02)
+    yield 1.5
+    check("it is under way", running())
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "Escape")
+    yield from until(lambda: not running(), 10)
+    check("Esc ends it", is_clean())
+    (painted,) = maps() or [None]
+    if check("... and keeps what is done", painted is not None, data_blocks()):
+        record = painted["tactile_map"].to_dict()
+        check("... which is a part", 0 < record["touched"] < record["points"], record["touched"])
+        picture("map_part")
+        gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+        yield 1
+        check("... in one step of undo", data_blocks() == before, data_blocks())
 
 
 def delete_target():

@@ -151,23 +151,6 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     assert dict(addon.touch.wording.verification_rows(found, unit))["Overlap"] == "100 %"
 
 
-def test_what_is_written_on_the_mesh_where_that_is_asked_for(empty, patch):
-    ball = empty.data.objects["Sphere"]
-    ball.data.attributes.new("patch_overlap", "FLOAT", "FACE")  # of another kind: makes room
-    before = state(ball)
-    found = verified(empty, patch, write=True)
-    after = state(ball)
-    assert set(after[3]) - set(before[3]) == {"patch_distance"}
-    assert after[:3] == before[:3]
-    distance, overlap = values(ball.data, "patch_distance"), values(ball.data, "patch_overlap") == 1
-    assert overlap.sum() == found["vertices"]
-    assert distance[overlap].mean() == pytest.approx(found["vertex_distance_mean"], rel=1e-5)
-    assert distance[overlap].max() == pytest.approx(found["vertex_distance_max"], rel=1e-5)
-    assert (distance[~overlap] == -1.0).all()
-    at = positions(ball.data)[overlap]
-    assert np.linalg.norm(at - patch["tactile"]["frame"]["origin"], axis=1).max() < 0.7
-
-
 def test_half_covered_and_nothing_below(empty, patch, capfd):
     cut = add_ball(empty, name="Half").data
     point = np.array(patch["tactile"]["frame"]["origin"])
@@ -179,10 +162,9 @@ def test_half_covered_and_nothing_below(empty, patch, capfd):
     empty.ops.object.mode_set(mode="OBJECT")
     assert len(cut.vertices) < 0.6 * len(at)
     activate(empty, patch)
-    found = verified(empty, patch, target="Half", write=True)
+    found = verified(empty, patch, target="Half")
     assert found["overlap"] == pytest.approx(0.5, abs=0.03)
-    overlap = values(empty.data.objects["Half"].data, "patch_overlap") == 1
-    assert found["vertices"] == overlap.sum() < patch["tactile"]["vertices"]
+    assert found["vertices"] < 0.7 * patch["tactile"]["vertices"]
     assert "it covers 5" in capfd.readouterr().out.replace("covers 4", "covers 5")
     add_ball(empty, 0.1, "Far")
     activate(empty, patch)
@@ -239,9 +221,6 @@ def test_a_probes_patch_by_the_probe_and_until_it_is_touched_again(empty):
     empty.context.view_layer.update()
     assert "verification" in patch["tactile"]
     assert probe.tactile_probe.digest == digest
-    verified(empty, patch, write=True)  # changes the target, but not its shape
-    empty.context.view_layer.update()
-    assert "verification" in patch["tactile"]
     probe.tactile_probe.extent = 0.5
     assert "verification" not in patch["tactile"]
 
@@ -263,11 +242,6 @@ def several(bpy, patch):
 
 def of_a_later_version(bpy, patch):
     patch["tactile_reconstruction"] = patch["tactile_reconstruction"].replace('"version": 2', '"version": 3')
-
-
-def with_modifier(bpy, patch):
-    bpy.data.objects["Sphere"].modifiers.new("Subdivision", "SUBSURF")
-    return {"write": True}
 
 
 def scaled(*scale):
@@ -301,7 +275,6 @@ def with_no_faces(bpy, patch):
         (with_no_faces, '"Bare" has no faces'),
         (several, "2 meshes are selected: select one besides the patch"),
         (of_a_later_version, "cannot be read any more: touch again .version: wanted 2, got 3"),
-        (with_modifier, 'The modifiers of "Sphere" make or take away vertices'),
         (scaled(1.0, 2.0, 1.0), "is stretched, mirrored or scaled to nothing"),
         (scaled(-1.0, 1.0, 1.0), "is stretched, mirrored or scaled to nothing"),
         (scaled(-1.0, -1.0, -1.0), "is stretched, mirrored or scaled to nothing"),
@@ -333,8 +306,6 @@ def test_linked_data_is_not_written(empty, patch, tmp_path):
     ball = empty.data.objects["Sphere"]
     empty.context.view_layer.objects.active = ball
     assert empty.ops.tactile.reconstruct(location=TOP, extent=0.6) == {"FINISHED"}
-    with pytest.raises(RuntimeError, match="cannot be changed: leave its Edit Mode, or make it local"):
-        empty.ops.tactile.verify(write=True)
     assert empty.ops.tactile.verify() == {"FINISHED"}
 
 
@@ -355,8 +326,7 @@ def test_one_undo_takes_all_of_it_back(empty, patch):
     activate(empty, patch)
     name, deviation, status = patch.name, values(patch.data, "deviation"), patch["tactile"]["status"]
     empty.ops.ed.undo_push(message="before")
-    empty.ops.tactile.verify("EXEC_DEFAULT", True, target="Larger", write=True)
-    assert "patch_distance" in empty.data.objects["Larger"].data.attributes
+    empty.ops.tactile.verify("EXEC_DEFAULT", True, target="Larger")
     empty.ops.ed.undo_push(message="after")
     empty.ops.ed.undo()
     if "verification" in empty.data.objects[name]["tactile"]:  # a script's own push was one more
@@ -365,7 +335,6 @@ def test_one_undo_takes_all_of_it_back(empty, patch):
     assert "verification" not in patch["tactile"]
     assert patch["tactile"]["status"] == status
     assert (values(patch.data, "deviation") == deviation).all()
-    assert "patch_distance" not in empty.data.objects["Larger"].data.attributes
     empty.ops.ed.redo()
     assert empty.data.objects[name]["tactile"]["verification"]["target"] == "Larger"
 
