@@ -97,6 +97,21 @@ class Derivatives:
         half = np.sqrt(np.maximum(mean**2 - self.gaussian_curvature, 0.0))
         return mean - half, mean + half
 
+    @property
+    def shape_index(self) -> Array:
+        """-2 / pi atan((kappa1 + kappa2) / (kappa2 - kappa1)): 1 on a convex cap, 0 on a saddle, -1 in a cup.
+
+        A planar point has none (Koenderink and van Doorn, 1992); it is given the 0 of the middle.
+        """
+        k1, k2 = self.principal_curvatures
+        return np.arctan2(k1 + k2, k2 - k1) * (-2.0 / np.pi)
+
+    @property
+    def curvedness(self) -> Array:
+        """sqrt((kappa1^2 + kappa2^2) / 2), in 1/length."""
+        k1, k2 = self.principal_curvatures
+        return np.sqrt(0.5 * (k1**2 + k2**2))
+
 
 class HeightField:
     """A surface z(x, y); all follows from its derivatives.
@@ -127,6 +142,14 @@ class HeightField:
     def principal_curvatures(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """kappa1 <= kappa2 at (x, y), in 1/length."""
         return self.derivatives(x, y).principal_curvatures
+
+    def shape_index(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """1 on a convex cap, 0 on a saddle or plane, -1 in a cup, at (x, y)."""
+        return self.derivatives(x, y).shape_index
+
+    def curvedness(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The root mean square of kappa1 and kappa2 at (x, y), in 1/length."""
+        return self.derivatives(x, y).curvedness
 
     def closest_point(self, points: ArrayLike) -> Array:
         """The foot on the surface of each local point, (n, 3) -> (n, 3).

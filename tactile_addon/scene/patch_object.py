@@ -25,13 +25,21 @@ CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 QUANTITIES = [
     ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
     ("mean_curvature", "Mean Curvature", "H: blue where the surface bulges outward, red where inward", -1),
+    (
+        "shape_index",
+        "Shape Index",
+        "1 on caps, 0.5 on ridges, 0 on saddles, -0.5 in ruts, -1 in cups",
+        0,
+    ),
+    ("curvedness", "Curvedness", "How strongly it bends, whatever the shape", -1),
     ("deviation", "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
 ]
 POWERS = {name: power for name, _, _, power in QUANTITIES}
-QUANTITIES_OF_A_FIT = ("gaussian_curvature", "mean_curvature", "height_std")  # these need no mesh
+# These need no mesh.
+QUANTITIES_OF_A_FIT = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness", "height_std")
 NORMAL, PLACE = "custom_normal", "domain_place"  # attributes: as shaded; on the unit disk, see core.Domain
-POSITIVE = ("height_std",)  # never below zero: half a scale says it all
+POSITIVE = ("curvedness", "height_std")  # never below zero: half a scale says it all
 FLOOR = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
 
 

@@ -68,6 +68,8 @@ def reconstruction_report(result, ended=""):
         "gaussian_curvature": float(result.patch.gaussian_curvature(0.0, 0.0)),
         "mean_curvature": float(result.patch.mean_curvature(0.0, 0.0)),
         **{f"{name}_std": getattr(result, f"{name}_std") for name in CURVATURES},
+        "shape_index": float(result.patch.shape_index(0.0, 0.0)),
+        "curvedness": float(result.patch.curvedness(0.0, 0.0)),
         "residual": 0.0 if result.residual is None else result.radius * result.residual.size,
         "coefficients": result.patch.coefficients.tolist(),
         "radius": result.radius,

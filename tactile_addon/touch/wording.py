@@ -5,6 +5,8 @@
 from . import units
 from .units import say
 
+FLAT = 2.0  # A curvature within so many deviations of 0 has no radius.
+FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 SPREAD = ("mean", "median", "max", "rms")
 # What core.verify finds, in the order of a table.
 VERIFIED = (
@@ -34,6 +36,8 @@ def readable(report):
         ("kappa1, kappa2", f"{_measured(report, 'k1')}, {_measured(report, 'k2')} per unit of length"),
         ("Gaussian curvature", f"{_measured(report, 'gaussian_curvature')} per unit of area"),
         ("mean curvature", f"{_measured(report, 'mean_curvature')} per unit of length"),
+        ("shape index", f"{report['shape_index']:.3f}"),
+        ("curvedness", f"{report['curvedness']:.5g} per unit of length"),
         ("residual", f"{report['residual']:.4g}, {_share(report, 'residual')} of the radius"),
         ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
         ("height std", f"{report['height_std']:.4g}, {_share(report, 'height_std')} of the radius"),
@@ -172,6 +176,7 @@ def patch_rows(record, unit):
     rows = [
         measured("Curvature κ1", "k1", -1),
         measured("Curvature κ2", "k2", -1),
+        *_radii(record, unit),
         measured("Gaussian K", "gaussian_curvature", -2),
         measured("Mean H", "mean_curvature", -1),
         row("Fit Error", "fit_error"),
@@ -187,6 +192,14 @@ def patch_rows(record, unit):
         ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
         ("… Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
     ]
+
+
+def _radii(record, unit):
+    """Rows of the radii 1 / kappa, with their deviations, as far as the curvatures are known not to be 0."""
+    for number in (1, 2):
+        k, std = record[f"k{number}"], record[f"k{number}_std"]
+        if abs(k) > FLAT * std and abs(k) * record["radius"] > FLATTEST:
+            yield f"Radius 1/κ{number}", units.say(1.0 / k, 1, unit, std / k**2)
 
 
 def verification_table(found, unit):

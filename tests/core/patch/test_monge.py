@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Monge patch against finite differences and brute force."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,20 @@ def test_the_terms_stand_in_the_order_of_equation_1():
     assert names == ["30", "21", "12", "03", "40", "31", "22", "13", "04"]
     patch = MongePatch(2.0, 6.0, np.array([0, 0, 0, 0, 0, 0, 0, 5.0, 0]))
     assert patch.height(2.0, 3.0) == pytest.approx(4 + 27 + 5 * 2 * 27)
+
+
+@pytest.mark.parametrize(
+    ("k1", "k2", "index"),
+    [(-2, -2, 1), (-3, 0, 0.5), (-1, 1, 0), (0, 3, -0.5), (2, 2, -1), (0, 0, 0), (-(3**0.5), 1, 1 / 6)],
+)
+def test_shape_index_and_curvedness_at_the_point(k1, k2, index):
+    patch = MongePatch(k1, k2, np.empty(0))
+    assert patch.shape_index(0.0, 0.0) == pytest.approx(index, abs=1e-12)
+    assert patch.curvedness(0.0, 0.0) == pytest.approx(math.hypot(k1, k2) / math.sqrt(2.0))
+    assert np.isfinite(patch.shape_index(X, Y)).all()
+    larger = patch.scaled(3.0)
+    assert larger.shape_index(3.0 * X, 3.0 * Y) == pytest.approx(patch.shape_index(X, Y), abs=1e-7)
+    assert 3.0 * larger.curvedness(3.0 * X, 3.0 * Y) == pytest.approx(patch.curvedness(X, Y))
 
 
 @pytest.mark.parametrize("degree", range(2, 7))
