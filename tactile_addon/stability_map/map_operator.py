@@ -115,7 +115,6 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         """Esc ends it with what there is so far."""
         if not self._map.done:
             self._leave(context)
-            self.report({"INFO"}, "Stopped: nothing was kept")
             return {"CANCELLED"}
         self._steps = self._map.spread()  # the rest is done as before
         return {"RUNNING_MODAL"}
