@@ -26,6 +26,8 @@ FELT = 96  # contacts of a half curve as long as may be
 SEEDS = (24, 12, 6, 4)  # Numbers of these contacts that a half curve may begin with.
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
 GROWTH = 1.5  # A half curve grows by this factor at once.
+NEAR = 0.75  # of what ends growth: a mean deviation with which no longer half curves are tried
+HOPELESS = 3.0  # times it: with half as many contacts it is too large still
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
@@ -111,14 +113,16 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
     first = SEEDS[0] * step
     felt = Felt(feel(min(first, farthest)), point, step, partial=first < farthest)
-    found = yield from _seed(felt)
+    known: dict[bytes, Grown] = {}
+    found = yield from _seed(felt, known)
     growing = np.full(found.counts.shape, found.doubt <= 1.0)
-    while (growing := growing & ((found.counts < felt.whole) | felt.open)).any():
+    while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= NEAR:
         longer = np.where(growing, np.ceil(GROWTH * found.counts), found.counts).astype(np.intp)
         if (felt.open & (longer > felt.whole)).any():
             felt = Felt(feel(farthest), point, step)
+        longer = np.minimum(longer, felt.whole)
         try:
-            trial = yield from tried(felt, np.minimum(longer, felt.whole))
+            trial = known.get(longer.tobytes()) or (yield from tried(felt, longer))
         except DegenerateCurvesError:
             break
         if trial.misfits.max() > 1.0:  # the half curve that is explained worst ends here
@@ -130,20 +134,24 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     return found
 
 
-def _seed(felt: Felt) -> Fits:
-    """The longest of SEEDS that is in no doubt, or the one in the least."""
-    found, error = [], None
-    for seed in SEEDS:
+def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
+    """The longest of SEEDS that is in no doubt, or the one in the least; all that are tried become `known`."""
+    error, seeds = None, list(SEEDS)
+    while seeds:
+        counts = np.minimum(seeds.pop(0), felt.whole)
         try:
-            found.append((yield from tried(felt, np.minimum(seed, felt.whole))))
+            trial = yield from tried(felt, counts)
         except DegenerateCurvesError as why:
             error = why
             continue
-        if found[-1].doubt <= 1.0:
+        known[counts.tobytes()] = trial
+        if trial.doubt <= 1.0:
             break
-    if not found and error is not None:
+        if trial.spread > HOPELESS and len(seeds) > 1:
+            seeds.pop(0)
+    if not known and error is not None:
         raise error
-    return min(found, key=lambda trial: (trial.doubt, trial.counts.max()))
+    return min(known.values(), key=lambda trial: (trial.doubt, trial.counts.max()))
 
 
 def tried(felt: Felt, counts: Counts) -> Fits:
