@@ -7,7 +7,7 @@ So touches of one surface can grow side by side, and their fits be done in stack
 """
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -65,11 +65,10 @@ class Felt:
         found = []
         ends = (counts < self.whole) | self.open
         for contour, at, n, end in zip(self.contours, self.places, counts.tolist(), ends, strict=True):
-            assert contour.normals is not None and contour.stops is not None
+            assert contour.stops is not None
             which = slice(at - n[0] // stride * stride, at + n[1] // stride * stride + 1, stride)
             first, last = (UNEXPLAINED if e else s for e, s in zip(end, contour.stops, strict=True))
-            points, normals = contour.points[which], contour.normals[which]
-            found.append(replace(contour, points=points, normals=normals, stops=(first, last)))
+            found.append(contour.part(which, (first, last)))
         return found
 
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
