@@ -156,19 +156,24 @@ def own_variance(p: Array, variances: Array) -> Array:
 
 
 def _maternes(distance: Array) -> list[Array]:
-    """M of distances (...) over each of LENGTHS."""
-    return [_matern(math.sqrt(5.0) / length * distance) for length in LENGTHS]
+    """M of distances (...), which are used up, over each of LENGTHS; of the shorter by its power of the other's.
 
-
-def _matern(a: Array) -> Array:
-    """(1 + a + a^2 / 3) exp(-a); what it works on is passed over memory as seldom as can be."""
-    values = a / 3.0
-    values += 1.0
-    values *= a
-    values += 1.0
-    np.negative(a, out=a)
-    values *= np.exp(a, out=a)
-    return values
+    What is worked on is passed over memory as seldom as can be.
+    """
+    short, long = LENGTHS.tolist()
+    a = np.multiply(distance, math.sqrt(5.0) / long, out=distance)
+    decay, ratio = np.exp(-a), long / short
+    other = a * (ratio**2 / 3.0)
+    other += ratio
+    other *= a
+    other += 1.0
+    other *= decay**ratio
+    one = a / 3.0
+    one += 1.0
+    one *= a
+    one += 1.0
+    one *= decay
+    return [other, one]
 
 
 def _derived(p: Array, places: Array, variances: Array, weights: Array) -> Array:
