@@ -64,7 +64,7 @@ def touch(scan, point, outward, planes=EVEN, farthest=FARTHEST, **more):
 
 def touch_with_planes(scan, point, outward):
     """Planes are added while they help."""
-    if hasattr(core, "HELPS"):
+    if hasattr(core, "explore_many"):
         return touch(scan, point, outward, tolerance=TOLERANCE)
     found, planes = touch(scan, point, outward), EVEN
     farthest, (e1, n, _) = found.extent, EVEN[0].axes(outward).T

@@ -72,7 +72,10 @@ class Felt:
         return found
 
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
-        """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2)."""
+        """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
+
+        Above 1 is too much for their accuracy.
+        """
         each = list(zip(self.contours, self.places, counts.tolist(), strict=True))
         points = np.vstack([contour.points[at - n[0] : at + n[1] + 1] for contour, at, n in each])
         x, y, z = r.frame.to_local(points).T
@@ -81,7 +84,8 @@ class Felt:
         starts = np.cumsum(sizes) - sizes.ravel()
         squares = np.append((z - r.height(x, y)) ** 2, 0.0)
         sums = np.add.reduceat(squares, starts).reshape(-1, 3)[:, ::2]
-        return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0)
+        limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
+        return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0) / limit
 
 
 class Grown(NamedTuple):
@@ -159,9 +163,8 @@ def tried(felt: Felt, counts: Counts) -> Fits:
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
-    limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
     spread = r.mean_height_std / (GROWN_STD * r.radius)
-    return Grown(felt, counts, stride, felt.misfits(counts, r) / limit, spread, r)
+    return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
 
 
 def spacing(reaches: Array | Counts, count: int) -> float:
