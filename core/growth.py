@@ -26,7 +26,7 @@ FELT = 96  # contacts of a half curve as long as may be
 SEEDS = (24, 12, 6, 4)  # Numbers of these contacts that a half curve may begin with.
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
 GROWTH = 1.5  # A half curve grows by this factor at once.
-NEAR = 0.75  # of what ends growth: a mean deviation with which no longer half curves are tried
+NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
 
@@ -118,8 +118,9 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     felt = Felt(feel(min(first, farthest)), point, step, partial=first < farthest)
     known: dict[bytes, Grown] = {}
     found = yield from _seed(felt, known)
+    most = NEAR if len(known) > 1 else 1.0
     growing = np.full(found.counts.shape, found.doubt <= 1.0)
-    while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= NEAR:
+    while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(GROWTH * found.counts), found.counts).astype(np.intp)
         if (felt.open & (longer > felt.whole)).any():
             felt = Felt(feel(farthest), point, step)
