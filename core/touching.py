@@ -184,13 +184,12 @@ def is_enough(r: Reconstruction) -> bool:
     """
     if r.mean_height_std <= MISFIT * r.radius:
         return True
-    surface, (points, weights) = r.uncertainty, r.domain.nodes
-    over, contacts = points / r.radius, r.contacts[:, :2] / r.radius
+    (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
     some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), PLACES)).astype(np.intp)]
-    shared = surface.height_covariance(some, over)
-    seen = surface.height_covariance(some, some)
-    np.einsum("ii->i", seen)[:] += surface.noise**2 * len(some) / len(contacts)  # a view
-    variance = surface.height_std(*over.T) ** 2
+    both, m = np.vstack([some, points]) / r.radius, len(some)
+    covariance = r.uncertainty.height_covariance(both, both)
+    variance, shared, seen = covariance.diagonal()[m:], covariance[:m, m:], covariance[:m, :m].copy()
+    seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
     lost = np.einsum("in,in->n", shared, np.linalg.solve(seen, shared))
     then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
-    return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))
+    return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(np.maximum(variance, 0.0))))
