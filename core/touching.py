@@ -24,6 +24,7 @@ from .growth import (
     grown,
     spacing,
 )
+from .patch.residual import cholesky, solved
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.result import Reconstruction
 
@@ -190,6 +191,7 @@ def is_enough(r: Reconstruction) -> bool:
     covariance = r.uncertainty.height_covariance(both, both)
     variance, shared, seen = covariance.diagonal()[m:], covariance[:m, m:], covariance[:m, :m].copy()
     seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
-    lost = np.einsum("in,in->n", shared, np.linalg.solve(seen, shared))
+    told = solved(cholesky(seen), shared)
+    lost = np.einsum("in,in->n", told, told)
     then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
     return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(np.maximum(variance, 0.0))))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..patch.monge import monomials
-from ..patch.residual import Residual, kernels, places_factor, solved
+from ..patch.residual import Residual, cholesky, kernels, places_factor, solved
 from .evidence import FREE_PRECISION, USUAL_WAVINESS, prior_variances
 from .measured_slopes import slope_equations
 from .posterior import FREE, TERMS, Posterior
@@ -222,7 +222,7 @@ def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tupl
     )
     if touch.normals is not None:
         _add_slopes(touch, precision, seen)
-    factor = np.linalg.cholesky(precision)
+    factor = cholesky(precision)
     mean = solved(factor, solved(factor, seen), transposed=True)
     mean[terms:] = solved(places, mean[terms:], transposed=True)
     return Residual(touch.contacts[index, :2], variances, mean, factor, np.array(noise)), places
