@@ -65,6 +65,7 @@ class Scan:
         across = np.cross(b - a, c - a)
         self.name, self.areas, self.centers = path.stem, np.linalg.norm(across, axis=1), (a + b + c) / 3.0
         self.normals = across / np.maximum(self.areas, 1e-300)[:, None]
+        self.points, self.faces = points, faces
         self.tree = BVHTree.FromPolygons(points.tolist(), faces.tolist(), all_triangles=True)
 
     def ray_cast(self, origin, direction, distance):

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the time of a fit goes, what its solvers gain, and what fitting many at once gains.
 
-`python -m benchmarks.speed`, from the root of a checkout. On the touches of benchmarks.accuracy (eleven exact
+`python -m benchmarks.speed [--base ROOT [TASK ...]]`, from the root of a checkout. With --base it prints how long
+fits and automatic touches take beside those of that checkout and beside scipy's thin plate (ratios.py; bpy to
+read the scans and to cast rays), and nothing else. Otherwise, on the touches of benchmarks.accuracy (eleven exact
 surfaces, three plane sets, three noise levels, 75 contacts) it prints Markdown tables:
 
 (a) the minimization of (9), by Newton's method, by scipy's L-BFGS-B from the same start and on the same grid,
@@ -11,6 +13,8 @@ surfaces, three plane sets, three noise levels, 75 contacts) it prints Markdown 
 (c) the parts of one fit.
 """
 
+import argparse
+from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 from unittest.mock import patch
@@ -22,8 +26,9 @@ from core import reconstruct, reconstruct_many
 from core.bayes import joint_fit
 from core.paper import tagc
 from core.reconstruction import from_contours
+from tools import blender
 
-from . import accuracy, machine, table, timed
+from . import accuracy, machine, ratios, table, timed
 
 WITHIN = 1e-6  # of an objective
 TIGHT = {"maxiter": 1000, "ftol": 1e-12, "gtol": 1e-9}
@@ -182,6 +187,16 @@ def parts(cases):
 
 
 def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--base", type=Path, metavar="ROOT", help="a checkout to compare with")
+    parser.add_argument("tasks", nargs="*", choices=[*ratios.KINDS, []], help="some of what is compared")
+    options = parser.parse_args()
+    if options.base:
+        with blender.quiet():
+            cases = ratios.cases()
+        ratios.compare(options.base, cases, options.tasks or ratios.KINDS)
+        print(f"{machine('bpy', 'numpy', 'scipy')}.")
+        return
     cases = touches()
     for case in cases:
         fit(case)

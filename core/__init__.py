@@ -23,7 +23,7 @@ from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
 from .patch.monge import MongePatch
 from .reconstruction.deviations import mean_height_stds, with_height_stds
-from .reconstruction.exploration import Exploration, explore
+from .reconstruction.exploration import Exploration, explore, explore_many
 from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.result import Reconstruction
@@ -56,6 +56,7 @@ __all__ = [
     "common_point",
     "distances",
     "explore",
+    "explore_many",
     "fit_error",
     "from_dict",
     "height_error",

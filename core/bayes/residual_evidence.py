@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..patch.monge import TERMS, monomials
-from ..patch.residual import Residual, kernels, places_factor, solved
+from ..patch.residual import Residual, cholesky, kernels, places_factor, solved
 from .evidence import FREE_PRECISION, USUAL_WAVINESS, prior_variances
 from .measured_slopes import slope_equations
 from .posterior import FREE, Posterior
@@ -94,29 +94,46 @@ def _some(count: int, most: int) -> NDArray[np.intp]:
     return np.arange(m) * count // m
 
 
-def sizes(touch: Touch, system: System) -> tuple[Array, float, bool]:
-    """Variances (2,) and noise, averaged over their grid; and whether the touch asks for a residual.
+class Sizes(NamedTuple):
+    """Variances (2,) and noise, averaged over their grid; and whether the touch asks for a residual."""
+
+    variances: Array
+    noise: float
+    asked: bool
+
+
+def sizes(touch: Touch, system: System) -> Sizes:
+    """By the marginal likelihood of the heights.
 
     Heights ~ N(0, K), K = basis prior basis' + v k + noise^2, by one Cholesky factor of K bordered by the
     heights, as in evidence.py; each contact's row times the root of its weight.
     """
-    root = np.sqrt(touch.weights[system.places])
-    basis, heights = root[:, None] * system.basis[system.places], root * system.heights[system.places]
+    basis, heights, kernels_within = _weighted(touch, system)
     noises = touch.least * (touch.most / touch.least) ** (np.arange(NOISES) / (NOISES - 1.0))
-    covariances = _bordered(basis, heights, [root[:, None] * k[system.places] * root for k in system.kernels])
+    covariances = _bordered(basis, heights, kernels_within)
     # The middle noise first; the others where it does not rule out a length and an amplitude.
     with_it = np.full((*covariances.shape[:2], NOISES), np.inf)
     for at in np.ndindex(with_it.shape[:2]):
         with_it[at][MIDDLE] = _surprise(covariances[at], noises[MIDDLE])
     for at in zip(*np.nonzero(with_it[..., MIDDLE] < with_it.min() + NEGLIGIBLE), strict=True):
-        with_it[at] = [_surprise(covariances[at], noise) for noise in noises]
+        for i in (i for i in range(NOISES) if i != MIDDLE):
+            with_it[at][i] = _surprise(covariances[at], noises[i])
     without = _surprises_alone(basis / touch.most, heights / touch.most)
     without += 2.0 * len(heights) * math.log(touch.most)
     least = min(with_it.min(), without.min())
     p, p_alone = np.exp(-0.5 * (with_it - least)), np.exp(-0.5 * (without - least))
     shares = p / p.sum()
     noise = float(np.sqrt(shares.sum(axis=(0, 1)) @ noises**2))
-    return shares.sum(axis=2) @ AMPLITUDES**2, noise, bool(p.mean() > p_alone.mean())
+    return Sizes(shares.sum(axis=2) @ AMPLITUDES**2, noise, bool(p.mean() > p_alone.mean()))
+
+
+def _weighted(touch: Touch, system: System) -> tuple[Array, Array, list[Array]]:
+    """Basis, heights and kernels of the places, rows times the roots of their weights."""
+    if len(system.places) == len(touch.weights) and touch.weights.min() == 1.0:
+        return system.basis, system.heights, system.kernels
+    root = np.sqrt(touch.weights[system.places])
+    within = [root[:, None] * k[system.places] * root for k in system.kernels]
+    return root[:, None] * system.basis[system.places], root * system.heights[system.places], within
 
 
 def _prior(waviness: float) -> Array:
@@ -165,6 +182,22 @@ def _surprises_alone(basis: Array, heights: Array) -> Array:
     return surprises
 
 
+def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
+    """Of the terms, less the prior's mean, and what k(p, places) is multiplied with, (27 + m,)."""
+    from scipy.linalg.lapack import dposv
+
+    if touch.normals is not None or len(system.places) < len(touch.weights):
+        return fitted(touch, system, sizes.variances, sizes.noise)[0].mean
+    # Of N(0, K), K as in `sizes`: without the posterior's covariance its mean takes one Cholesky factor.
+    (basis, heights, within), (one, other) = _weighted(touch, system), sizes.variances
+    prior = _prior(USUAL_WAVINESS)
+    matrix = (basis * prior) @ basis.T
+    matrix += one * within[0] + other * within[1]
+    matrix.flat[:: len(matrix) + 1] += sizes.noise**2
+    solution = dposv(matrix.T, heights, lower=1, overwrite_a=1)[1]
+    return np.concatenate([prior * (solution @ basis), np.sqrt(touch.weights) * solution])
+
+
 def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tuple[Residual, Array]:
     """What the contacts say, given these; and the factor L of k(u, u).
 
@@ -189,7 +222,7 @@ def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tupl
     )
     if touch.normals is not None:
         _add_slopes(touch, precision, seen)
-    factor = np.linalg.cholesky(precision)
+    factor = cholesky(precision)
     mean = solved(factor, solved(factor, seen), transposed=True)
     mean[terms:] = solved(places, mean[terms:], transposed=True)
     return Residual(touch.contacts[index, :2], variances, mean, factor, np.array(noise)), places

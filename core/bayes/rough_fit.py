@@ -20,7 +20,7 @@ from ..patch.residual import Residual, kernel, kernels, weighted_kernel, whitene
 from .joint_fit import turned
 from .linear_system import prior_mean
 from .posterior import DISK, FREE, Posterior, nodes
-from .residual_evidence import MISFIT, Touch, asking, fitted, sizes, system_of
+from .residual_evidence import MISFIT, Sizes, System, Touch, asking, fitted, mean_given, sizes, system_of
 
 SCALE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.
 
@@ -72,23 +72,22 @@ def rough_fit(
             None if normals is None else np.vstack([normals[i][there], point]),
         )
         system = system_of(touch)
-        variances, noise, asked = sizes(touch, system)
-        if asked:
-            _settle(found, i, touch, fitted(touch, system, variances, noise)[0], tangent[i])
+        size = sizes(touch, system)
+        if size.asked:
+            _settle(found, i, touch, system, size, tangent[i])
     return found
 
 
-def _settle(found: RoughFit, place: int, touch: Touch, first: Residual, tangent: Array) -> None:
+def _settle(found: RoughFit, place: int, touch: Touch, system: System, size: Sizes, tangent: Array) -> None:
     """Into `found`: the fit of a touch in the frame that its first fit shows."""
     (at, weights), half = _projection(), len(nodes()[2])
-    mean = _terms()[:FREE] @ (touch.expected + first.mean[: len(TERMS)])
-    mean += weights[:FREE, :half] @ weighted_kernel(
-        at[:half], first.places, first.variances, first.mean[len(TERMS) :]
-    )
+    first, places = mean_given(touch, system, size), touch.contacts[system.places, :2]
+    mean = _terms()[:FREE] @ (touch.expected + first[: len(TERMS)])
+    mean += weights[:FREE, :half] @ weighted_kernel(at[:half], places, size.variances, first[len(TERMS) :])
     turn, k1, k2, _ = turned(np.eye(3), mean, tangent)
     scale = float(np.hypot(*(touch.contacts @ turn)[:, :2].T).max())
     touch = touch.moved(turn, scale)._replace(expected=prior_mean(k1, k2))
-    second = fitted(touch, system_of(touch), first.variances / scale**2, float(first.noise) / scale)
+    second = fitted(touch, system_of(touch), size.variances / scale**2, size.noise / scale)
     found.turns[place], found.scales[place] = turn, scale
     _put(found, place, *second, touch.expected)
 

@@ -105,6 +105,13 @@ class Contour:
             if not np.abs(self.normals).max(axis=1, initial=0.0).all():
                 raise ValueError("normals: wanted directions where normal_std is given, got (0, 0, 0)")
 
+    def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
+        """Some of its contacts, as they are: they are in order."""
+        found = object.__new__(Contour)
+        normals = None if self.normals is None else self.normals[which]
+        vars(found).update(vars(self), points=self.points[which], normals=normals, stops=stops)
+        return found
+
 
 def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:
     """The unit vector across the unit n that azimuths are measured from; see SamplingPlane.axes."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import SMALLEST, Array
-from .contour import Contour
+from .contour import Contour, cross
 
 WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
 LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
@@ -120,22 +120,29 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     (b, c, 3, 3), rows r0, r1 and r2, fitted to the nearest contacts, and (b, c). 0 where there are too
     few of them to tell.
     """
-    distance = np.where(curves.present, np.abs(curves.along), np.inf)
-    order = np.argsort(distance, axis=-1, kind="stable")[..., :WINDOW]
-    near = np.take_along_axis(curves.present, order, axis=-1)
-    r = near[..., None] * np.take_along_axis(curves.points, order[..., None], axis=-2)
-    s = (r @ curves.tangents[..., None])[..., 0]
-    count, longest = np.count_nonzero(near, axis=-1), np.abs(s).max(axis=-1)
+    shape, curve = curves.present.shape, np.arange(curves.present[..., 0].size)[:, None]
+    present = curves.present.reshape(len(curve), -1)
+    distance = np.where(present, np.abs(curves.along.reshape(present.shape)), np.inf)
+    order = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
+    near = present[curve, order]
+    r = near[..., None] * curves.points.reshape(*present.shape, 3)[curve, order]
+    s = (r @ curves.tangents.reshape(-1, 3, 1))[..., 0]
+    count, longest = near.sum(axis=1), np.abs(s).max(axis=1)
     told = (count > LEAST_CONTACTS) & (longest > 0.0)
-    powers = np.where(told, longest, 1.0)[..., None] ** np.arange(3)
-    basis = (near & told[..., None])[..., None] * (s / powers[..., 1:2])[..., None] ** np.arange(3)
-    gram = np.swapaxes(basis, -1, -2) @ basis + RIDGE * np.eye(3)
-    inverse = np.linalg.inv(gram)
-    solution = inverse @ (np.swapaxes(basis, -1, -2) @ r)
-    variance = np.sum((r - basis @ solution) ** 2, axis=(-2, -1)) / np.maximum(count - 3, 1)
-    stds = np.sqrt(variance * inverse[..., 0, 0])
-    solution /= powers[..., None]
-    return np.where(told[..., None, None], solution, 0.0), np.where(told, stds, 0.0)
+    scale = np.where(told, longest, 1.0)[:, None]
+    basis = np.empty((*s.shape, 3))
+    basis[..., 0] = near & told[:, None]
+    np.multiply(basis[..., 0], s / scale, out=basis[..., 1])
+    np.multiply(basis[..., 1], s / scale, out=basis[..., 2])
+    turned = np.swapaxes(basis, 1, 2)
+    inverse = np.linalg.inv(turned @ basis + RIDGE * np.eye(3))
+    solution = inverse @ (turned @ r)
+    off = r - basis @ solution
+    variance = np.einsum("cni,cni->c", off, off) / np.maximum(count - 3, 1)
+    stds = np.where(told, np.sqrt(variance * inverse[:, 0, 0]), 0.0)
+    solution /= (scale ** np.arange(3))[..., None]
+    solution[~told] = 0.0
+    return solution.reshape(*shape[:-1], 3, 3), stds.reshape(shape[:-1])
 
 
 def misses(curves: Curves) -> Array:
@@ -144,8 +151,8 @@ def misses(curves: Curves) -> Array:
     (b, c, 2): the part of r0 across the tangent. 0 where there are too few contacts to tell.
     """
     local, stds = local_curves(curves)
-    across = np.cross(local[..., 0, :], curves.tangents)
-    return np.stack([np.linalg.norm(across, axis=-1), stds], axis=-1)
+    across = np.array(cross(np.moveaxis(local[..., 0, :], -1, 0), np.moveaxis(curves.tangents, -1, 0)))
+    return np.stack([np.sqrt((across**2).sum(axis=0)), stds], axis=-1)
 
 
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:

@@ -84,7 +84,7 @@ def track(
         raise ValueError(f"step: wanted no more than the extent {extent:g}, got {step:g}")
     if extent / step > MOST_CONTACTS:
         raise ValueError(f"step: wanted at least a {MOST_CONTACTS}th of the extent {extent:g}, got {step:g}")
-    noise, generator = number("noise", noise, least=0.0), _generator(rng)
+    noise, generator = number("noise", noise, least=0.0), generator_of(rng)
     count = math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
     e1 = tangent_of(n, tangent)
     start, up, side = _first_contact(surface, vector_of(p), n, e1, step)
@@ -104,7 +104,7 @@ def track(
     return contours
 
 
-def _generator(rng: np.random.Generator | int | None) -> np.random.Generator:
+def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
     """Raises ValueError for what is no seed."""
     try:
         return np.random.default_rng(rng)

@@ -5,7 +5,6 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,21 +26,33 @@ class Domain:
     ends: Array
 
     @cached_property
-    def _boundary(self) -> tuple[Array, Any]:
-        """Lengths along the chords at the ends, and at the first once more (m + 1,); the spline over them."""
-        from scipy.interpolate import CubicSpline
+    def _boundary(self) -> tuple[Array, Array]:
+        """Lengths of the chords (m,), and the closed cubic spline over them: (4, m, 2), powers of the length.
 
-        closed = np.vstack([self.ends, self.ends[:1]])
-        lengths = np.linalg.norm(np.diff(closed, axis=0), axis=1)
-        at = np.concatenate([[0.0], np.cumsum(lengths)])
-        return at, CubicSpline(at, closed, bc_type="periodic")
+        Its slopes at the ends follow from the continuity of its second derivative.
+        """
+        chords = np.roll(self.ends, -1, axis=0) - self.ends
+        lengths = np.sqrt(chords[:, 0] ** 2 + chords[:, 1] ** 2)
+        m, before = len(lengths), np.roll(lengths, 1)
+        rise, rows = chords / lengths[:, None], np.arange(m)
+        system = np.zeros((m, m))
+        system[rows, rows] = 2.0 * (lengths + before)
+        system[rows, rows - 1], system[rows, rows + 1 - m] = lengths, before
+        right = lengths[:, None] * np.roll(rise, 1, axis=0) + before[:, None] * rise
+        slopes = np.linalg.solve(system, 3.0 * right)
+        bend = (slopes + np.roll(slopes, -1, axis=0) - 2.0 * rise) / lengths[:, None]
+        return lengths, np.array(
+            [self.ends, slopes, (rise - slopes) / lengths[:, None] - bend, bend / lengths[:, None]]
+        )
 
     @cached_property
     def _polar(self) -> tuple[Array, Array]:
         """Azimuths, ascending, and radii of the boundary."""
-        at, spline = self._boundary
+        chords, (start, slope, bend, third) = self._boundary
         each = math.ceil(SAMPLES / len(self.ends))  # Samples of one piece: as symmetric as the ends.
-        x, y = spline((at[:-1, None] + np.diff(at)[:, None] / each * np.arange(each)).ravel()).T
+        t = (chords[:, None] / each * np.arange(each))[..., None]
+        start, slope, bend, third = (part[:, None] for part in (start, slope, bend, third))
+        x, y = (start + t * (slope + t * (bend + t * third))).reshape(-1, 2).T
         azimuths, radii = np.arctan2(y, x), np.hypot(x, y)
         if np.count_nonzero(np.diff(azimuths, append=azimuths[0]) <= 0.0) > 1:
             azimuths, radii = self._without_turning_back()
@@ -71,10 +82,11 @@ class Domain:
         In circles parallel to the boundary.
         """
         piece, share, along, out, outward = _gauss(len(self.ends))
-        at, spline = self._boundary
-        chords = np.diff(at)[piece]
-        places = at[piece] + share * chords
-        points, ahead = spline(places), chords[:, None] * spline(places, 1)
+        lengths, pieces = self._boundary
+        chords, (start, slope, bend, third) = lengths[piece, None], pieces[:, piece]
+        t = share[:, None] * chords
+        points = start + t * (slope + t * (bend + t * third))
+        ahead = chords * (slope + t * (2.0 * bend + 3.0 * t * third))
         weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 

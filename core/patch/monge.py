@@ -27,7 +27,21 @@ TERMS = exponents(1, DEGREE)
 
 def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:
     """The terms (m, 2) at n points, (n, m)."""
+    if terms is exponents(1, 6):  # as most often: degree by degree
+        return _monomials_to(x, y, 6).T
     return derived_monomials(x, y, terms, [(0, 0)])[0].T
+
+
+def _monomials_to(x: Array, y: Array, degree: int) -> Array:
+    """Those of `exponents(1, degree)` at n points, (m, n): each degree from the one before."""
+    values = np.empty((degree * (degree + 3) // 2, len(x)))
+    values[0], values[1], start = x, y, 0
+    for d in range(2, degree + 1):
+        end = start + d
+        np.multiply(values[start:end], x, out=values[end : end + d])
+        np.multiply(values[end - 1], y, out=values[end + d])
+        start = end
+    return values
 
 
 def derived_monomials(

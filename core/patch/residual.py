@@ -100,7 +100,18 @@ class Residual:
 def places_factor(within: Array) -> Array:
     """L of k(u, u) of places, (m, m), lower triangular."""
     np.einsum("ii->i", within)[:] += ROUNDING * within.trace() / len(within)  # a view
-    return np.linalg.cholesky(within)
+    return cholesky(within)
+
+
+def cholesky(matrix: Array) -> Array:
+    """Its lower triangular factor; the matrix (m, m) may be used up. scipy's is some times as fast as numpy's."""
+    from scipy.linalg.lapack import dpotrf
+
+    factor, failed = dpotrf(matrix.T, lower=0, clean=1, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    lower: Array = factor.T
+    return lower
 
 
 def whitened(places: Array, factor: Array, terms: Array, told: Array) -> tuple[Array, Array]:
@@ -155,19 +166,24 @@ def own_variance(p: Array, variances: Array) -> Array:
 
 
 def _maternes(distance: Array) -> list[Array]:
-    """M of distances (...) over each of LENGTHS."""
-    return [_matern(math.sqrt(5.0) / length * distance) for length in LENGTHS]
+    """M of distances (...), which are used up, over each of LENGTHS; of the shorter by its power of the other's.
 
-
-def _matern(a: Array) -> Array:
-    """(1 + a + a^2 / 3) exp(-a); what it works on is passed over memory as seldom as can be."""
-    values = a / 3.0
-    values += 1.0
-    values *= a
-    values += 1.0
-    np.negative(a, out=a)
-    values *= np.exp(a, out=a)
-    return values
+    What is worked on is passed over memory as seldom as can be.
+    """
+    short, long = LENGTHS.tolist()
+    a = np.multiply(distance, math.sqrt(5.0) / long, out=distance)
+    decay, ratio = np.exp(-a), long / short
+    other = a * (ratio**2 / 3.0)
+    other += ratio
+    other *= a
+    other += 1.0
+    other *= decay**ratio
+    one = a / 3.0
+    one += 1.0
+    one *= a
+    one += 1.0
+    one *= decay
+    return [other, one]
 
 
 def _derived(p: Array, places: Array, variances: Array, weights: Array) -> Array:

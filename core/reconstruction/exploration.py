@@ -3,46 +3,23 @@
 """A touch that chooses its own size: curves as long as a patch can be trusted, contacts as many as tell.
 
 Beside the paper. Half curves grow outward from the reference point like the regions of a segmentation
-by surface fitting: fit, go on where the fit explains the contacts, fit again.
+by surface fitting: fit, go on where the fit explains the contacts, fit again (growth.py).
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..arguments import LARGEST, Array, finite_array, number
-from ..bayes.joint_fit import MISFIT
-from ..bayes.residual_evidence import PLACES
-from ..contours.contour import UNEXPLAINED, Contour, SamplingPlane
-from ..contours.local_geometry import DegenerateCurvesError
-from ..contours.tracking import Surface, track
-from .from_contours import reconstruct
-from .result import DOUBTFUL_STD, Reconstruction
-
-CONTACTS = (12, 24, 48)  # Numbers of contacts of the longest half curve: the first that is enough is taken.
-NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
-LEAST = 4  # contacts of the shortest half curve
-FELT = 128  # contacts of a half curve as long as may be
-SEEDS = (32, 16, 8, 4)  # Numbers of these contacts that a half curve may begin with.
-GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
-GROWTH = 1.5  # A half curve grows by this factor at once.
-EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
-
-Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
-
-
-@dataclass(frozen=True, eq=False)
-class Exploration:
-    """What was felt and found, and the length of the longest half curve and the step that it took."""
-
-    contours: list[Contour]
-    result: Reconstruction
-    extent: float
-    step: float
+from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vector
+from ..contours.contour import SamplingPlane
+from ..contours.tracking import Surface, generator_of, track
+from ..touching import Answer, Ask, Exploration, Steps, Touch
+from .deviations import with_height_stds
+from .from_contours import reconstruct_many
+from .result import Reconstruction
 
 
 def explore(
@@ -52,6 +29,8 @@ def explore(
     planes: Sequence[SamplingPlane],
     *,
     farthest: float,
+    tolerance: float | None = None,
+    most_planes: int = 6,
     extent: float | str = "auto",
     step: float | str = "auto",
     noise: float = 0.0,
@@ -62,6 +41,8 @@ def explore(
     """Tracks `surface` from `point` and reconstructs the patch, as large and as densely felt as it needs.
 
     farthest : the longest that a half curve may become
+    tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
+        added, up to `most_planes`, as long as one takes a tenth off. None for the given planes only
     extent : of each half curve, as in `track`; "auto" has each grow until the default fit no longer
         explains its contacts by their accuracy, or the patch could be trusted no longer
     step : as in `track`; "auto" for so many contacts that twice as many would not lower the deviation of
@@ -72,46 +53,66 @@ def explore(
     `reconstruct` raise.
     """
     p = finite_array("point", point, (3,), LARGEST)
-    length, spacing = _given("extent", extent), _given("step", step)
-    feel = partial(track, surface, p, outward, planes, noise=noise, rng=rng, tangent=tangent)
-    touched = partial(_touched, feel, p, outward, fit, spacing)
-    if length is not None:
-        return touched(length)
-    farthest = number("farthest", farthest, above=0.0)
-    between = max(spacing or 0.0, farthest / FELT)
-    counts, sure = _grown(feel(extent=farthest, step=between), p, outward, fit | {"method": "bayes"})
-    reaches = between * counts.astype(np.float64)
-    found = touched(farthest, reaches)
-    if sure and found.result.status != "ok" and found.result.method == "bayes":
-        return touched(farthest, reaches / GROWTH)  # these contacts are others than those felt
+    up = unit_vector("outward", outward)
+    wanted = _wanted(planes, farthest, tolerance, most_planes, extent, step, fit)
+    sensor = {"noise": noise, "rng": generator_of(rng), "tangent": tangent}
+    (found,) = _side_by_side([_touch(surface, p, up, wanted, sensor).steps()], p[None], up[None], fit)
+    if isinstance(found, ValueError):
+        raise found
     return found
 
 
-def _touched(
-    feel: Callable[..., list[Contour]],
-    p: Array,
+def explore_many(
+    surface: Surface,
+    points: ArrayLike,
     outward: ArrayLike,
+    planes: Sequence[SamplingPlane],
+    *,
+    farthest: float,
+    tolerance: float | None = None,
+    most_planes: int = 6,
+    extent: float | str = "auto",
+    step: float | str = "auto",
+    noise: float = 0.0,
+    rng: np.random.Generator | int | None = None,
+    tangent: ArrayLike | None = None,
+    **fit: Any,
+) -> list[Exploration | ValueError]:
+    """What `explore` gives at each of m points; side by side, with their fits in stacks, which is faster.
+
+    points, outward : (m, 3); all else as in `explore`, of all of them
+
+    In the place of a touch that there cannot be stands its error. Raises ValueError for bad arguments.
+    """
+    p = finite_array("points", points, (None, 3), LARGEST)
+    up = finite_array("outward", outward, (len(p), 3))
+    up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
+    wanted = _wanted(planes, farthest, tolerance, most_planes, extent, step, fit)
+    sensor = {"noise": noise, "rng": generator_of(rng), "tangent": tangent}
+    steps = [_touch(surface, *place, wanted, sensor).steps() for place in zip(p, up, strict=True)]
+    return _side_by_side(steps, p, up, fit)
+
+
+def _wanted(
+    planes: Sequence[SamplingPlane],
+    farthest: float,
+    tolerance: float | None,
+    most_planes: int,
+    extent: float | str,
+    step: float | str,
     fit: dict[str, Any],
-    spacing: float | None,
-    extent: float,
-    reaches: Array | None = None,
-) -> Exploration:
-    """A touch of this extent, or of one for each half curve (c, 2) up to it; with that spacing or its own."""
-    length = extent if reaches is None else float(reaches.max())
-
-    def at(step: float) -> Exploration:
-        """The touch whose contacts are so far apart."""
-        contours = feel(extent=length if reaches is None else min(length + step, extent), step=step)
-        if reaches is not None:  # a step longer than that, so that where they end shows
-            counts = (reaches / step * (1.0 + 1e-6)).astype(np.intp)
-            contours = [_shortened(*each, p) for each in zip(contours, counts, strict=True)]
-        return Exploration(contours, reconstruct(p, contours, outward=outward, **fit), length, step)
-
-    if spacing is not None:
-        return at(spacing)
-    shortest = length if reaches is None else float(reaches[reaches > 0.0].min())
-    coarsest = max(shortest / LEAST, length / CONTACTS[-1])
-    return _enough(at, [min(length / count, coarsest) for count in CONTACTS])
+) -> dict[str, Any]:
+    """Of a Touch, checked."""
+    length, between = _given("extent", extent), _given("step", step)
+    return {
+        "planes": tuple(list_of("planes", planes, SamplingPlane)),
+        "extent": length,
+        "step": between,
+        "farthest": number("farthest", farthest, above=0.0) if length is None else length,
+        "tolerance": None if tolerance is None else number("tolerance", tolerance, least=0.0),
+        "most_planes": most_planes,
+        "is_grown": fit.get("method", "bayes") == "bayes",
+    }
 
 
 def _given(name: str, length: float | str) -> float | None:
@@ -120,123 +121,42 @@ def _given(name: str, length: float | str) -> float | None:
     return None if automatic else number(name, length, above=0.0)  # type: ignore[arg-type]
 
 
-def _enough(touched: Callable[[float], Exploration], steps: Sequence[float]) -> Exploration:
-    """The touch with the first of these steps that brings enough contacts, or with the last."""
-    for step in steps:
-        try:
-            found = touched(step)
-        except DegenerateCurvesError:
-            if step == steps[-1]:
-                raise
-        else:
-            if _is_enough(found.result):
-                break
-    return found
+def _touch(
+    surface: Surface, point: Array, outward: Array, wanted: dict[str, Any], sensor: dict[str, Any]
+) -> Touch:
+    reference = SamplingPlane(0.0).axes(outward, sensor["tangent"])
+    return Touch(partial(track, surface, point, outward, **sensor), point, reference, **wanted)
 
 
-def _is_enough(r: Reconstruction) -> bool:
-    """Whether twice as many contacts would take less than NOTICEABLE off the mean deviation of the height.
-
-    They would tell nothing where that is less than a polynomial may be off.
-    """
-    surface, (points, weights) = r.uncertainty, r.domain.nodes
-    over, contacts = points / r.radius, r.contacts[:, :2] / r.radius
-    some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), PLACES)).astype(np.intp)]
-    shared = surface.height_covariance(some, over)
-    seen = surface.height_covariance(some, some)
-    np.einsum("ii->i", seen)[:] += surface.noise**2 * len(some) / len(contacts)  # a view
-    variance = surface.height_std(*over.T) ** 2
-    lost = np.einsum("in,in->n", shared, np.linalg.solve(seen, shared))
-    now, then = weights @ np.sqrt(variance), weights @ np.sqrt(np.maximum(variance - lost, 0.0))
-    return bool(then >= (1.0 - NOTICEABLE) * now or now <= MISFIT)
-
-
-def _grown(felt: Sequence[Contour], p: Array, outward: ArrayLike, fit: dict[str, Any]) -> tuple[Counts, bool]:
-    """To how many contacts on either side of p the contours can be followed, and whether that is "ok"."""
-    whole = np.array([_on_either_side(contour, p) for contour in felt])
-    counts, doubt, sure = _seed(felt, whole, p, outward, fit)
-    growing = (counts < whole) & (doubt <= 1.0)
-    while growing.any():
-        longer = np.minimum(np.ceil(GROWTH * counts).astype(np.intp), whole)
-        trial = np.where(growing, longer, counts)
-        try:
-            misfits, spread, still = _doubts(felt, trial, p, outward, fit)
-        except DegenerateCurvesError:
-            break
-        if misfits.max() > 1.0:  # the half curve that is explained worst ends here
-            growing.flat[np.argmax(np.where(growing, misfits, -1.0))] = False
-        elif spread > 1.0 or (sure and not still):  # what is known for sure is not given away for more
-            break
-        else:
-            counts, sure = trial, still
-            growing &= counts < whole
-    return counts, sure
+def _side_by_side(
+    steps: Sequence[Steps], points: Array, outward: Array, fit: dict[str, Any]
+) -> list[Exploration | ValueError]:
+    """What each of b touches comes to, at (b, 3) and (b, 3); the fits that they ask for in stacks."""
+    found: dict[int, Exploration | ValueError] = {}
+    answers: dict[int, Answer | None] = dict.fromkeys(range(len(steps)))
+    while answers:
+        asked: dict[int, Ask] = {}
+        for i, answer in answers.items():
+            try:
+                asked[i] = steps[i].send(answer)  # type: ignore[arg-type]
+            except StopIteration as end:
+                found[i] = end.value
+            except ValueError as error:
+                found[i] = error
+        answers = {}
+        for growing in (True, False):
+            which = [i for i, ask in asked.items() if ask.growing is growing]
+            options = fit | ({"method": "bayes"} if growing else {})
+            contours = [asked[i].contours for i in which]
+            if which:
+                results = reconstruct_many(points[which], contours, outward=outward[which], **options)
+                answers.update(zip(which, _with_stds(results), strict=True))
+    return [found[i] for i in range(len(steps))]
 
 
-def _seed(
-    felt: Sequence[Contour], whole: Counts, p: Array, outward: ArrayLike, fit: dict[str, Any]
-) -> tuple[Counts, float, bool]:
-    """The longest of SEEDS that is in no doubt, or the one in the least.
-
-    And its doubt, at most 1 for none, and whether its status is "ok".
-
-    Raises DegenerateCurvesError where none of them carries a fit.
-    """
-    found, error = [], None
-    for seed in SEEDS:
-        try:
-            misfits, spread, sure = _doubts(felt, np.minimum(seed, whole), p, outward, fit)
-        except DegenerateCurvesError as why:
-            error = why
-            continue
-        found.append((max(float(misfits.max()), spread), seed, sure))
-        if found[-1][0] <= 1.0:
-            break
-    if not found and error is not None:
-        raise error
-    doubt, seed, sure = min(found)
-    return np.minimum(seed, whole), doubt, sure
-
-
-def _doubts(
-    felt: Sequence[Contour], counts: Counts, p: Array, outward: ArrayLike, fit: dict[str, Any]
-) -> tuple[Array, float, bool]:
-    """How far contacts are off the fit of so many, (c, 2), and its mean deviation: above 1 is too much.
-
-    And whether its status is "ok".
-    """
-    few = [_shortened(*each, p, most=CONTACTS[0]) for each in zip(felt, counts, strict=True)]
-    r = reconstruct(p, few, outward=outward, **fit)
-    sides = [side for each in zip(felt, counts, strict=True) for side in _sides(*each, p)]
-    x, y, z = r.frame.to_local(np.vstack(sides)).T
-    ends = np.cumsum([len(side) for side in sides])
-    squares = np.split((z - r.height(x, y)) ** 2, ends[:-1])
-    misfits = np.array([np.sqrt(side.mean()) if len(side) else 0.0 for side in squares]).reshape(counts.shape)
-    limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
-    return misfits / limit, r.mean_height_std / (GROWN_STD * r.radius), r.status == "ok"
-
-
-def _sides(contour: Contour, counts: Counts, p: Array) -> tuple[Array, Array]:
-    """The nearest contacts of a tracked contour before p and after it, `counts` (2,) of them: (n, 3) each."""
-    at, (before, after) = _on_either_side(contour, p)[0], counts.tolist()
-    return contour.points[at - before : at], contour.points[at + 1 : at + after + 1]
-
-
-def _on_either_side(contour: Contour, p: Array) -> tuple[int, int]:
-    """How many contacts a tracked contour has before p and after it."""
-    at = int(np.argmax((contour.points == p).all(axis=1)))
-    return at, len(contour.points) - 1 - at
-
-
-def _shortened(contour: Contour, counts: Counts, p: Array, most: float = np.inf) -> Contour:
-    """The contour with no more than `counts` (2,) contacts on either side of p, thinned to some `most`."""
-    whole = _on_either_side(contour, p)
-    before, after = (np.arange(n, 0, -max(1, round(n / most))) for n in np.minimum(counts, whole))
-    which = whole[0] + np.concatenate([-before, [0], after[::-1]])
-    assert contour.normals is not None and contour.stops is not None
-    first, last = (
-        stop if count >= there else UNEXPLAINED
-        for stop, count, there in zip(contour.stops, counts, whole, strict=True)
-    )
-    points, normals = contour.points[which], contour.normals[which]
-    return replace(contour, points=points, normals=normals, stops=(first, last))
+def _with_stds(results: list[Answer]) -> list[Answer]:
+    """With the mean_height_std of many computed at once."""
+    if len(results) == 1:
+        return results
+    known = iter(with_height_stds([r for r in results if isinstance(r, Reconstruction)]))
+    return [next(known) if isinstance(r, Reconstruction) else r for r in results]

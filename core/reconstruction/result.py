@@ -215,21 +215,21 @@ class Reconstruction:
     @property
     def status(self) -> str:
         """ "ok", "uncertain" or "not_converged"."""
-        return self._judgment[0]
+        return self._verdict[0]
 
     @property
     def message(self) -> str:
         """The status in a sentence, with advice; and the blind directions."""
-        return self._judgment[1]
-
-    @cached_property
-    def _judgment(self) -> tuple[str, str]:
-        status, message = self._doubt or ("ok", "The patch describes its contacts.")
+        _, message = self._verdict
         if self.blind:
             verb = "is" if self.blind == 1 else "are"
             terms = terms_to(self.patch.degree)
             message += f" {self.blind} of {terms} coefficients {verb} invisible to these planes."
-        return status, message
+        return message
+
+    @cached_property
+    def _verdict(self) -> tuple[str, str]:
+        return self._doubt or ("ok", "The patch describes its contacts.")
 
     @property
     def _doubt(self) -> tuple[str, str] | None:

@@ -25,7 +25,6 @@ FARTHEST = 1.0 / 2.0  # Share of the object's size: a half contour that ends by 
 AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where no extent is given.
 FINEST = 1.0 / 128.0  # Share of it: the step where neither is given.
 STEPS = 12  # Least steps of a half contour, where no step is given.
-HELPS = 0.1  # Share of the mean deviation of the height that one more plane must take off.
 COARSE = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
 
 
@@ -41,36 +40,13 @@ class Touch:
     report: dict
 
 
-def touch(obj, depsgraph, location, planes, *, tolerance=None, **inputs):
-    """A touch as `touch_along` gives, with more planes where a tolerance asks for them.
-
-    tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
-        added, up to MOST_PLANES, as long as one would take HELPS off. None for the given planes only.
-    """
-    touched = touch_along(obj, depsgraph, location, planes, **inputs)
-    added, farthest = [], touched.report["extent"]  # more planes are for a better patch, not for a larger one
-    while tolerance is not None and len(planes) < MOST_PLANES:
-        std, report = touched.result.mean_height_std, touched.report
-        plane = suggestion_report(touched.result, np.array(report["axes"]))
-        if std <= tolerance or plane["expected_height_std"] > (1.0 - HELPS) * std:
-            break
-        more = [*planes, core.SamplingPlane(math.radians(plane["azimuth"]))]
-        try:
-            touched = touch_along(obj, depsgraph, location, more, farthest=farthest, **inputs)
-        except ValueError:  # nothing can be felt along that one: what was felt so far stays
-            break
-        planes = more
-        after = touched.result.mean_height_std
-        added.append({"azimuth": plane["azimuth"], "height_std_before": std, "height_std": after})
-    return replace(touched, report=touched.report | {"added_planes": added})
-
-
-def touch_along(
+def touch(
     obj,
     depsgraph,
     location,
     planes,
     *,
+    tolerance=None,
     outward=None,
     toward=None,
     tangent=None,
@@ -78,17 +54,17 @@ def touch_along(
     step,
     noise,
     seed,
-    farthest=None,
     sound=False,
     **fit,
 ):
     """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
 
     location : world coordinates, projected onto the object
+    tolerance : mean deviation of the height that is good enough, up to which planes are added while they
+        help, MOST_PLANES at most, see core.explore; None for the given ones only
     outward : or None for the surface's; on the side of it that `toward` points to, where given
     tangent : azimuth 0 of the planes, see core.SamplingPlane.axes; None for its choice
     extent, step : 0 for what the surface there asks for, see core.explore
-    farthest : of an extent that is chosen, half the object's size where it is None
     sound : see MeshSurface
     fit : what core.reconstruct takes
 
@@ -104,7 +80,9 @@ def touch_along(
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
     size = {
-        "farthest": farthest or FARTHEST * surface.size,
+        "farthest": FARTHEST * surface.size,
+        "tolerance": tolerance,
+        "most_planes": MOST_PLANES,
         "extent": extent or "auto",
         "step": step or "auto",
     }
@@ -122,7 +100,13 @@ def touch_along(
         "noise": noise,
         "seed": seed,
         **reconstruction_report(result, "" if extent else ends(result.contours)),
-        "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
+        "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in found.planes],
+        "added_planes": [
+            {"azimuth": math.degrees(plane.azimuth), "height_std_before": before, "height_std": after}
+            for plane, before, after in zip(
+                found.planes[len(planes) :], found.stds, found.stds[1:], strict=False
+            )
+        ],
         "axes": axes.tolist(),
         "stops": [list(contour.stops) for contour in result.contours],
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),

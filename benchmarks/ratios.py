@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long fits and automatic touches take beside those of an older checkout and scipy's thin plate.
+
+What `python -m benchmarks.speed --base ROOT` prints; ROOT is any worktree of this repository. Either checkout
+runs in a process of its own on the same cases, by turns, so that what else the machine does meets both.
+"""
+
+import pickle
+import subprocess
+import sys
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from core import SamplingPlane, reconstruct, track
+
+from . import ROOT, SCANS_FOLDER, accuracy, table
+from .real import Scan
+
+POINTS, PLANES, EXTENT, STEPS = 6, (3, 5), 1.0 / 16.0, 12  # of each scan; of its size
+KINDS = {"batch": 1, "planes": 1, "touch": 2, "fit": 5, "spline": 5}  # with the rounds of each
+
+
+def compare(base, cases, tasks):
+    """A Markdown table of the medians of `tasks`, some of KINDS, here and in the checkout `base`."""
+    cases, smooth = cases
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        path = Path(folder, "cases")
+        path.write_bytes(pickle.dumps(cases))
+        ours, theirs = (stack.enter_context(_worker(root, path)) for root in (ROOT, base))
+        counts = {"batch": "batches", "planes": "touches", "touch": "touches", "fit": "fits"}
+        rows = []
+        for task in (task for task in counts if task in tasks):
+            numbers = range(len(cases[counts[task]]))
+            ask = [(ours, task), (theirs, task), *([(ours, "spline")] if task == "fit" else [])]
+            seconds = np.array([_asked(ask, i, KINDS[task]) for i in numbers])
+            groups = {task: np.full(len(seconds), True)}
+            if task == "fit":
+                groups = {"fit, no residual": smooth, "fit, residual": ~smooth}
+            rows += [_row(title, seconds[which], cases, task) for title, which in groups.items()]
+    table(["medians, ms", "this", "base", "this / base", "thin plate", "this / thin plate", "cases"], rows)
+
+
+def _asked(ask, case, rounds):
+    """The least seconds of each of (worker, task), by turns."""
+    return np.min([[_answer(worker, task, case) for worker, task in ask] for _ in range(rounds)], axis=0)
+
+
+def _row(title, seconds, cases, task):
+    ms = [1e3 * median(column) for column in seconds.T]
+    size = len(cases["batches"][0][1]) if task == "batch" else 1
+    ratios = [f"{median(seconds[:, 0] / other):.2f}" for other in seconds.T[1:]]
+    return [
+        title,
+        *(f"{each / size:.2f}" for each in ms[:2]),
+        ratios[0],
+        *([f"{ms[2]:.2f}", ratios[1]] if len(ms) > 2 else ["", ""]),
+        f"{len(seconds)}",
+    ]
+
+
+def _worker(root, path):
+    command = [sys.executable, str(ROOT / "benchmarks" / "speed_worker.py"), str(root), str(path)]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def _answer(worker, task, case):
+    worker.stdin.write(f"{task} {case}\n")
+    worker.stdin.flush()
+    return float(worker.stdout.readline())
+
+
+def cases():
+    """What speed_worker.py reads; and which of the fits have no residual, booleans."""
+    scans = [Scan(path) for path in sorted(SCANS_FOLDER.glob("*.*"))]
+    places = [list(scan.places(POINTS, 1)) for scan in scans]
+    touched = [*_exact(), *(each for s, p in zip(scans, places, strict=True) for each in _fixed(s, p))]
+    results = [reconstruct(point, contours, outward=outward) for point, outward, contours in touched]
+    contacts = [np.vstack([np.zeros(3), r.contacts]) / r.radius for r in results]
+    found = {
+        "fits": [(p, n, [(c.points, c.plane_normal) for c in contours]) for p, n, contours in touched],
+        "contacts": contacts,
+        "scans": [(scan.points, scan.faces) for scan in scans],
+        "touches": [(i, *place) for i, of in enumerate(places) for place in of],
+        "batches": [(i, *(np.array(part) for part in zip(*of, strict=True))) for i, of in enumerate(places)],
+    }
+    return found, np.array([r.residual is None for r in results])
+
+
+def _exact():
+    """Of benchmarks.accuracy: point, outward, contours."""
+    cases = [
+        accuracy.exact_case(name, planes, noise, 0)
+        for name in accuracy.SURFACES
+        for planes in accuracy.EXACT_PLANES
+        for noise in accuracy.NOISES
+    ]
+    return [(case.point, case.axes[:, 2], case.contours) for case in cases]
+
+
+def _fixed(scan, places):
+    """Touches of an extent that is given, of a scan."""
+    for point, outward in places:
+        for count in PLANES:
+            planes = [SamplingPlane(np.pi * i / count) for i in range(count)]
+            try:
+                contours = track(scan, point, outward, planes, extent=EXTENT, step=EXTENT / STEPS)
+                reconstruct(point, contours, outward=outward)
+            except ValueError:  # an edge or a hole: no touch
+                continue
+            yield point, outward, contours

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far half curves can be followed from the reference point, as long as fits explain their contacts.
+
+What fits is asked by `yield`: of contours, answered by their Reconstruction or the error why there is none.
+So touches of one surface can grow side by side, and their fits be done in stacks.
+"""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arguments import Array
+from .bayes.joint_fit import MISFIT
+from .contours.contour import EXTENT, UNEXPLAINED, Contour
+from .contours.local_geometry import DegenerateCurvesError
+from .reconstruction.result import DOUBTFUL_STD, Reconstruction
+
+CONTACTS = (12, 24, 48)  # Numbers of contacts of the longest half curve: the first that is enough is taken.
+LEAST = 4  # contacts of the shortest half curve
+FELT = 96  # contacts of a half curve as long as may be
+SEEDS = (24, 12, 6, 4)  # Numbers of these contacts that a half curve may begin with.
+GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
+GROWTH = 1.5  # A half curve grows by this factor at once.
+NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
+HOPELESS = 3.0  # times it: with half as many contacts it is too large still
+EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
+
+Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
+Fits = Generator[list[Contour], Reconstruction | DegenerateCurvesError, "Grown"]
+Feel = Callable[[float], list[Contour]]  # contours of an extent
+
+
+@dataclass(frozen=True, eq=False)
+class Felt:
+    """Contours as they were tracked with a step between contacts; `partial`: not as far as may be."""
+
+    contours: list[Contour]
+    point: Array
+    step: float
+    partial: bool = False
+
+    @cached_property
+    def places(self) -> list[int]:
+        """Of the point in each contour."""
+        return [int(np.argmax((contour.points == self.point).all(axis=1))) for contour in self.contours]
+
+    @cached_property
+    def whole(self) -> Counts:
+        """The contacts there are."""
+        each = zip(self.contours, self.places, strict=True)
+        return np.array([(at, len(contour.points) - 1 - at) for contour, at in each])
+
+    @cached_property
+    def open(self) -> NDArray[np.bool_]:
+        """Whether a half curve goes on beyond what was tracked, (c, 2)."""
+        return np.array([[self.partial and s == EXTENT for s in c.stops or ()] for c in self.contours])
+
+    def shortened(self, counts: Counts, stride: int = 1) -> list[Contour]:
+        """Every so many of these contacts, and the point."""
+        found = []
+        ends = (counts < self.whole) | self.open
+        for contour, at, n, end in zip(self.contours, self.places, counts.tolist(), ends, strict=True):
+            assert contour.stops is not None
+            which = slice(at - n[0] // stride * stride, at + n[1] // stride * stride + 1, stride)
+            first, last = (UNEXPLAINED if e else s for e, s in zip(end, contour.stops, strict=True))
+            found.append(contour.part(which, (first, last)))
+        return found
+
+    def misfits(self, counts: Counts, r: Reconstruction) -> Array:
+        """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
+
+        Above 1 is too much for their accuracy.
+        """
+        each = list(zip(self.contours, self.places, counts.tolist(), strict=True))
+        points = np.vstack([contour.points[at - n[0] : at + n[1] + 1] for contour, at, n in each])
+        x, y, z = r.frame.to_local(points).T
+        # The point itself, which stands between the sides of each, is none of either.
+        sizes = np.array([(a, 1, b) for _, _, (a, b) in each])
+        starts = np.cumsum(sizes) - sizes.ravel()
+        squares = np.append((z - r.height(x, y)) ** 2, 0.0)
+        sums = np.add.reduceat(squares, starts).reshape(-1, 3)[:, ::2]
+        limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
+        return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0) / limit
+
+
+class Grown(NamedTuple):
+    """Half curves of so many contacts, felt and, every `stride` of them, fitted; and what is in doubt of it.
+
+    misfits, spread : of the contacts, (c, 2), and of the mean deviation: above 1 is too much
+    """
+
+    felt: Felt
+    counts: Counts
+    stride: int
+    misfits: Array
+    spread: float
+    result: Reconstruction
+
+    @property
+    def doubt(self) -> float:
+        """At most 1 for none."""
+        return max(float(self.misfits.max()), self.spread)
+
+    @property
+    def sure(self) -> bool:
+        """Whether its status is "ok"."""
+        return self.result.status == "ok"
+
+
+def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
+    """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
+    first = SEEDS[0] * step
+    felt = Felt(feel(min(first, farthest)), point, step, partial=first < farthest)
+    known: dict[bytes, Grown] = {}
+    found = yield from _seed(felt, known)
+    most = NEAR if len(known) > 1 else 1.0
+    growing = np.full(found.counts.shape, found.doubt <= 1.0)
+    while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
+        longer = np.where(growing, np.ceil(GROWTH * found.counts), found.counts).astype(np.intp)
+        if (felt.open & (longer > felt.whole)).any():
+            felt = Felt(feel(farthest), point, step)
+        longer = np.minimum(longer, felt.whole)
+        try:
+            trial = known.get(longer.tobytes()) or (yield from tried(felt, longer))
+        except DegenerateCurvesError:
+            break
+        if trial.misfits.max() > 1.0:  # the half curve that is explained worst ends here
+            growing.flat[np.argmax(np.where(growing, trial.misfits, -1.0))] = False
+        elif trial.spread > 1.0 or (found.sure and not trial.sure):
+            break  # what is known for sure is not given away for more
+        else:
+            found = trial
+    return found
+
+
+def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
+    """The longest of SEEDS that is in no doubt, or the one in the least; all that are tried become `known`."""
+    error, seeds = None, list(SEEDS)
+    while seeds:
+        counts = np.minimum(seeds.pop(0), felt.whole)
+        try:
+            trial = yield from tried(felt, counts)
+        except DegenerateCurvesError as why:
+            error = why
+            continue
+        known[counts.tobytes()] = trial
+        if trial.doubt <= 1.0:
+            break
+        if trial.spread > HOPELESS and len(seeds) > 1:
+            seeds.pop(0)
+    if not known and error is not None:
+        raise error
+    return min(known.values(), key=lambda trial: (trial.doubt, trial.counts.max()))
+
+
+def tried(felt: Felt, counts: Counts) -> Fits:
+    """With so many contacts, of which as few are fitted as most often are enough."""
+    stride = max(1, int(spacing(counts, CONTACTS[0])))
+    r = yield felt.shortened(counts, stride)
+    if isinstance(r, DegenerateCurvesError):
+        raise r
+    spread = r.mean_height_std / (GROWN_STD * r.radius)
+    return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
+
+
+def spacing(reaches: Array | Counts, count: int) -> float:
+    """A step that gives the longest of half curves (c, 2) some `count` contacts, the shortest LEAST."""
+    longest = float(reaches.max())
+    shortest = float(np.where(reaches > 0, reaches, longest).min())
+    return min(longest / count, max(shortest / LEAST, longest / CONTACTS[-1]))

@@ -1,0 +1,197 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One touch that chooses what is not given, and asks for the fits that it needs by `yield`, as in growth.py."""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .arguments import Array
+from .bayes.joint_fit import MISFIT
+from .bayes.residual_evidence import PLACES
+from .contours.contour import Contour, SamplingPlane
+from .contours.local_geometry import DegenerateCurvesError
+from .growth import (
+    CONTACTS,
+    FELT,
+    GROWTH,
+    LEAST,
+    Counts,
+    Felt,
+    Grown,
+    grown,
+    spacing,
+)
+from .patch.residual import cholesky, solved
+from .reconstruction.next_plane import azimuth_of, suggest_plane
+from .reconstruction.result import Reconstruction
+
+NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
+HELPS = 0.1  # of the same, that one more plane is to take off
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """What was felt and found, and the length of the longest half curve and the step that it took.
+
+    planes : those that were given, and those that were added
+    stds : the mean deviation of the height with the planes given, and after each that was added
+    """
+
+    contours: list[Contour]
+    result: Reconstruction
+    extent: float
+    step: float
+    planes: tuple[SamplingPlane, ...]
+    stds: tuple[float, ...] = ()
+
+
+class Ask(NamedTuple):
+    """Contours to be fitted: as it is asked for, or by the default method, by which curves grow."""
+
+    contours: list[Contour]
+    growing: bool = False
+
+
+Answer = Reconstruction | DegenerateCurvesError
+Steps = Generator[Ask, Answer, Exploration]
+Contacts = tuple[list[Contour], float, Reconstruction | None]  # with their step, and their fit where known
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """A place and how to feel there: a function of planes, extent and step; and what is wanted.
+
+    Lengths are None where they are to be chosen, the tolerance where no planes are to be added.
+    reference : columns e1, n and e1 x n, which azimuths are measured by
+    is_grown : whether what makes curves grow is the fit that is asked for
+    """
+
+    feel: Callable[..., list[Contour]]
+    point: Array
+    reference: Array
+    planes: tuple[SamplingPlane, ...]
+    extent: float | None
+    step: float | None
+    farthest: float
+    tolerance: float | None
+    most_planes: int
+    is_grown: bool
+
+    def steps(self) -> Steps:
+        """The touch, with planes added while they help: they are for a better patch, not for a larger one."""
+        found = yield from (self._grown() if self.extent is None else self._of_extent(self.extent))
+        stds = [found.result.mean_height_std]
+        while (
+            self.tolerance is not None and stds[-1] > self.tolerance and len(found.planes) < self.most_planes
+        ):
+            plane, expected = suggest_plane(found.result)
+            if expected > (1.0 - HELPS) * stds[-1]:
+                break
+            d1, _, n = found.result.frame.axes.T
+            along = plane.axes(n, d1)[:, 0]
+            azimuth = azimuth_of(along, self.reference[:, 1], self.reference[:, 0])
+            try:
+                found = yield from self._with_plane(found, SamplingPlane(azimuth))
+            except ValueError:  # nothing can be felt along that one: what was felt so far stays
+                break
+            stds.append(found.result.mean_height_std)
+        return replace(found, stds=tuple(stds))
+
+    def _of_extent(self, extent: float) -> Steps:
+        steps = [extent / count for count in CONTACTS] if self.step is None else [self.step]
+        return (yield from self._enough(lambda step: (self._felt(extent, step), step, None), extent, steps))
+
+    def _felt(self, extent: float, step: float) -> list[Contour]:
+        return self.feel(self.planes, extent=extent, step=step)
+
+    def _grown(self) -> Steps:
+        """As large as it can be trusted."""
+        between = max(self.step or 0.0, self.farthest / FELT)
+        fits = grown(lambda extent: self._felt(extent, between), self.point, self.farthest, between)
+        contours = next(fits)
+        while True:
+            answer = yield Ask(contours, growing=not self.is_grown)
+            try:
+                contours = fits.send(answer)
+            except StopIteration as end:
+                largest: Grown = end.value
+                break
+        found = yield from self._of_reaches(largest, largest.counts)
+        if largest.sure and found.result.status != "ok" and self.is_grown:
+            # These contacts are others than those felt.
+            return (yield from self._of_reaches(largest, np.floor(largest.counts / GROWTH).astype(np.intp)))
+        return found
+
+    def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
+        """With half curves of so many of the contacts that were felt; with these where they do."""
+        felt, reaches = largest.felt, largest.felt.step * counts.astype(np.float64)
+        length = float(reaches.max())
+
+        def at(step: float) -> Contacts:
+            """Contacts so far apart, or somewhat nearer."""
+            stride = int(step / felt.step * (1.0 + 1e-6))
+            if stride:
+                same = self.is_grown and counts is largest.counts and stride == largest.stride
+                known = largest.result if same else None
+                return felt.shortened(counts, stride), stride * felt.step, known
+            # A step longer than that, so that where they end shows.
+            again = Felt(self._felt(min(length + step, self.farthest), step), self.point, step)
+            fewer = np.minimum((reaches / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
+            return again.shortened(fewer), step, None
+
+        steps = [spacing(reaches, count) for count in CONTACTS] if self.step is None else [self.step]
+        return (yield from self._enough(at, length, steps))
+
+    def _enough(self, at: Callable[[float], Contacts], extent: float, steps: list[float]) -> Steps:
+        """The touch with the first of these steps that brings enough contacts, or with the last."""
+        for wanted in dict.fromkeys(steps):
+            contours, step, known = at(wanted)
+            r = known or (yield Ask(contours))
+            if isinstance(r, DegenerateCurvesError):
+                if wanted == steps[-1]:
+                    raise r
+            elif wanted == steps[-1] or is_enough(r):
+                break
+        assert isinstance(r, Reconstruction)
+        return Exploration(contours, r, extent, step, self.planes)
+
+    def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
+        """With one more, as far as the fit explains its contacts; raises ValueError where it shows nothing.
+
+        Felt twice as densely as fitted: what lies between tells whether it is explained.
+        """
+        half = 0.5 * found.step
+        felt = Felt(self.feel((plane,), extent=found.extent, step=half), self.point, half)
+        counts = felt.whole // 2 * 2
+        while True:
+            contours = [*found.contours, *felt.shortened(counts, 2)]
+            r = yield Ask(contours)
+            if isinstance(r, DegenerateCurvesError):
+                raise r
+            misfits = felt.misfits(counts, r)
+            worst = int(np.argmax(misfits))
+            if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * LEAST:
+                return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
+            counts.flat[worst] = max(2 * LEAST, int(counts.flat[worst] / GROWTH) // 2 * 2)
+
+
+def is_enough(r: Reconstruction) -> bool:
+    """Whether twice as many contacts would take less than NOTICEABLE off the mean deviation of the height.
+
+    They would tell nothing where that is less than a polynomial may be off.
+    """
+    if r.mean_height_std <= MISFIT * r.radius:
+        return True
+    (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
+    some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), PLACES)).astype(np.intp)]
+    both, m = np.vstack([some, points]) / r.radius, len(some)
+    covariance = r.uncertainty.height_covariance(both, both)
+    variance, shared, seen = covariance.diagonal()[m:], covariance[:m, m:], covariance[:m, :m].copy()
+    seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
+    told = solved(cholesky(seen), shared)
+    lost = np.einsum("in,in->n", told, told)
+    then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
+    return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(np.maximum(variance, 0.0))))
