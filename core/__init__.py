@@ -18,12 +18,13 @@ from .contours.contour import (
 )
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import Surface, track
+from .exploration.one_touch import Exploration
+from .exploration.touches import explore, explore_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
 from .patch.monge import MongePatch
 from .reconstruction.deviations import mean_height_stds, with_height_stds
-from .reconstruction.exploration import Exploration, explore, explore_many
 from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.result import Reconstruction

@@ -8,11 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arguments import Array
-from .bayes.joint_fit import MISFIT
-from .bayes.residual_evidence import PLACES
-from .contours.contour import Contour, SamplingPlane
-from .contours.local_geometry import DegenerateCurvesError
+from ..arguments import Array
+from ..bayes.joint_fit import MISFIT
+from ..bayes.residual_evidence import PLACES
+from ..contours.contour import Contour, SamplingPlane
+from ..contours.local_geometry import DegenerateCurvesError
+from ..patch.residual import cholesky, solved
+from ..reconstruction.next_plane import azimuth_of, suggest_plane
+from ..reconstruction.result import Reconstruction
 from .growth import (
     CONTACTS,
     FELT,
@@ -24,9 +27,6 @@ from .growth import (
     grown,
     spacing,
 )
-from .patch.residual import cholesky, solved
-from .reconstruction.next_plane import azimuth_of, suggest_plane
-from .reconstruction.result import Reconstruction
 
 NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
 HELPS = 0.1  # of the same, that one more plane is to take off

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import Array
-from .bayes.joint_fit import MISFIT
-from .contours.contour import EXTENT, UNEXPLAINED, Contour
-from .contours.local_geometry import DegenerateCurvesError
-from .reconstruction.result import DOUBTFUL_STD, Reconstruction
+from ..arguments import Array
+from ..bayes.joint_fit import MISFIT
+from ..contours.contour import EXTENT, UNEXPLAINED, Contour
+from ..contours.local_geometry import DegenerateCurvesError
+from ..reconstruction.result import DOUBTFUL_STD, Reconstruction
 
 CONTACTS = (12, 24, 48)  # Numbers of contacts of the longest half curve: the first that is enough is taken.
 LEAST = 4  # contacts of the shortest half curve

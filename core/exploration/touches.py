@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike
 from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vector
 from ..contours.contour import SamplingPlane
 from ..contours.tracking import Surface, generator_of, track
-from ..touching import Answer, Ask, Exploration, Steps, Touch
-from .deviations import with_height_stds
-from .from_contours import reconstruct_many
-from .result import Reconstruction
+from ..reconstruction.deviations import with_height_stds
+from ..reconstruction.from_contours import reconstruct_many
+from ..reconstruction.result import Reconstruction
+from .one_touch import Answer, Ask, Exploration, Steps, Touch
 
 
 def explore(
