@@ -15,6 +15,7 @@ from ..bayes.posterior import FREE, Posterior, terms_to
 from ..contours.contour import Contour
 from ..contours.curves import besides_point
 from ..contours.local_geometry import Frame
+from ..contradiction import contradiction, measured_normals
 from ..paper import least_squares
 from ..patch.domain import Domain
 from ..patch.geometry import Geometry, fit_error, similarity, total_absolute_curvature
@@ -29,6 +30,8 @@ DOUBTFUL_CURVATURE = 0.1  # of 1 / radius; as well is it known along a curve tha
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # Share of a contact's accuracy: few contacts may happen to scatter less.
+CONTRADICTED = 0.01  # radians, by which normals contradict the contacts, and by SIGNIFICANT deviations
+DOUBTFUL_FIT = 0.01  # of the radius, beside the noise, by which half of the contacts are missed
 MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at most.
 
 
@@ -171,6 +174,12 @@ class Reconstruction:
         """(6), the mean of |dz| over the contacts."""
         return fit_error(self.geometry, self.contacts)
 
+    @property
+    def typical_miss(self) -> float:
+        """The median of |dz| over the contacts, which outlying ones do not change."""
+        x, y, z = self.contacts.T
+        return float(np.median(np.abs(self.height(x, y) - z)))
+
     @cached_property
     def total_absolute_curvature(self) -> float:
         """(8), the integral of |K| over the patch."""
@@ -223,6 +232,16 @@ class Reconstruction:
         return self._judgment[1]
 
     @cached_property
+    def _contradiction(self) -> tuple[float, float]:
+        """By how many deviations, and by what angle, fitted normals contradict the contacts."""
+        contacts, normals = measured_normals(self.contours, self.frame, self.radius)
+        if self.joint_posterior is None or not len(normals):
+            return 0.0, 0.0
+        k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
+        alone = posterior_of(k1, k2, self.contacts / self.radius, self.accuracy)
+        return contradiction(contacts, normals, alone)
+
+    @cached_property
     def _judgment(self) -> tuple[str, str]:
         status, message = self._doubt or ("ok", "The patch describes its contacts.")
         if self.blind:
@@ -243,13 +262,34 @@ class Reconstruction:
                 "The contacts alone do not determine the surface between the curves (condition number "
                 f"{self.condition_number:.1e}): take another method, or add sampling planes."
             )
+        return self._doubt_about_data or self._doubt_about_heights or self._doubt_about_frame
+
+    @property
+    def _doubt_about_data(self) -> tuple[str, str] | None:
+        deviations, angle = self._contradiction
+        if deviations > SIGNIFICANT and angle > CONTRADICTED:
+            return "uncertain", (
+                f"The measured normals contradict the contacts by {math.degrees(angle):.1f} degrees in the "
+                "mean, more than their deviation explains: check in which frame they were measured, or "
+                "leave them out."
+            )
+        missed = self.typical_miss / self.radius
+        if missed > DOUBTFUL_FIT + self.accuracy:
+            return "uncertain", (
+                f"Half of the contacts are off the patch by more than {100.0 * missed:.1f} % of the radius, "
+                "which their noise does not explain: take a shorter extent, or say how noisy they are."
+            )
+        return None
+
+    @property
+    def _doubt_about_heights(self) -> tuple[str, str] | None:
         share = self.mean_height_std / self.radius
         if share > DOUBTFUL_STD:
             return "uncertain", (
                 f"Heights are good to {100.0 * share:.1f} % of the radius in the mean: take a shorter "
                 "extent, or add sampling planes."
             )
-        return self._doubt_about_frame
+        return None
 
     @property
     def _doubt_about_frame(self) -> tuple[str, str] | None:

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from core import Contour, reconstruct, reconstruct_many
 from core.bayes import evidence, linear_system, posterior
 from core.bayes.measured_slopes import slope_equations
+from core.contradiction import contradiction
 from core.patch.monge import monomials
 
 PLANES = surfaces.planes((0, 60, 120))
@@ -184,6 +185,65 @@ def test_without_slopes_both_likelihoods_are_one():
     one, other = (linear_system.hyperparameters(s, data, weights, np.array([2e-3])) for s in (alone, empty))
     for a, b in zip(one, other, strict=True):
         assert b == pytest.approx(a, rel=1e-4)
+
+
+def tilted(surface, contours, degrees):
+    """The same with all normals turned about one axis, across the normal at the point."""
+    axis = np.cross(surface.normal, [0.48, -0.6, 0.64])
+    turn = Rotation.from_rotvec(np.radians(degrees) * axis / np.linalg.norm(axis)).as_matrix()
+    return [replace(c, normals=c.normals @ turn.T) for c in contours]
+
+
+def contradicts(r):
+    return "measured normals contradict the contacts" in r.message
+
+
+@pytest.mark.parametrize("std", [0.0, 0.02])
+def test_normals_in_another_frame_than_the_contacts_are_told(std):
+    for number, surface in enumerate(EXACT):
+        contours = measured(touched(surface, 0.02, number), std, number)
+        for degrees in (-5.0, 5.0):
+            r = surface.fit(tilted(surface, contours, degrees))
+            assert (r.status, contradicts(r)) == ("uncertain", True)
+            angle = float(r.message.split(" by ")[1].split(" degrees")[0])
+            assert angle == pytest.approx(5.0, rel=0.25)
+    assert "check in which frame they were measured, or leave them out" in r.message
+
+
+def test_mirrored_normals_are_told_though_they_are_right_in_the_mean():
+    surface = surfaces.sphere(35)
+    contours = touched(surface, 0.02)
+    axes = surface.fit(contours).frame.axes
+    mirror = np.eye(3) - 2.0 * np.outer(axes[:, 0], axes[:, 0])
+    assert contradicts(
+        surface.fit([replace(c, normals=c.normals @ mirror, normal_std=0.02) for c in contours])
+    )
+
+
+@pytest.mark.parametrize("std", [0.0, 0.02, 0.05])
+def test_right_normals_are_not_doubted(std):
+    for surface in EXACT:
+        for noise in (0.0, 0.1):
+            for seed in range(5):
+                assert not contradicts(surface.fit(measured(touched(surface, noise, seed), std, seed)))
+
+
+def test_normals_that_only_scatter_more_than_was_said_contradict_nothing():
+    """As those of a texture do."""
+    surface = surfaces.pear()
+    for seed in range(20):
+        contours = [replace(c, normal_std=0.02) for c in measured(touched(surface, 0.02), 0.1, seed)]
+        assert not contradicts(surface.fit(contours))
+
+
+def test_too_few_normals_contradict_nothing():
+    surface = surfaces.pear()
+    r = surface.fit(touched(surface, 0.02))
+    contacts = r.contacts / r.radius
+    for count, told in ((0, False), (2, False), (30, True)):
+        normals = np.tile([60.0, 0.0, 80.0], (count, 1))
+        deviations, angle = contradiction(contacts[:count], normals, r.posterior)
+        assert (deviations > 5.0, angle > 0.5) == (told, told)
 
 
 @pytest.mark.parametrize(
