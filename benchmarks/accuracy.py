@@ -238,7 +238,7 @@ BAYES, PROCESS, QUADRIC = next(iter(METHODS)), "Matérn 5/2 Gaussian process", "
 CUBIC, TAGC = (next(m for m in METHODS if m.startswith(name)) for name in ("RBF cubic", "TAGC"))
 if find_spec("sklearn") is None:
     del METHODS[PROCESS]
-SHAPE_METHODS = [method for method in (BAYES, TAGC, PROCESS) if method in METHODS]
+SHAPE_METHODS = [method for method in (BAYES, TAGC, PROCESS, CUBIC) if method in METHODS]
 
 
 def cramer_rao(case):
@@ -441,7 +441,9 @@ def random_table(scores):
         of = {m: [s[p][m] for s in scores for p in PLANES if planes in (p, "all")] for m in SHAPE_METHODS}
         errors = {m: np.array([s.error for s in of[m]]) for m in SHAPE_METHODS}
         mine = errors[BAYES]
-        ratios = [f"{mine.mean() / errors[m].mean():.2f}" if m in errors else "" for m in (TAGC, PROCESS)]
+        ratios = [
+            f"{mine.mean() / errors[m].mean():.2f}" if m in errors else "" for m in (TAGC, PROCESS, CUBIC)
+        ]
         rows.append([
             planes,
             f"{np.median(mine):.0f}",
@@ -451,7 +453,17 @@ def random_table(scores):
             *_interval(of[BAYES]),
         ])  # fmt: skip
     table(
-        ["planes", "median", "mean", "p99 / median", "mean / TAGC's", "mean / process's", "covered", "width"],
+        [
+            "planes",
+            "median",
+            "mean",
+            "p99 / median",
+            "mean / TAGC's",
+            "mean / process's",
+            "mean / cubic's",
+            "covered",
+            "width",
+        ],
         rows,
     )
 

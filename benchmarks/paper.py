@@ -360,7 +360,7 @@ def _distances_to_meshes(tested, kind):
     yield f"objects; at {SHORT:g} of these extents {_span(shorter)} times. They are {_span(to_bayes)} times"
     yield "those of bayes. **What does not repeat:** TAGC is at least as near as QV, to contacts and to"
     yield f"vertices, in {_nearer(PAPER_TABLE.values())} in the paper and in {_nearer(of.row for of in ours)}"
-    yield f"here; in {_nearer(of.alike for of in ours)} with TAGC's weight for QV, which is then far from f = 0."
+    yield f"here; in {_nearer(of.alike for of in ours)} with TAGC's weight for QV, far from f = 0."
     vertices = [row.vertices for row in PAPER_TABLE.values() if row.vertices]
     if kind == SCAN:
         yield f"Our scans are coarser, {_span([of.row.vertices for of in ours], '.0f')} vertices under a"

@@ -277,3 +277,14 @@ def test_normals_of_any_length_and_along_the_tangent_plane_leave_finite_numbers(
         r = surface.fit(odd)
         assert np.isfinite(r.patch.coefficients).all()
         assert np.isfinite(r.mean_height_std)
+
+
+def test_no_normal_is_taken_for_better_than_a_hundredth_of_a_radian():
+    rng = np.random.default_rng(5)
+    local, weights = rng.uniform(-0.8, 0.8, (1, 9, 3)), np.ones((1, 9))
+    normals = rng.normal([0.0, 0.0, 4.0], 1.0, (1, 9, 3))
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    best, limit, worse = (slope_equations(c * normals, local, weights) for c in (1e5, 100.0, 50.0))
+    for one, other, half in zip(best, limit, worse, strict=True):
+        assert one == pytest.approx(other, rel=1e-12)
+        assert half == pytest.approx(0.5 * other, rel=1e-12)
