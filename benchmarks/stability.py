@@ -328,10 +328,14 @@ UNTOLD = (
               lambda v: Setting(turn=0.0), partial(hidden, name))
         for name in LINES
     ),
-    Sweep("one curve turned by, degrees", (5, 15, 45, 90), (),
+    Sweep("one of three curves turned by, degrees", (5, 15, 45, 90), (),
           lambda v: Setting(change=partial(turned_curve, v)), upright),
-    Sweep("one curve upside down: no, yes", (0, 1), (),
+    Sweep("one of four curves turned by, degrees", (5, 15, 45, 90), (),
+          lambda v: Setting((0, 45, 90, 135), (0, 0, 0, 0), change=partial(turned_curve, v)), upright),
+    Sweep("upside down of three curves", (0, 1), (),
           lambda v: Setting(change=partial(upside_down, v)), upright),
+    Sweep("upside down of four curves", (0, 1), (),
+          lambda v: Setting((0, 45, 90, 135), (0, 0, 0, 0), change=partial(upside_down, v)), upright),
     Sweep("felt from end to end, late by, of the extent", LATE, (),
           lambda v: Setting(change=partial(late, v, False)), upright),
     Sweep("felt from the point outward, late by, of the extent", LATE, (),
