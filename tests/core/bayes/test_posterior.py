@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from core import Contour, SamplingPlane, reconstruct, suggest_plane, track
 from core.bayes import evidence, joint_fit, posterior
 from core.patch.monge import monomials
+from core.reconstruction import next_plane
 
 EXTENT = 12.0
 
@@ -342,3 +343,15 @@ def test_scatter_makes_contacts_outlying_beyond_five_of_its_deviations_by_the_me
     assert np.array_equal(
         joint_fit._student_weights(residuals, np.ones((1, 7), dtype=bool), np.full(1, 2e-3)), np.ones((1, 7))
     )
+
+
+def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
+    surface = surfaces.torus(40, 20, 0.6)
+    for azimuths in ((0, 60, 120), (0, 35, 80), (10, 20, 60)):
+        r = touched(surface, surfaces.planes(azimuths), noise=0.03)
+        points, weights = r.domain.nodes
+        lost = next_plane._lost(r, points / r.radius, next_plane.AZIMUTHS) @ weights
+        plane, _ = suggest_plane(r)
+        chosen = np.argmin(np.abs(next_plane.AZIMUTHS - plane.azimuth))
+        assert next_plane.AZIMUTHS[chosen] == pytest.approx(plane.azimuth)
+        assert lost[chosen] > 0.97 * lost.max()

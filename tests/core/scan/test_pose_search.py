@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 import surfaces
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, register
@@ -297,3 +297,14 @@ def test_poses_within_a_20th_of_the_radius_and_2_degrees_are_one():
 
     places = np.array([place(), place(0.04), place(0.06), place(0.0, 1.9), place(0.0, 2.1)])
     assert pose_search._distinct(places, np.arange(5.0)) == [0, 2, 4]
+
+
+def test_places_that_are_tried_are_a_fifth_of_the_radius_apart_and_leave_no_gap():
+    _, vertices, faces = bumpy()
+    mesh = scanned_mesh.mesh_of(vertices / 10.0, faces, 2.0)
+    places, _ = pose_search._fields(mesh, 1.0)
+    origins = places[..., 3]
+    tree = cKDTree(origins)
+    assert tree.query(origins, 2)[0][:, 1].min() >= 0.2
+    assert tree.query(mesh.centers)[0].max() < 0.2 + 2.0 * pose_search.SPACING
+    assert np.abs(places[..., :3].swapaxes(1, 2) @ places[..., :3] - np.eye(3)).max() < 1e-12
