@@ -355,3 +355,18 @@ def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
         chosen = np.argmin(np.abs(next_plane.AZIMUTHS - plane.azimuth))
         assert next_plane.AZIMUTHS[chosen] == pytest.approx(plane.azimuth)
         assert lost[chosen] > 0.97 * lost.max()
+
+
+@pytest.mark.parametrize("planes", [THREE, surfaces.planes((0, 25, 70))], ids=["even", "uneven"])
+def test_deviations_of_curvatures_are_those_of_surfaces_drawn_from_the_posterior(planes):
+    """H = b_20 + b_02, k1 = 2 b_20, k2 = 2 b_02; K = k1 k2 / radius^2, its product's variance included."""
+    r = touched(surfaces.torus(40, 20, 0.6), planes, noise=0.3)
+    drawn = np.random.default_rng(8).multivariate_normal(r.posterior.mean, r.posterior.covariance, 200_000)
+    k1, k2 = 2.0 * drawn[:, 2] / r.radius, 2.0 * drawn[:, 4] / r.radius
+    for found, values in (
+        (r.k1_std, k1),
+        (r.k2_std, k2),
+        (r.mean_curvature_std, (k1 + k2) / 2.0),
+        (r.gaussian_curvature_std, k1 * k2),
+    ):
+        assert found == pytest.approx(np.std(values), rel=0.01)
