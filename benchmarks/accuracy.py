@@ -8,6 +8,9 @@ is left out where it is missing. Prints Markdown tables:
 (a) eleven exact surfaces of the paper's size, three plane sets, three noise levels, 75 contacts;
 (b) random smooth closed shapes, a third of them touched at a hyperbolic point, six plane sets.
 
+The constants of the default's prior, as the settings of the peers, were chosen on (a); (b) is independent of
+that choice. `--choose` prints what the peers' settings were chosen by.
+
 The error is the mean |dz| over some 300 points of the true surface above the domain, each method in the
 frame it found itself (the peers in the paper's). Lengths are in mm, errors in micrometers.
 """
@@ -29,7 +32,7 @@ from core.patch.monge import exponents, monomials
 from tests import surfaces
 
 from . import machine, table
-from .peers import Fit, gaussian_process, jet, radial_basis
+from .peers import Fit, gaussian_process, jet, quadric_process, radial_basis
 
 # Surfaces and extents of their half curves. The sizes are such that the peers' errors come out like those
 # measured on other surfaces when this fit was planned, so that these are as hard.
@@ -207,24 +210,35 @@ def ours(case, **options):
     return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
 
+# Of what `--choose` tries the best in the mean of all.
+SPLINES = {
+    "RBF thin plate": {"kernel": "thin_plate_spline", "degree": 2, "smoothing": 0.1},
+    "RBF cubic": {"kernel": "cubic", "degree": 2, "smoothing": 0.03},
+}
+
+
+def settings(options):
+    return f"degree {options['degree']}, smoothing {options['smoothing']:g}"
+
+
 METHODS = {
     "Bayes, degree 4 (default)": ours,
     "Bayes, degree 6": partial(ours, degree=6),
     "Bayes, degree auto": partial(ours, degree="auto"),
     "Matérn 5/2 Gaussian process": gaussian_process,
-    "RBF thin plate": partial(radial_basis, kernel="thin_plate_spline"),
-    "RBF cubic": partial(radial_basis, kernel="cubic"),
-    "quadratic variation": partial(ours, method="quadratic-variation", weight=1e5),
-    "TAGC": partial(ours, method="tagc"),
+    **{f"{name}, {settings(options)}": partial(radial_basis, **options) for name, options in SPLINES.items()},
+    "quadratic variation, weight 1e5": partial(ours, method="quadratic-variation"),
+    "TAGC, weight 1e3": partial(ours, method="tagc"),
     "least squares": partial(ours, method="least-squares"),
     "quadric alone": partial(ours, method="least-squares", degree=2),
     "jet of degree 3": partial(jet, degree=3),
     "jet of degree 4": partial(jet, degree=4),
 }
-BAYES, PROCESS, TAGC, QUADRIC = next(iter(METHODS)), "Matérn 5/2 Gaussian process", "TAGC", "quadric alone"
+BAYES, PROCESS, QUADRIC = next(iter(METHODS)), "Matérn 5/2 Gaussian process", "quadric alone"
+CUBIC, TAGC = (next(m for m in METHODS if m.startswith(name)) for name in ("RBF cubic", "TAGC"))
 if find_spec("sklearn") is None:
     del METHODS[PROCESS]
-SHAPE_METHODS = [method for method in (BAYES, TAGC, PROCESS) if method in METHODS]
+SHAPE_METHODS = [method for method in (BAYES, TAGC, PROCESS, CUBIC) if method in METHODS]
 
 
 def cramer_rao(case):
@@ -363,6 +377,36 @@ def frame_table(scores):
     table(head, [*rows, ["Cramér-Rao bound, degree 4", *bound, "", "", ""]])
 
 
+CHOICES = {
+    **{
+        f"RBF {kernel}, degree {degree}, smoothing {s:g}": partial(
+            radial_basis, kernel=kernel, degree=degree, smoothing=s
+        )
+        for kernel, degree in (("thin_plate_spline", 1), ("thin_plate_spline", 2), ("cubic", 1), ("cubic", 2))
+        for s in (0.0, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0)
+    },
+    "Matérn process of the heights": gaussian_process,
+    "Matérn process of what a quadric leaves": quadric_process,
+}
+
+
+def choice_scores(key):
+    name, planes, noise, seed = key
+    case = exact_case(name, planes, noise, 1000 * seed + list(SURFACES).index(name))
+    return {m: score(fit(case), case) for m, fit in CHOICES.items()}
+
+
+def choice_table(scores):
+    """What the peers' settings were chosen by."""
+    print("Peers by their settings, as in (a); smoothing is scipy's, in unit radius.\n")
+    rows = []
+    for method in CHOICES:
+        cells = [[s[method].error for k, s in scores.items() if k[1:3] == cell] for cell in CELLS]
+        medians = [f"{median_score(scores, 'error', method, *cell):.0f}" for cell in CELLS]
+        rows.append([method, *medians, f"{np.mean([np.mean(cell) for cell in cells]):.1f}"])
+    table(["method", *(f"{p}, {n:g}" for p, n in CELLS), "mean"], rows)
+
+
 def interval_table(scores):
     print("90 % intervals of the default's height_std: share of the hold-out within, and median of mean")
     print("height_std over mean |dz|.\n")
@@ -377,7 +421,7 @@ def surface_table(scores):
     """Where each method fails: medians are silent about it."""
     print("Errors by surface in um, the median over seeds: planes 0/60/120 with 0.02 mm of noise, and the")
     print("tilted ones with none.\n")
-    methods = [m for m in (BAYES, PROCESS, "RBF cubic", TAGC, QUADRIC) if m in METHODS]
+    methods = [m for m in (BAYES, PROCESS, CUBIC, TAGC, QUADRIC) if m in METHODS]
     cells = ((EXACT_PLANES[0], 0.02), (EXACT_PLANES[2], 0.0))
     rows = []
     for name in SURFACES:
@@ -397,7 +441,9 @@ def random_table(scores):
         of = {m: [s[p][m] for s in scores for p in PLANES if planes in (p, "all")] for m in SHAPE_METHODS}
         errors = {m: np.array([s.error for s in of[m]]) for m in SHAPE_METHODS}
         mine = errors[BAYES]
-        ratios = [f"{mine.mean() / errors[m].mean():.2f}" if m in errors else "" for m in (TAGC, PROCESS)]
+        ratios = [
+            f"{mine.mean() / errors[m].mean():.2f}" if m in errors else "" for m in (TAGC, PROCESS, CUBIC)
+        ]
         rows.append([
             planes,
             f"{np.median(mine):.0f}",
@@ -407,7 +453,17 @@ def random_table(scores):
             *_interval(of[BAYES]),
         ])  # fmt: skip
     table(
-        ["planes", "median", "mean", "p99 / median", "mean / TAGC's", "mean / process's", "covered", "width"],
+        [
+            "planes",
+            "median",
+            "mean",
+            "p99 / median",
+            "mean / TAGC's",
+            "mean / process's",
+            "mean / cubic's",
+            "covered",
+            "width",
+        ],
         rows,
     )
 
@@ -416,6 +472,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10, help="of the noise on exact surfaces (%(default)s)")
     parser.add_argument("--shapes", type=int, default=300, help="random ones (%(default)s)")
+    parser.add_argument("--choose", action="store_true", help="the peers by their settings, and nothing else")
     options = parser.parse_args()
     keys = [
         (name, planes, noise, seed)
@@ -424,6 +481,10 @@ def main():
         for noise in NOISES
         for seed in range(options.seeds if noise else 1)
     ]
+    if options.choose:
+        with ProcessPoolExecutor() as pool:
+            choice_table(dict(zip(keys, pool.map(choice_scores, keys, chunksize=8), strict=True)))
+        return
     times = milliseconds()
     with ProcessPoolExecutor() as pool:
         exact = dict(zip(keys, pool.map(exact_scores, keys, chunksize=8), strict=True))

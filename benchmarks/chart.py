@@ -93,8 +93,9 @@ METHODS = [
     *_powers("QV", "quadratic-variation", (1e3, 1e5), "quadratic variation, weight"),
     _paper("LS", "least squares, degree 4", "least-squares"),
     _paper("quadric", "frame and curvatures alone", "least-squares", degree=2),
-    _peer("RBF tp", INTERPOLATION, "scipy, thin plate", peers.radial_basis, kernel="thin_plate_spline"),
-    _peer("RBF cubic", INTERPOLATION, "scipy", peers.radial_basis, kernel="cubic"),
+    *(_peer(label, INTERPOLATION, f"scipy, {name[4:]}, {accuracy.settings(accuracy.SPLINES[name])}",
+            peers.radial_basis, **accuracy.SPLINES[name])
+      for label, name in (("RBF tp", "RBF thin plate"), ("RBF cubic", "RBF cubic"))),
     _peer("MLS", INTERPOLATION, "moving least squares, quadrics", peers.moving_least_squares),
     *(_peer(f"jet {d}", INTERPOLATION, "one free polynomial, degree", peers.jet, degree=d) for d in (3, 4)),
     _peer("GP Matérn", PROCESSES, "scikit-learn, nu = 5/2", peers.gaussian_process, "sklearn"),

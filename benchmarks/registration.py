@@ -11,7 +11,8 @@ The exhaustive search puts the reference point on every vertex, aligns the tange
 in steps of 10 degrees (their ends then move by no more than the scans' vertices are apart) and measures to
 the planes of the nearest vertices; its best poses are refined as those of core.register are. It is the judge
 of what is ambiguous too: where a pose of its own that is not right has less than 1.5 times the residual of
-the true one.
+the true one. It takes an hour, nearly all of it for the exhaustive search, twenty seconds
+a case and two minutes on the femur; `--cases 2` takes six minutes.
 """
 
 import argparse
@@ -148,6 +149,7 @@ def main():
     options = parser.parse_args()
     if not SCANS_FOLDER.is_dir():
         sys.exit(f"registration: there are no scans in {SCANS_FOLDER}")
+    print("This takes about three minutes for each case of --cases.", file=sys.stderr)
     rows = [_row(name, options) for name in SCANS]
     head = (
         "scan, vertices|cases|right|s|slowest, s|exhaustive: right|s|better|ambiguous|right|exhaustive: right"

@@ -22,7 +22,12 @@ from tools import blender
 
 from . import SCANS_FOLDER, machine, table
 
-METHODS = ("bayes", "tagc", "quadratic-variation", "least-squares")
+METHODS = {  # and how they are called: each at its default
+    "bayes": "bayes",
+    "tagc": "tagc, weight 1e3",
+    "quadratic-variation": "quadratic-variation, weight 1e5",
+    "least-squares": "least-squares",
+}
 AZIMUTHS = (0.0, 60.0, 120.0)
 RUNS = 7
 LEAST_VERTICES = 20  # over a patch, for its mean distance to count
@@ -102,7 +107,7 @@ def _rows(extension, scan, data):
         report = reports[0]
         yield [
             scan.title,
-            method,
+            METHODS[method],
             f"{report['contacts']}",
             f"{scan.scale * report['fit_error']:.4f}",
             f"{report['vertices']}",

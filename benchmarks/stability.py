@@ -11,6 +11,9 @@ build/charts/stability.png, the sheet of all sweeps, and stability.csv. A warnin
 
 of the cases where all is harmless and none is due, 5 % at most are to be warned of; and the uncertainty
 stated is not to be blown up: the median of mean height_std over mean |dz| is to be 2 at most. In mm.
+
+A last table is of what no contact can tell, whatever the method, and of measured normals that are turned:
+how often a warning was due, and how often the default gave one.
 """
 
 import argparse
@@ -29,7 +32,7 @@ from .accuracy import SURFACES, TURN, above, darboux, table
 
 SEEDS = 3
 TOO_FAR, TURNED, UMBILIC, SMALL = 3.0, 10.0, 0.05, 0.01  # of the rule
-NOISE = 0.05
+NOISE, NORMAL_STD = 0.05, 0.02  # mm, radians
 STEPS = 12  # of a half curve
 HOLD_OUT = 100
 SADDLE = "monkey saddle"  # of which planes at its lines see nothing: a sweep of its own
@@ -47,6 +50,7 @@ class Setting(NamedTuple):
     wrap: Callable | None = None  # of the surface to touch: (surface, axes, extent) -> surface
     scale: float = 1.0
     offset: float = 0.0  # of all coordinates, in extents, which are then of single precision
+    normals: float | None = None  # degrees that measured normals are turned by, said to be good to NORMAL_STD
 
 
 class Sweep(NamedTuple):
@@ -101,11 +105,25 @@ def touch(surface, extent, setting, seed):
         points = setting.change(points, surface.point, extent, rng)
     shift = setting.offset * extent * np.array([0.6, -0.48, 0.64])
     dtype = np.float32 if setting.offset else float
+    measured = setting.normals is not None
     moved = [
-        Contour((setting.scale * p + shift).astype(dtype), noise=setting.scale * c.noise)
+        Contour(
+            (setting.scale * p + shift).astype(dtype),
+            noise=setting.scale * c.noise,
+            normals=_measured_normals(c, axes, setting.normals, rng) if measured else None,
+            normal_std=NORMAL_STD if measured else None,
+        )
         for p, c in zip(points, contours, strict=True)
     ]
     return (setting.scale * surface.point + shift).astype(dtype), axes[:, 2], moved
+
+
+def _measured_normals(contour, axes, degrees, rng):
+    """Those of a contour, scattered, and turned about d1."""
+    angle = np.radians(degrees)
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    found = contour.normals + rng.normal(0.0, NORMAL_STD, contour.normals.shape)
+    return found @ axes @ turn.T @ axes.T
 
 
 def outcome(surface, setting, point, outward, contours, method):
@@ -155,6 +173,31 @@ def apart(distance, curves, point, extent, rng):
     shifts = rng.normal(size=(len(curves), 3))
     shifts *= distance / np.linalg.norm(shifts, axis=1, keepdims=True)
     return [curve + shift for curve, shift in zip(curves, shifts, strict=True)]
+
+
+def turned_curve(degrees, curves, point, extent, rng):
+    """The first curve turned about the normal, as if the plane's azimuth had been noted wrongly."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return [point + (curves[0] - point) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), *curves[1:]]
+
+
+def upside_down(which, curves, point, extent, rng):
+    """The first curve with its heights negated."""
+    return [point + (curves[0] - point) * [1.0, 1.0, -1.0 if which else 1.0], *curves[1:]]
+
+
+def late(distance, outward, curves, point, extent, rng):
+    """Contacts noted where the finger has got to: felt from end to end, or from the point outward."""
+    found = []
+    for curve in curves:
+        run = (curve[-1] - curve[0]) / np.linalg.norm(curve[-1] - curve[0])
+        ahead = np.sign((curve - point) @ run)[:, None] if outward else 1.0
+        found.append(
+            np.where(
+                (curve != point).any(axis=1, keepdims=True), curve + distance * extent * ahead * run, curve
+            )
+        )
+    return found
 
 
 class Facets:
@@ -236,6 +279,73 @@ SWEEPS = (
 )  # fmt: skip
 
 
+# Upright, all at the origin: what these do to curves is done in the axes of the world.
+BENT = {"quadric": (-0.04, -0.01), "saddle": (-0.04, 0.02)}
+LINES = {  # r^n sin(n theta), zero along planes at 0, 60 and 120 degrees
+    "sin 3 theta": {(2, 1): 3, (0, 3): -1},
+    "sin 6 theta": {(5, 1): 6, (3, 3): -20, (1, 5): 6},
+    "sin 9 theta": {(8, 1): 9, (6, 3): -84, (4, 5): 126, (2, 7): -36, (0, 9): 1},
+}
+
+
+def hidden(name, share):
+    """Quadrics with something beside them: a share of the radius at the rim, and zero along the curves."""
+    order = max(map(sum, LINES[name]))
+    beside = {ij: share * c / 13.0 ** (order - 1) for ij, c in LINES[name].items()}
+    bent = {n: {(2, 0): k1 / 2.0, (0, 2): k2 / 2.0} for n, (k1, k2) in BENT.items()}
+    return {n: (surfaces.graph({**terms, **beside}), 13.0) for n, terms in bent.items()}
+
+
+def upright(value):
+    return {f"{n} {kind}": s for n, k in BENT.items() for kind, s in graphs(*k).items()}
+
+
+def waves(length):
+    """Quadrics with waves of this length beside them, in mm, along and across."""
+    found = {}
+    for name, (k1, k2) in BENT.items():
+        for height in (0.1, 0.3):
+            p, q = 2.0 * np.pi / length * np.array([0.8, 0.6])
+            found[f"{name} {height:g}"] = (_waves(k1, k2, height, p, q), 12.0)
+    return found
+
+
+def _waves(k1, k2, height, p, q):
+    def level(x, y, z):
+        return z - (k1 * x * x + k2 * y * y) / 2.0 - height * (np.cos(p * x + q * y) - 1.0)
+
+    def gradient(r):
+        steep = height * np.sin(p * r[0] + q * r[1])
+        return np.array([-k1 * r[0] + p * steep, -k2 * r[1] + q * steep, 1.0])
+
+    return surfaces.Exact(level, gradient, np.zeros(3), k1, k2)
+
+
+LATE = (0.01, 0.02, 0.05, 0.1)
+UNTOLD = (
+    *(
+        Sweep(f"{name} beside, of the radius at the rim", (0.005, 0.02, 0.05), (),
+              lambda v: Setting(turn=0.0), partial(hidden, name))
+        for name in LINES
+    ),
+    Sweep("one of three curves turned by, degrees", (5, 15, 45, 90), (),
+          lambda v: Setting(change=partial(turned_curve, v)), upright),
+    Sweep("one of four curves turned by, degrees", (5, 15, 45, 90), (),
+          lambda v: Setting((0, 45, 90, 135), (0, 0, 0, 0), change=partial(turned_curve, v)), upright),
+    Sweep("upside down of three curves", (0, 1), (),
+          lambda v: Setting(change=partial(upside_down, v)), upright),
+    Sweep("upside down of four curves", (0, 1), (),
+          lambda v: Setting((0, 45, 90, 135), (0, 0, 0, 0), change=partial(upside_down, v)), upright),
+    Sweep("felt from end to end, late by, of the extent", LATE, (),
+          lambda v: Setting(change=partial(late, v, False)), upright),
+    Sweep("felt from the point outward, late by, of the extent", LATE, (),
+          lambda v: Setting(change=partial(late, v, True)), upright),
+    Sweep("waves of, mm, touched each mm", (3, 5, 6, 8, 10, 12), (), lambda v: Setting(), waves),
+    Sweep("measured normals turned by, degrees", (0, 1, 2, 5), (), lambda v: Setting(normals=v)),
+)  # fmt: skip
+ALL = SWEEPS + UNTOLD
+
+
 class Key(NamedTuple):
     """A touch: the number of the sweep, its value, the surface and the seed."""
 
@@ -246,12 +356,12 @@ class Key(NamedTuple):
 
     @property
     def is_benign(self):
-        return self.value in SWEEPS[self.sweep].benign
+        return self.value in ALL[self.sweep].benign
 
 
 def outcomes(key):
     """{method: Outcome} of a touch."""
-    sweep = SWEEPS[key.sweep]
+    sweep = ALL[key.sweep]
     setting, (surface, extent) = sweep.setting(key.value), sweep.surfaces(key.value)[key.surface]
     try:
         touched = touch(surface, extent, setting, [key.seed, *map(ord, key.surface)])
@@ -311,6 +421,25 @@ def rule_table(results):
                     f"error {100 * f.error:.2f} %, stated {100 * f.std:.2f} %, turned {f.turn:.0f} degrees"
                 )
     print()
+
+
+def untold_table(results):
+    print("What no contact can tell, and normals that contradict them; of the default, medians in % of L.\n")
+    rows = []
+    for number, sweep in enumerate(UNTOLD, len(SWEEPS)):
+        for value in sweep.values:
+            of = [f["bayes"] for key, f in results.items() if (key.sweep, key.value) == (number, value)]
+            made = [f for f in of if f.status != "refused"] or [Outcome("refused")]
+            rows.append([
+                sweep.title,
+                f"{value:g}",
+                f"{len(of)}",
+                f"{sum(f.is_due for f in of)}",
+                f"{sum(map(is_quiet, of))}",
+                f"{sum(f.status != 'ok' for f in of)}",
+                *(f"{100.0 * np.median([getattr(f, what) for f in made]):.2f}" for what in ("error", "std")),
+            ])  # fmt: skip
+    table(["beside", "value", "cases", "due", "due, not given", "told", "error", "stated"], rows)
 
 
 HEAD = [
@@ -438,20 +567,27 @@ def key(axes):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of the noise (%(default)s)")
-    seeds = parser.parse_args().seeds
+    parser.add_argument("--untold", action="store_true", help="the last table alone")
+    options = parser.parse_args()
     keys = [
         Key(number, value, surface, seed)
-        for number, sweep in enumerate(SWEEPS)
+        for number, sweep in enumerate(ALL)
+        if number >= len(SWEEPS) or not options.untold
         for value in sweep.values
         for surface in sweep.surfaces(value)
-        for seed in range(seeds)
+        for seed in range(options.seeds)
     ]
     with ProcessPoolExecutor() as pool:
-        results = dict(zip(keys, pool.map(outcomes, keys, chunksize=8), strict=True))
+        found = dict(zip(keys, pool.map(outcomes, keys, chunksize=8), strict=True))
+    results = {key: of for key, of in found.items() if key.sweep < len(SWEEPS)}
+    untold_table(found)
+    if options.untold:
+        return
     rule_table(results)
     caption = (
-        f"Medians over ten exact surfaces (quadrics and quartics near the special points) and {seeds} seeds. "
-        f"What is not said is harmless: planes 60 degrees apart, {STEPS} steps to a side, noise of {NOISE:g} "
+        "Medians over ten exact surfaces (quadrics and quartics near the special points) and "
+        f"{options.seeds} seeds. What is not said is harmless: planes 60 degrees apart, {STEPS} steps to a "
+        f"side, noise of {NOISE:g} "
         "mm, radii L of 12 to 15 mm. Error: mean |dz| over the domain. Below it the condition number, and "
         f"the share of the touches that were warned of or refused. On {machine('numpy', 'scipy', 'bpy')}."
     )

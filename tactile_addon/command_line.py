@@ -120,7 +120,7 @@ def _add_method(add):
     add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (bayes)")
     help = "of the polynomial (auto: the least that says what the contacts show)"
     add("--degree", type=str.strip, choices=["auto", *"23456"], help=help)
-    add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000)")
+    add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000, 1e5)")
     add("--solver", choices=[name for name, _, _ in SOLVERS], help="of tagc (fast)")
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
     help = "save the scene with the result, .blend; the result alone as .ply; a patch also as .json"

@@ -4,7 +4,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -111,6 +111,19 @@ class Contour:
         normals = None if self.normals is None else self.normals[which]
         vars(found).update(vars(self), points=self.points[which], normals=normals, stops=stops)
         return found
+
+    def moved(self, scale: float, turn: Array, start: Array, end: Array) -> "Contour":
+        """The contour after a similarity of the world that takes the point `start` to `end`, (3,).
+
+        One of its points stays one of its points, whatever its coordinates.
+        """
+        return replace(
+            self,
+            points=end + scale * (self.points - start) @ turn.T,
+            plane_normal=None if self.plane_normal is None else turn @ self.plane_normal,
+            normals=None if self.normals is None else self.normals @ turn.T,
+            noise=None if self.noise is None else scale * self.noise,
+        )
 
 
 def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:

@@ -18,7 +18,8 @@ from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
 from ..contours.contour import EXTENT, UNEXPLAINED, Contour
 from ..contours.local_geometry import DegenerateCurvesError
-from ..reconstruction.result import DOUBTFUL_STD, Reconstruction
+from ..reconstruction.result import Reconstruction
+from ..reconstruction.status import DOUBTFUL_STD
 
 CONTACTS = (12, 24, 48)  # Numbers of contacts of the longest half curve: the first that is enough is taken.
 LEAST = 4  # contacts of the shortest half curve

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Total absolute Gaussian curvature against the contacts: the objective (9) and two ways down it (IV-B)."""
+"""Total absolute Gaussian curvature against the contacts: the objective (9) and two ways down it (IV-B).
+
+lambda stays as it is given: the paper updates it from step to step, but does not say how, and its text takes
+the gradient of f + lambda g where (9) is g + lambda f.
+"""
 
 from typing import NamedTuple
 

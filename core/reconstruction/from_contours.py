@@ -45,7 +45,9 @@ from ..patch.residual import Residual
 from .result import Reconstruction
 
 METHODS = ("bayes", *PAPER_METHODS)
-DEFAULT_WEIGHT = 1000.0  # lambda L^2: the paper's 9.99/mm^2 at L = 10 mm
+# lambda L^2: of TAGC the paper's 9.99/mm^2 at L = 10 mm; quadratic variation in the paper is subject to
+# f = 0, which 1e5 comes near.
+WEIGHTS = {"tagc": 1e3, "quadratic-variation": 1e5}
 COARSE = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
 STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache
 
@@ -68,7 +70,7 @@ def reconstruct(
         "least-squares" (5)
     degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
     noise : accuracy of a contact; noise is taken for no less. None: the contours' own
-    weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000
+    weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000 and 1e5
     solver : of "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
@@ -159,7 +161,7 @@ def _options(
         method,
         None if isinstance(degree, str) else int(degree),
         None if noise is None else number("noise", noise, least=0.0),
-        DEFAULT_WEIGHT if weight is None else number("weight", weight, above=0.0),
+        WEIGHTS.get(method, 1.0) if weight is None else number("weight", weight, above=0.0),
         solver,
     )
 

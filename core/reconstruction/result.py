@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
+from ..bayes.contradiction import contradiction, measured_normals
 from ..bayes.joint_fit import posterior_of
 from ..bayes.posterior import FREE, Posterior, terms_to
 from ..contours.contour import Contour
@@ -20,15 +21,8 @@ from ..patch.domain import Domain
 from ..patch.geometry import Geometry, fit_error, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.residual import Residual
+from .status import doubt
 
-DOUBTFUL_STD = 0.02  # Share of the radius that the height may deviate in the mean over the domain.
-DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise this many times larger.
-DOUBTFUL_TURN = math.radians(10.0)  # Angle that the frame may be off.
-LIKELY = 0.5  # that it is off by less, of a rough surface: its directions are others at each scale
-DOUBTFUL_CURVATURE = 0.1  # of 1 / radius; as well is it known along a curve that ends at a quarter of it
-DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point,
-SIGNIFICANT = 5.0  # standard deviations of it,
-LEAST_SCATTER = 0.3  # Share of a contact's accuracy: few contacts may happen to scatter less.
 MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at most.
 
 
@@ -171,6 +165,12 @@ class Reconstruction:
         """(6), the mean of |dz| over the contacts."""
         return fit_error(self.geometry, self.contacts)
 
+    @property
+    def typical_miss(self) -> float:
+        """The median of |dz| over the contacts, which outlying ones do not change."""
+        x, y, z = self.contacts.T
+        return float(np.median(np.abs(self.height(x, y) - z)))
+
     @cached_property
     def total_absolute_curvature(self) -> float:
         """(8), the integral of |K| over the patch."""
@@ -189,25 +189,12 @@ class Reconstruction:
         """
         scale, turn, _ = similarity(matrix)
         geometry = self.geometry.moved(matrix)
-        # From the reference point, which so stays a point of its curves whatever its coordinates.
         start, end = self.frame.origin, geometry.frame.origin
-
-        def placed(contour: Contour) -> Contour:
-            """The contour after the similarity, normals and noise included."""
-            plane, normals, noise = contour.plane_normal, contour.normals, contour.noise
-            return replace(
-                contour,
-                points=end + scale * (contour.points - start) @ turn.T,
-                plane_normal=None if plane is None else turn @ plane,
-                normals=None if normals is None else normals @ turn.T,
-                noise=None if noise is None else scale * noise,
-            )
-
         return replace(
             self,
             geometry=geometry,
             patch=self.patch.scaled(scale),
-            contours=tuple(map(placed, self.contours)),
+            contours=tuple(contour.moved(scale, turn, start, end) for contour in self.contours),
             misses=scale * self.misses,
             known_height_std=None,
         )
@@ -229,48 +216,14 @@ class Reconstruction:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
-        return self._doubt or ("ok", "The patch describes its contacts.")
+        return doubt(self) or ("ok", "The patch describes its contacts.")
 
-    @property
-    def _doubt(self) -> tuple[str, str] | None:
-        if not self.converged:
-            return "not_converged", (
-                "The minimization stopped at its step limit, the patch is its best so far: use the fast "
-                "solver, or a smaller weight."
-            )
-        if self.method == "least-squares" and self.condition_number > DOUBTFUL_CONDITION:
-            return "uncertain", (
-                "The contacts alone do not determine the surface between the curves (condition number "
-                f"{self.condition_number:.1e}): take another method, or add sampling planes."
-            )
-        share = self.mean_height_std / self.radius
-        if share > DOUBTFUL_STD:
-            return "uncertain", (
-                f"Heights are good to {100.0 * share:.1f} % of the radius in the mean: take a shorter "
-                "extent, or add sampling planes."
-            )
-        return self._doubt_about_frame
-
-    @property
-    def _doubt_about_frame(self) -> tuple[str, str] | None:
-        distances, stds = self.misses.T / self.radius
-        stds = np.maximum(stds, LEAST_SCATTER * self.accuracy)
-        apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))
-        if len(apart):
-            return "uncertain", (
-                f"Curve {apart[0] + 1} passes the reference point at {self.radius * distances[apart[0]]:.3g}"
-                ", more than its scatter explains: set the point where the curves meet."
-            )
-        turn = self.posterior.turn() if self.residual is None else self.posterior.turn(LIKELY)
-        if turn > DOUBTFUL_TURN:
-            return "uncertain", (
-                f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
-                "extent, or add sampling planes."
-            )
-        std = self.posterior.curvature_std()
-        if std > DOUBTFUL_CURVATURE:
-            return "uncertain", (
-                f"Curvatures are good to {std / self.radius:.2g} in the direction known least: take a longer "
-                "extent, or add sampling planes."
-            )
-        return None
+    @cached_property
+    def contradiction(self) -> tuple[float, float]:
+        """By how many deviations, and by what angle in radians, fitted normals contradict the contacts."""
+        contacts, normals = measured_normals(self.contours, self.frame, self.radius)
+        if self.joint_posterior is None or not len(normals):
+            return 0.0, 0.0
+        k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
+        alone = posterior_of(k1, k2, self.contacts / self.radius, self.accuracy)
+        return contradiction(contacts, normals, alone)

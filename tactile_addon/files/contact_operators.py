@@ -104,7 +104,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
                 normal_std=self.normal_std,
                 method=self.method,
                 degree=self.degree or "auto",
-                weight=self.weight,
+                weight=self.weight or None,
                 solver=self.solver,
             )
         except (OSError, ValueError) as error:

@@ -75,9 +75,10 @@ class FitSettings:
     )
     weight: FloatProperty(
         name="Weight",
-        description="Of the contacts against the smoothness, in the two fits by curvature",
-        default=1000.0,
-        soft_min=1.0,
+        description="Of the contacts against the smoothness, in the two fits by curvature; 0 for what suits "
+        "each of them",
+        default=0.0,
+        soft_min=0.0,
         soft_max=1e5,
         update=changed,
         override=OVERRIDABLE,
@@ -168,7 +169,8 @@ def touch_arguments(settings):
         "planes": [core.SamplingPlane(*pair) for pair in pairs],
         "degree": settings.degree or "auto",
         **{name: getattr(settings, name) for name in ("extent", "step", "noise", "seed")},
-        **{name: getattr(settings, name) for name in ("method", "weight", "solver")},
+        "weight": settings.weight or None,
+        **{name: getattr(settings, name) for name in ("method", "solver")},
     }
 
 

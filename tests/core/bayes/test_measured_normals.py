@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, reconstruct_many
 from core.bayes import evidence, linear_system, posterior
+from core.bayes.contradiction import contradiction
 from core.bayes.measured_slopes import slope_equations
 from core.patch.monge import monomials
 
@@ -186,6 +187,65 @@ def test_without_slopes_both_likelihoods_are_one():
         assert b == pytest.approx(a, rel=1e-4)
 
 
+def tilted(surface, contours, degrees):
+    """The same with all normals turned about one axis, across the normal at the point."""
+    axis = np.cross(surface.normal, [0.48, -0.6, 0.64])
+    turn = Rotation.from_rotvec(np.radians(degrees) * axis / np.linalg.norm(axis)).as_matrix()
+    return [replace(c, normals=c.normals @ turn.T) for c in contours]
+
+
+def contradicts(r):
+    return "measured normals contradict the contacts" in r.message
+
+
+@pytest.mark.parametrize("std", [0.0, 0.02])
+def test_normals_in_another_frame_than_the_contacts_are_told(std):
+    for number, surface in enumerate(EXACT):
+        contours = measured(touched(surface, 0.02, number), std, number)
+        for degrees in (-5.0, 5.0):
+            r = surface.fit(tilted(surface, contours, degrees))
+            assert (r.status, contradicts(r)) == ("uncertain", True)
+            angle = float(r.message.split(" by ")[1].split(" degrees")[0])
+            assert angle == pytest.approx(5.0, rel=0.25)
+    assert "check in which frame they were measured, or leave them out" in r.message
+
+
+def test_mirrored_normals_are_told_though_they_are_right_in_the_mean():
+    surface = surfaces.sphere(35)
+    contours = touched(surface, 0.02)
+    axes = surface.fit(contours).frame.axes
+    mirror = np.eye(3) - 2.0 * np.outer(axes[:, 0], axes[:, 0])
+    assert contradicts(
+        surface.fit([replace(c, normals=c.normals @ mirror, normal_std=0.02) for c in contours])
+    )
+
+
+@pytest.mark.parametrize("std", [0.0, 0.02, 0.05])
+def test_right_normals_are_not_doubted(std):
+    for surface in EXACT:
+        for noise in (0.0, 0.1):
+            for seed in range(5):
+                assert not contradicts(surface.fit(measured(touched(surface, noise, seed), std, seed)))
+
+
+def test_normals_that_only_scatter_more_than_was_said_contradict_nothing():
+    """As those of a texture do."""
+    surface = surfaces.pear()
+    for seed in range(20):
+        contours = [replace(c, normal_std=0.02) for c in measured(touched(surface, 0.02), 0.1, seed)]
+        assert not contradicts(surface.fit(contours))
+
+
+def test_too_few_normals_contradict_nothing():
+    surface = surfaces.pear()
+    r = surface.fit(touched(surface, 0.02))
+    contacts = r.contacts / r.radius
+    for count, told in ((0, False), (2, False), (30, True)):
+        normals = np.tile([60.0, 0.0, 80.0], (count, 1))
+        deviations, angle = contradiction(contacts[:count], normals, r.posterior)
+        assert (deviations > 5.0, angle > 0.5) == (told, told)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -217,3 +277,14 @@ def test_normals_of_any_length_and_along_the_tangent_plane_leave_finite_numbers(
         r = surface.fit(odd)
         assert np.isfinite(r.patch.coefficients).all()
         assert np.isfinite(r.mean_height_std)
+
+
+def test_no_normal_is_taken_for_better_than_a_hundredth_of_a_radian():
+    rng = np.random.default_rng(5)
+    local, weights = rng.uniform(-0.8, 0.8, (1, 9, 3)), np.ones((1, 9))
+    normals = rng.normal([0.0, 0.0, 4.0], 1.0, (1, 9, 3))
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    best, limit, worse = (slope_equations(c * normals, local, weights) for c in (1e5, 100.0, 50.0))
+    for one, other, half in zip(best, limit, worse, strict=True):
+        assert one == pytest.approx(other, rel=1e-12)
+        assert half == pytest.approx(0.5 * other, rel=1e-12)

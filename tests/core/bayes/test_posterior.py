@@ -8,8 +8,9 @@ import surfaces
 from scipy.spatial.transform import Rotation
 
 from core import Contour, SamplingPlane, reconstruct, suggest_plane, track
-from core.bayes import evidence, posterior
+from core.bayes import evidence, joint_fit, posterior
 from core.patch.monge import monomials
+from core.reconstruction import next_plane
 
 EXTENT = 12.0
 
@@ -294,3 +295,78 @@ def test_few_contacts_are_enough_for_a_finite_answer():
     r = reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
     assert [r.patch.k1, r.patch.k2] == pytest.approx([-0.2, -0.2], abs=0.02)
     assert np.isfinite(r.height_std(*r.domain.grid(50)[0].T)).all()
+
+
+def test_without_evidence_the_waviness_is_the_priors():
+    """Log-normal about 0.6."""
+    noises = np.full((1, 5), 0.01)
+    found = evidence._averaged(np.zeros((1, 6, 5)), noises)
+    w = evidence.WAVINESS
+    density = np.exp(-0.5 * (np.log(w / 0.6) / 0.5) ** 2)
+    density /= density.sum()
+    assert found.waviness == pytest.approx([np.exp(density @ np.log(w))])
+    assert found.variances[0] == pytest.approx(density @ evidence.prior_variances(w))
+    assert found.noise == pytest.approx([0.01])
+    assert evidence.prior_variances(np.array([0.6]))[0, [0, -1]] == pytest.approx([0.036**2, 0.007776**2])
+
+
+@pytest.mark.parametrize(("ratio", "degree"), [(0.4, 3), (0.6, 5)])
+def test_a_degree_will_do_whose_patch_departs_by_half_a_deviation(ratio, degree):
+    """The mean has one term of degree 5, of which a cubic shows as much as a quartic."""
+    rng = np.random.default_rng(7)
+    contacts = np.column_stack([rng.uniform(-0.9, 0.9, (50, 2)), np.zeros(50)])
+    mean = np.zeros(27)
+    mean[14] = 0.1
+    alone = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)))
+    basis = monomials(contacts[:, 0], contacts[:, 1], posterior.TERMS)
+    off = basis @ (mean - posterior.coefficients_of(alone.patch(4)))
+    variance = np.sum(off**2) / ratio**2 / np.sum(basis**2)
+    assert alone._replace(covariance=variance * np.eye(27)).degree_shown(contacts) == degree
+
+
+def test_an_outlying_contact_weighs_as_under_students_distribution():
+    """(4 + 1) / (4 + r^2) of r deviations: 1 at one of them; and all 1 where none is beyond five."""
+    ratios = np.array([[0.0, 0.1, 1.0, 2.0, 0.5, 0.6, 0.2, 6.0], [0.0, 0.1, 1.0, 2.0, 0.5, 0.6, 0.2, 4.9]])
+    weights = joint_fit._student_weights(2e-3 * ratios, np.ones((2, 8), dtype=bool), np.full(2, 2e-3))
+    assert weights[0] == pytest.approx(5.0 / (4.0 + ratios[0] ** 2))
+    assert np.array_equal(weights[1], np.ones(8))
+    present = np.array([[True] * 7 + [False]])
+    assert np.array_equal(joint_fit._student_weights(2e-3 * ratios[:1], present, np.full(1, 2e-3)), present)
+
+
+def test_scatter_makes_contacts_outlying_beyond_five_of_its_deviations_by_the_median():
+    residuals = np.array([[1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 8.0]]) * 0.01
+    deviation = 1.4826 * 0.01
+    weights = joint_fit._student_weights(residuals, np.ones((1, 7), dtype=bool), np.full(1, 2e-3))
+    assert weights[0] == pytest.approx(5.0 / (4.0 + (residuals[0] / deviation) ** 2))
+    residuals[0, -1] = 4.9 * deviation
+    assert np.array_equal(
+        joint_fit._student_weights(residuals, np.ones((1, 7), dtype=bool), np.full(1, 2e-3)), np.ones((1, 7))
+    )
+
+
+def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
+    surface = surfaces.torus(40, 20, 0.6)
+    for azimuths in ((0, 60, 120), (0, 35, 80), (10, 20, 60)):
+        r = touched(surface, surfaces.planes(azimuths), noise=0.03)
+        points, weights = r.domain.nodes
+        lost = next_plane._lost(r, points / r.radius, next_plane.AZIMUTHS) @ weights
+        plane, _ = suggest_plane(r)
+        chosen = np.argmin(np.abs(next_plane.AZIMUTHS - plane.azimuth))
+        assert next_plane.AZIMUTHS[chosen] == pytest.approx(plane.azimuth)
+        assert lost[chosen] > 0.97 * lost.max()
+
+
+@pytest.mark.parametrize("planes", [THREE, surfaces.planes((0, 25, 70))], ids=["even", "uneven"])
+def test_deviations_of_curvatures_are_those_of_surfaces_drawn_from_the_posterior(planes):
+    """H = b_20 + b_02, k1 = 2 b_20, k2 = 2 b_02; K = k1 k2 / radius^2, its product's variance included."""
+    r = touched(surfaces.torus(40, 20, 0.6), planes, noise=0.3)
+    drawn = np.random.default_rng(8).multivariate_normal(r.posterior.mean, r.posterior.covariance, 200_000)
+    k1, k2 = 2.0 * drawn[:, 2] / r.radius, 2.0 * drawn[:, 4] / r.radius
+    for found, values in (
+        (r.k1_std, k1),
+        (r.k2_std, k2),
+        (r.mean_curvature_std, (k1 + k2) / 2.0),
+        (r.gaussian_curvature_std, k1 * k2),
+    ):
+        assert found == pytest.approx(np.std(values), rel=0.01)

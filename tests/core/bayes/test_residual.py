@@ -287,3 +287,15 @@ def test_it_goes_into_json_and_back():
     x, y = over(r).T
     assert again.height(x, y) == pytest.approx(r.height(x, y), abs=1e-9)
     assert again.height_std(x, y) == pytest.approx(r.height_std(x, y), rel=1e-9)
+
+
+def test_the_derivatives_of_a_surface_with_a_residual_are_those_of_its_height_in_its_unit():
+    _, r = touched()
+    assert r.residual is not None and r.radius > 10.0
+    (x, y), h = over(r, 20).T, 1e-3 * r.radius
+    d = r.geometry.derivatives(x, y)
+    assert d.z == pytest.approx(r.height(x, y), abs=1e-12)
+    assert d.x == pytest.approx((r.height(x + h, y) - r.height(x - h, y)) / (2.0 * h), abs=2e-4)
+    assert d.y == pytest.approx((r.height(x, y + h) - r.height(x, y - h)) / (2.0 * h), abs=2e-4)
+    xx = (r.height(x + h, y) - 2.0 * r.height(x, y) + r.height(x - h, y)) / h**2
+    assert d.xx == pytest.approx(xx, abs=0.02 * np.abs(d.xx).max() + 2e-3)

@@ -180,3 +180,14 @@ def line(angle, contacts=9):
 def test_degenerate_curves_say_what_to_move(contours, message):
     with pytest.raises(DegenerateCurvesError, match=message):
         reconstruct((0, 0, 0), contours, outward=(0, 0, 1))
+
+
+@pytest.mark.parametrize(("degrees", "distinct"), [(1.1, True), (0.9, False)])
+def test_curves_a_degree_apart_are_distinct(degrees, distinct):
+    surface = surfaces.plane()
+    contours = surface.track(surfaces.planes((0.0, degrees, 90.0)))
+    if distinct:
+        assert surface.fit(contours).k1_std > 0.0
+    else:
+        with pytest.raises(DegenerateCurvesError, match="curves 1 and 2 run in one direction"):
+            surface.fit(contours)

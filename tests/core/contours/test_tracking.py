@@ -230,3 +230,13 @@ def test_azimuth_of_a_direction_gives_the_plane_that_holds_it():
         t = SamplingPlane(np.radians(degrees)).axes(normal, tangent)[:, 0]
         assert np.degrees(azimuth_of(t, normal, tangent)) % 180.0 == pytest.approx(degrees, abs=1e-6)
         assert np.degrees(azimuth_of(-t, normal, tangent)) % 180.0 == pytest.approx(degrees, abs=1e-6)
+
+
+@pytest.mark.parametrize("radius", [6.0, 10.0, 40.0])
+def test_contacts_are_a_step_apart_to_a_thousandth_however_bent_the_surface_is(radius):
+    """A step along the tangent of a circle ends 1 % too far where it is 0.28 of the radius."""
+    ball = surfaces.sphere(radius)
+    (contour,) = ball.track([SamplingPlane(0.4)], extent=8.0, step=2.0)
+    steps = np.linalg.norm(np.diff(contour.points, axis=0), axis=1)
+    assert len(steps) >= 6
+    assert np.abs(steps / 2.0 - 1.0).max() < 1e-3

@@ -7,7 +7,8 @@ import pytest
 import surfaces
 
 import core
-from core.reconstruction.result import DOUBTFUL_STD
+from core.exploration.one_touch import NOTICEABLE, _is_enough
+from core.reconstruction.status import DOUBTFUL_STD
 
 PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
 UP = (0.0, 0.0, 1.0)
@@ -183,3 +184,26 @@ def test_a_point_beside_an_edge_is_refused_as_ever():
 def test_bad_arguments_are_named(more, message):
     with pytest.raises(ValueError, match=f"^{message}$"):
         explore(surfaces.plane(), **more)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.2])
+def test_whether_contacts_are_enough_is_no_matter_of_the_unit(noise):
+    surface, found = surfaces.pear(), []
+    for step in (0.25, 0.5, 1.0, 3.0):
+        r = surface.fit(surface.track(surfaces.planes((0, 60, 120)), step=step, noise=noise, rng=1))
+        found.append(_is_enough(r))
+        for scale in (1e-3, 1.0 / r.radius, 30.0):
+            assert _is_enough(r.moved(np.diag([scale, scale, scale, 1.0]))) == found[-1]
+    assert found[-1] == (noise == 0.0)
+
+
+def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
+    """By another fit: the deviation with as many contacts more, between those there are."""
+    surface = surfaces.torus(40, 20, 0.6)
+    for step, noise in ((0.5, 0.05), (2.0, 0.05), (3.0, 0.2), (1.0, 0.01)):
+        planes = surfaces.planes((0, 60, 120))
+        once = surface.fit(surface.track(planes, step=step, noise=noise, rng=1))
+        twice = surface.fit(surface.track(planes, step=step / 2.0, noise=noise, rng=1))
+        share = twice.mean_height_std / once.mean_height_std
+        if abs(share - (1.0 - NOTICEABLE)) > 0.1:
+            assert _is_enough(once) == (share > 1.0 - NOTICEABLE)

@@ -183,6 +183,24 @@ def test_the_start_keeps_to_lines_between_neighboring_half_curves():
     assert start == pytest.approx(0.0, abs=1e-12)
 
 
+def test_the_start_of_the_descent_joins_neighboring_half_curves_at_their_quarters():
+    """Contact by contact, outward, as far as the shorter one goes; the last with the first."""
+    rng = np.random.default_rng(6)
+    angles, counts = np.radians([0, 60, 120, 180, 240, 300]), (7, 5, 7, 6, 7, 7)
+    halves = [
+        np.column_stack([np.outer(np.arange(1, n + 1) / 7, [np.cos(a), np.sin(a)]), 0.1 * rng.normal(size=n)])
+        for a, n in zip(angles, counts, strict=True)
+    ]
+    data = least_squares.problem(-0.3, 0.2, 4, np.vstack(halves))
+    points = [np.vstack(halves)]
+    for i in range(6):
+        one, other = halves[i], halves[(i + 1) % 6]
+        for k in range(min(len(one), len(other))):
+            points += [[one[k] + share * (other[k] - one[k])] for share in (0.25, 0.5, 0.75)]
+    wanted = least_squares.least_squares(least_squares.problem(-0.3, 0.2, 4, np.vstack(points)))
+    assert least_squares.tagc_start(data, halves) == pytest.approx(wanted, rel=1e-9)
+
+
 def test_figure_3_and_4_of_the_paper():
     """The bottle neck: 57 points, the reference point thrice among them, 0.05 mm noise, nine more curves.
 
@@ -199,18 +217,23 @@ def test_figure_3_and_4_of_the_paper():
         contours = neck.track(surfaces.UPRIGHT, noise=0.05, rng=seed, **touch)
         assert sum(len(c.points) for c in contours) == 57
         for method in METHODS:
-            r = neck.fit(contours, method=method)
+            r = neck.fit(contours, method=method, weight=9.99 * 11.7**2 if method == "tagc" else None)
             errors[method].append(
                 (r.fit_error, fit_error(r.patch, r.frame.to_local(off)), r.total_absolute_curvature)
             )
         kappas.append((r.patch.k1, r.patch.k2))
     assert np.median(kappas, axis=0) == pytest.approx([-0.0423, 0.0172], abs=0.002)
-    on_data, off_data, curvature = np.median(errors["least-squares"], axis=0)
-    assert on_data < 0.1
-    assert off_data > 1.0
-    assert curvature > 1.0
-    for method in ("tagc", "quadratic-variation"):
-        on_data, off_data, curvature = np.median(errors[method], axis=0)
-        assert on_data < 0.1
-        assert off_data < 0.5
-        assert curvature < 0.5
+    medians = {method: np.median(found, axis=0) for method, found in errors.items()}
+    on_data, off_data, curvature = medians["least-squares"]
+    assert on_data < 0.05
+    assert off_data > 100.0
+    assert curvature > 10.0
+    on_data, off_data, curvature = medians["tagc"]
+    assert on_data == pytest.approx(0.0514, abs=0.005)
+    assert off_data < 0.0859
+    assert curvature < 0.2
+    on_data, off_data, curvature = medians["quadratic-variation"]
+    assert on_data < 0.04
+    assert off_data < 0.07
+    assert medians["tagc"][2] < curvature < 0.3
+    assert medians["bayes"][1] < 0.02

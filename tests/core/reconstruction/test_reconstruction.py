@@ -382,3 +382,12 @@ def test_a_caller_who_has_numpy_raise_gets_the_same_fit(method):
         found = reconstruct(s.point, contours, outward=s.normal, method=method)
         assert (found.status, found.mean_height_std) == (wanted.status, wanted.mean_height_std)
     assert np.array_equal(found.patch.coefficients, wanted.patch.coefficients)
+
+
+@pytest.mark.parametrize(("method", "weight"), [("tagc", 1e3), ("quadratic-variation", 1e5)])
+def test_the_weight_that_is_not_given_is_that_of_the_method(method, weight):
+    surface = surfaces.torus(40, 20, 0.6)
+    contours = surface.track(surfaces.planes((0, 60, 120)), noise=0.02, rng=1)
+    one, other, half = (surface.fit(contours, method=method, weight=w) for w in (None, weight, weight / 2.0))
+    assert np.array_equal(one.patch.coefficients, other.patch.coefficients)
+    assert not np.array_equal(one.patch.coefficients, half.patch.coefficients)

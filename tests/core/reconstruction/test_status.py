@@ -43,6 +43,39 @@ def test_heights_that_are_good_to_little():
     assert "shorter extent, or add sampling planes" in r.message
 
 
+def test_contacts_that_are_missed_by_more_than_their_noise_explains():
+    s = surfaces.plane()
+    for seed in range(3):
+        noisy = contours_of(s, noise=0.025 * EXTENT, seed=seed, count=24)
+        r = s.fit([replace(c, noise=None) for c in noisy], degree=2)
+        x, y, z = r.contacts.T
+        missed = 100.0 * np.median(np.abs(r.height(x, y) - z)) / r.radius
+        assert 1.0 < missed < 2.5
+        assert r.status == "uncertain"
+        assert r.message.startswith(f"Half of the contacts are off the patch by more than {missed:.1f} %")
+        assert (
+            "which their noise does not explain: take a shorter extent, or say how noisy they are"
+            in r.message
+        )
+        assert "Half of the contacts" not in s.fit(noisy, degree=2).message
+
+
+def test_a_method_that_leaves_its_contacts_is_in_doubt():
+    s = surfaces.monkey_saddle()
+    r = s.fit(contours_of(s, noise=0.0), method="quadratic-variation", weight=1.0)
+    assert "Half of the contacts are off the patch" in r.message
+    assert s.fit(contours_of(s, noise=0.0), method="quadratic-variation", weight=1e5).status == "ok"
+
+
+def test_outlying_contacts_are_left_out_of_the_contacts_that_are_to_be_met():
+    s, rng = surfaces.pear(), np.random.default_rng(5)
+    lifted = [
+        moved(c, np.where(rng.random((len(c.points), 1)) < 0.2, 1.2, 0.0) * s.normal)
+        for c in contours_of(s, noise=0.0)
+    ]
+    assert "Half of the contacts" not in s.fit(lifted).message
+
+
 def test_least_squares_with_upright_planes():
     s = surfaces.pear()
     r = s.fit(contours_of(s), method="least-squares")

@@ -7,10 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 import surfaces
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, register
+from core.scan import pose_search, scanned_mesh
 
 PLANES = surfaces.planes((0, 60, 120))
 TURN, SHIFT = Rotation.from_euler("xyz", (0.7, -1.1, 2.3)).as_matrix(), np.array([310.0, -40.0, 75.0])
@@ -18,7 +19,7 @@ WAVES = ((1.0, (0.27, 0.08, -0.14), 0.4), (0.8, (-0.1, 0.3, 0.19), 1.9), (0.9, (
 
 
 def ball(count=10000):
-    """Points all over the unit sphere (n, 3), and counterclockwise triangles."""
+    """Points all over the unit sphere (n, 3), and counterclockwise scanned_mesh."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
     across = np.sqrt(1.0 - z**2)
@@ -216,7 +217,7 @@ SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
         ({"vertices": np.zeros((4, 2))}, "vertices: wanted shape"),
         ({"vertices": [[0.0, 0.0, np.nan]]}, "vertices: wanted finite numbers"),
         ({"vertices": "mesh"}, "vertices: wanted numbers"),
-        ({"faces": []}, "faces: wanted triangles, got none"),
+        ({"faces": []}, "faces: wanted scanned_mesh, got none"),
         ({"faces": [[0, 1, 2, 0]]}, "faces: wanted shape"),
         ({"faces": [[0, 1, 3]]}, "faces: wanted whole numbers from 0 to 2"),
         ({"faces": [[0, 1, -1]]}, "faces: wanted whole numbers"),
@@ -239,3 +240,71 @@ def test_few_triangles_are_enough():
     poses = register(touch(surfaces.plane()), 50.0 * SQUARE, [[0, 1, 2]])
     assert poses[0].residual < 1e-6
     assert np.isfinite(poses[0].rotation).all()
+
+
+@pytest.mark.parametrize(
+    ("turning", "shifting", "slides"), [(1.2, 1.2, False), (0.8, 1.2, True), (1.2, 0.8, True)]
+)
+def test_noise_shifts_a_pose_by_a_20th_of_the_radius_or_turns_it_by_2_degrees(
+    monkeypatch, turning, shifting, slides
+):
+    """Of contacts whose distances grow by so many times three least residuals then."""
+    growth = np.repeat([turning / np.radians(2.0), shifting / 0.05], 3) * 3e-3
+    monkeypatch.setattr(
+        pose_search, "mesh_distances", lambda *_: (np.zeros((1, 6, 1)), np.diag(growth)[None])
+    )
+    place = np.concatenate([np.eye(3), np.zeros((3, 1))], axis=1)[None]
+    assert pose_search._descended(place, np.zeros((2, 6, 3)), None, 1, 1)[2].tolist() == [slides]
+
+
+def test_the_coarse_search_forgives_a_tilt_and_a_shift_along_the_normal_and_nothing_else():
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(-1.0, 1.0, (2, 30))
+    fields = 0.1 * rng.normal(size=(15, 4))
+
+    def scores(z, weight=1.0):
+        up = np.tile([0.0, 0.0, weight], (30, 1))
+        return pose_search._scores(np.array([np.column_stack([x, y, z]), up]), fields)
+
+    z = 0.2 * x * y
+    assert scores(z + 0.3 + 0.2 * x - 0.1 * y) == pytest.approx(scores(z), rel=1e-9)
+    assert scores(z + 0.1 * x**2).min() > 0.0
+    assert np.abs(scores(z + 0.1 * x**2) - scores(z)).min() > 1e-3
+    assert scores(z, 0.5) == pytest.approx(0.25 * scores(z), rel=1e-9)
+
+
+def test_the_polynomials_of_the_coarse_search_are_of_one_side_of_a_thin_sheet():
+    """Two paraboloids of which one faces up and one down."""
+    points = np.array(np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-2, 2, 41))).reshape(2, -1).T
+    heights = np.concatenate([0.05 + 0.1 * points[:, 0] ** 2, -0.05 + 0.3 * points[:, 1] ** 2])
+    top, (x, y) = np.repeat([True, False], len(points)), np.tile(points, (2, 1)).T
+    slopes = np.column_stack([np.where(top, -0.2 * x, 0.0), np.where(top, 0.0, -0.6 * y), np.ones(len(x))])
+    normals = slopes / np.linalg.norm(slopes, axis=1, keepdims=True) * np.where(top, 1.0, -1.0)[:, None]
+    centers = np.column_stack([x, y, heights])
+    mesh = scanned_mesh.Mesh(None, normals, centers, normals, None)
+    places, fields = pose_search._fields(mesh, 0.8)
+    inner = np.hypot(places[:, 0, 3], places[:, 1, 3]) < 1.0
+    up = inner & (places[:, 2, 2] > 0.9)
+    assert np.count_nonzero(up) > 5
+    assert np.abs(fields[0, up]).max() < 0.01  # each place lies on its own side
+    assert np.abs(fields[[3, 4, 5]][:, up]).max() < 0.12  # bent by 0.1 in one direction
+
+
+def test_poses_within_a_20th_of_the_radius_and_2_degrees_are_one():
+    def place(shift=0.0, degrees=0.0):
+        turn = Rotation.from_rotvec([0.0, np.radians(degrees), 0.0]).as_matrix()
+        return np.column_stack([turn, [shift, 0.0, 0.0]])
+
+    places = np.array([place(), place(0.04), place(0.06), place(0.0, 1.9), place(0.0, 2.1)])
+    assert pose_search._distinct(places, np.arange(5.0)) == [0, 2, 4]
+
+
+def test_places_that_are_tried_are_a_fifth_of_the_radius_apart_and_leave_no_gap():
+    _, vertices, faces = bumpy()
+    mesh = scanned_mesh.mesh_of(vertices / 10.0, faces, 2.0)
+    places, _ = pose_search._fields(mesh, 1.0)
+    origins = places[..., 3]
+    tree = cKDTree(origins)
+    assert tree.query(origins, 2)[0][:, 1].min() >= 0.2
+    assert tree.query(mesh.centers)[0].max() < 0.2 + 2.0 * pose_search.SPACING
+    assert np.abs(places[..., :3].swapaxes(1, 2) @ places[..., :3] - np.eye(3)).max() < 1e-12

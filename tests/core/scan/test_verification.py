@@ -241,3 +241,28 @@ def test_bad_vertices_are_refused():
     for vertices in (np.zeros((3, 2)), [[np.nan] * 3], "mesh"):
         with pytest.raises(ValueError, match="vertices: wanted"):
             verify(r, surface, vertices)
+
+
+def test_overlap_is_a_share_of_the_area_which_is_more_where_the_patch_is_steep():
+    """Of a cap of a sphere, the ring that is below a plane across its normal."""
+    surface, extent = surfaces.sphere(30), 27.0
+    contours = surface.track(surfaces.planes((0, 60, 120)), extent=extent, step=1.5)
+    r = surface.fit(contours, degree=6)
+    up, inner = surface.normal, 0.6 * r.radius
+    edge = surface.point - (30.0 - np.sqrt(30.0**2 - inner**2)) * up
+    found = verify(r, Cut(surface, edge, -up), np.empty((0, 3)), extra=0)
+    (x, y) = r.domain.grid(4000)[0].T
+    lean = 30.0 / np.sqrt(30.0**2 - x**2 - y**2)
+    outside = np.hypot(x, y) > inner
+    assert found["overlap"] == pytest.approx(lean[outside].sum() / lean.sum(), abs=0.01)
+    assert found["overlap"] > outside.mean() + 0.02
+
+
+@pytest.mark.parametrize(("height", "share"), [(0.95, 1.0), (1.05, 0.0), (2.5, 0.0)])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_what_is_farther_from_the_tangent_plane_than_the_radius_is_not_below_the_patch(height, share, side):
+    surface = surfaces.plane()
+    r = shifted(touched(surface), side * height * touched(surface).radius)
+    assert verify(r, surface, np.empty((0, 3)), extra=0)["overlap"] == share
+    vertices, normals = vertices_of(surface, touched(surface))
+    assert (len(reachable(r.geometry, surface, vertices, normals)) > 0) == (share > 0.0)

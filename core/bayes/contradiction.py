@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether measured normals contradict the contacts that they were measured at.
+
+Beside the paper. Contacts alone show the surface's slopes and second derivatives at the point, and so do
+normals: how far apart the two are is judged by the deviations of both. The normals of a texture scatter
+about the patch by more than was claimed, which is no contradiction: so their scatter counts too.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arguments import Array
+from ..contours.contour import Contour
+from ..contours.curves import besides_point, stacked
+from ..contours.local_geometry import Frame
+from .measured_slopes import SLOPE_MISFIT, slope_equations
+from .posterior import FREE, Posterior
+
+
+def measured_normals(contours: Sequence[Contour], frame: Frame, radius: float) -> tuple[Array, Array]:
+    """Contacts with measured normals, besides the reference point, in the frame and in unit radius, (n, 3).
+
+    And these normals over their standard deviations, (n, 3).
+    """
+    points, present, normals = stacked(frame.origin[None], [contours])
+    if normals is None:
+        return np.empty((0, 3)), np.empty((0, 3))
+    chosen = present & besides_point(points)[1] & normals.any(axis=-1)
+    return points[chosen] @ frame.axes / radius, normals[chosen] @ frame.axes
+
+
+def contradiction(contacts: Array, normals: Array, posterior: Posterior) -> tuple[float, float]:
+    """By how many deviations normals contradict contacts, and by what angle in the root mean square.
+
+    contacts, normals : (n, 3), of `measured_normals`
+    posterior : what contacts leave open without any normal, in the same frame and unit
+
+    The angle is in radians. Both are 0 where there are too few normals to tell.
+    """
+    if 2 * len(normals) <= FREE:
+        return 0.0, 0.0
+    weights = np.ones((1, len(normals)))
+    slopes, steepness = (part[0] for part in slope_equations(normals[None], contacts[None], weights))
+    covariance = slopes @ posterior.covariance @ slopes.T + np.eye(len(slopes))
+    whitened = np.linalg.solve(
+        np.linalg.cholesky(covariance),
+        np.column_stack([steepness - slopes @ posterior.mean, slopes[:, :FREE]]),
+    )
+    off, free = whitened[:, 0], whitened[:, 1:]
+    apart = np.linalg.lstsq(free, off, rcond=None)[0]  # of the free terms, as normals and contacts show them
+    told = free @ apart
+    scatter = max(1.0, float(np.sum((off - told) ** 2)) / (len(off) - FREE))
+    certainty = np.minimum(np.linalg.norm(normals, axis=1), 1.0 / SLOPE_MISFIT)
+    angles = slopes[:, :FREE] @ apart / np.tile(certainty, 2)
+    return math.sqrt(float(told @ told) / scatter), math.sqrt(2.0 * float(np.mean(angles**2)))

@@ -1,0 +1,117 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a reconstruction can be trusted: what gives reason to doubt it, and what to do about that."""
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from ..arguments import Array
+from ..bayes.posterior import Posterior
+from ..patch.residual import Residual
+
+# Chosen with benchmarks.stability, but for what benchmarks.real says of rough surfaces.
+DOUBTFUL_STD = 0.02  # Share of the radius that the height may deviate in the mean over the domain.
+DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise this many times larger.
+DOUBTFUL_TURN = math.radians(10.0)  # Angle that the frame may be off.
+LIKELY = 0.5  # Probability of that on a rough surface, whose directions are others at each scale.
+DOUBTFUL_CURVATURE = 0.1  # Deviation in units of 1 / radius: what a curve tells that ends at a quarter of it.
+DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point,
+SIGNIFICANT = 5.0  # and standard deviations of it.
+LEAST_SCATTER = 0.3  # Share of a contact's accuracy: few contacts may happen to scatter less.
+CONTRADICTED = 0.01  # Radians by which normals may contradict the contacts, beside SIGNIFICANT deviations.
+DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts may be missed, beside the noise.
+
+
+class Judged(Protocol):
+    """What a status follows from; see Reconstruction."""
+
+    @property
+    def method(self) -> str: ...
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def radius(self) -> float: ...
+    @property
+    def accuracy(self) -> float: ...
+    @property
+    def misses(self) -> Array: ...
+    @property
+    def residual(self) -> Residual | None: ...
+    @property
+    def posterior(self) -> Posterior: ...
+    @property
+    def condition_number(self) -> float: ...
+    @property
+    def mean_height_std(self) -> float: ...
+    @property
+    def typical_miss(self) -> float: ...
+    @property
+    def contradiction(self) -> tuple[float, float]: ...
+
+
+def doubt(r: Judged) -> tuple[str, str] | None:
+    """Status and a sentence of advice; None where there is no doubt."""
+    if not r.converged:
+        return "not_converged", (
+            "The minimization stopped at its step limit, the patch is its best so far: use the fast "
+            "solver, or a smaller weight."
+        )
+    if r.method == "least-squares" and r.condition_number > DOUBTFUL_CONDITION:
+        return "uncertain", (
+            "The contacts alone do not determine the surface between the curves (condition number "
+            f"{r.condition_number:.1e}): take another method, or add sampling planes."
+        )
+    return _about_data(r) or _about_heights(r) or _about_frame(r)
+
+
+def _about_data(r: Judged) -> tuple[str, str] | None:
+    deviations, angle = r.contradiction
+    if deviations > SIGNIFICANT and angle > CONTRADICTED:
+        return "uncertain", (
+            f"The measured normals contradict the contacts by {math.degrees(angle):.1f} degrees in the "
+            "mean, more than their deviation explains: check in which frame they were measured, or "
+            "leave them out."
+        )
+    missed = r.typical_miss / r.radius
+    if missed > DOUBTFUL_FIT + r.accuracy:
+        return "uncertain", (
+            f"Half of the contacts are off the patch by more than {100.0 * missed:.1f} % of the radius, "
+            "which their noise does not explain: take a shorter extent, or say how noisy they are."
+        )
+    return None
+
+
+def _about_heights(r: Judged) -> tuple[str, str] | None:
+    share = r.mean_height_std / r.radius
+    if share > DOUBTFUL_STD:
+        return "uncertain", (
+            f"Heights are good to {100.0 * share:.1f} % of the radius in the mean: take a shorter "
+            "extent, or add sampling planes."
+        )
+    return None
+
+
+def _about_frame(r: Judged) -> tuple[str, str] | None:
+    distances, stds = r.misses.T / r.radius
+    stds = np.maximum(stds, LEAST_SCATTER * r.accuracy)
+    apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))
+    if len(apart):
+        return "uncertain", (
+            f"Curve {apart[0] + 1} passes the reference point at {r.radius * distances[apart[0]]:.3g}"
+            ", more than its scatter explains: set the point where the curves meet."
+        )
+    turn = r.posterior.turn() if r.residual is None else r.posterior.turn(LIKELY)
+    if turn > DOUBTFUL_TURN:
+        return "uncertain", (
+            f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
+            "extent, or add sampling planes."
+        )
+    std = r.posterior.curvature_std()
+    if std > DOUBTFUL_CURVATURE:
+        return "uncertain", (
+            f"Curvatures are good to {std / r.radius:.2g} in the direction known least: take a longer "
+            "extent, or add sampling planes."
+        )
+    return None

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changes core in one place after the other, and says which changes no test notices.
+
+`python -m tools.mutants [--count N] [--seed N] [--first N] [MODULE ...]`, from the root of a checkout. Of all
+places where an operator, a number, a comparison or a condition could be another one, so many are drawn; each
+is changed in a copy of the checkout, and its module's tests are run until one fails. What does not end in
+time counts as noticed. Prints the changes that survive, and how many died.
+"""
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+COPIED = ("core", "tests", "tools", "benchmarks", "docs", "examples", "pyproject.toml")
+TESTS = {  # of each module of core, those that fail soonest first
+    "arguments": "reconstruction serialization",
+    "bayes": "posterior status measured_normals reconstruction",
+    "coefficients": "fitting reconstruction",
+    "common_point": "common_point",
+    "contour": "tracking reconstruction measured_normals",
+    "contradiction": "measured_normals",
+    "curves": "local_geometry reconstruction status measured_normals",
+    "deviations": "reconstruction posterior",
+    "domain": "domain reconstruction",
+    "evidence": "posterior measured_normals",
+    "exploration": "exploration enough",
+    "fitting": "fitting",
+    "geometry": "geometry verification",
+    "local_geometry": "local_geometry reconstruction",
+    "monge": "monge geometry fitting",
+    "next_plane": "posterior",
+    "posterior": "posterior status",
+    "reconstruction": "reconstruction residual measured_normals",
+    "registration": "registration",
+    "residual": "residual",
+    "residual_evidence": "residual",
+    "result": "status reconstruction geometry residual posterior",
+    "rough_fit": "residual",
+    "sampling": "registration",
+    "serialization": "serialization",
+    "slopes": "measured_normals",
+    "system": "posterior measured_normals",
+    "tagc": "fitting",
+    "thinning": "thinning",
+    "tracking": "tracking",
+    "triangles": "registration",
+    "triangulation": "triangulation",
+    "verification": "verification",
+}
+OPERATORS: dict[type, type] = {
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult,
+    ast.Mod: ast.Mult, ast.FloorDiv: ast.Mult, ast.BitAnd: ast.BitOr,
+    ast.BitOr: ast.BitAnd, ast.And: ast.Or, ast.Or: ast.And, ast.Lt: ast.GtE, ast.GtE: ast.Lt,
+    ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
+}  # fmt: skip
+NAMES = {"maximum": "minimum", "minimum": "maximum", "max": "min", "min": "max", "cos": "sin", "sin": "cos"}
+
+
+class Mutant(NamedTuple):
+    """One changed place of a module: its source, and what to say of it."""
+
+    module: str
+    said: str
+    source: str
+
+
+def places_of(module: str) -> list[tuple[str, int]]:
+    """What can be changed in a module of core, each as the module and the number of a node of its tree."""
+    nodes = list(ast.walk(_tree(module)))
+    # What says of which type something is no test could notice.
+    types = [getattr(node, name, None) for node in nodes for name in ("annotation", "returns")]
+    skipped = {id(part) for top in types if top is not None for part in ast.walk(top)}
+    return [(module, i) for i, node in enumerate(nodes) if id(node) not in skipped and _change(node)]
+
+
+def mutant_at(module: str, number: int) -> Mutant:
+    """The change of one place."""
+    tree = _tree(module)
+    node = list(ast.walk(tree))[number]
+    before, change = ast.unparse(node), _change(node)
+    assert change is not None
+    change(node)
+    said = f"core/{module}.py:{node.lineno}: {before}  ->  {ast.unparse(node)}"  # type: ignore[attr-defined]
+    return Mutant(module, said, ast.unparse(tree))
+
+
+def _tree(module: str) -> ast.Module:
+    return ast.parse((ROOT / "core" / f"{module}.py").read_text(encoding="utf-8"))
+
+
+def _change(node: ast.AST) -> Callable[[ast.AST], None] | None:
+    """What changes a node of this kind; None for what stays."""
+    if isinstance(node, ast.BinOp | ast.BoolOp | ast.AugAssign) and type(node.op) in OPERATORS:
+        return lambda n: setattr(n, "op", OPERATORS[type(n.op)]())  # type: ignore[attr-defined]
+    if isinstance(node, ast.Compare) and type(node.ops[0]) in OPERATORS:
+        return lambda n: n.ops.__setitem__(0, OPERATORS[type(n.ops[0])]())  # type: ignore[attr-defined]
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        return lambda n: setattr(n, "op", ast.UAdd())
+    if isinstance(node, ast.Constant) and type(node.value) is bool:
+        return lambda n: setattr(n, "value", not n.value)  # type: ignore[attr-defined]
+    if isinstance(node, ast.Constant) and type(node.value) is int:
+        return lambda n: setattr(n, "value", n.value + 1)  # type: ignore[attr-defined]
+    if isinstance(node, ast.Constant) and type(node.value) is float:
+        return lambda n: setattr(n, "value", 2.0 * n.value or 1.0)  # type: ignore[attr-defined]
+    if isinstance(node, ast.Attribute) and node.attr in NAMES:
+        return lambda n: setattr(n, "attr", NAMES[n.attr])  # type: ignore[attr-defined]
+    if isinstance(node, ast.Name) and node.id in NAMES:
+        return lambda n: setattr(n, "id", NAMES[n.id])  # type: ignore[attr-defined]
+    return None
+
+
+def outcome(mutant: Mutant, place: Path, seconds: float) -> str:
+    """ "died", "survived" or "timed out"."""
+    path = place / "core" / f"{mutant.module}.py"
+    original = path.read_text(encoding="utf-8")
+    path.write_text(mutant.source, encoding="utf-8")
+    tests = [f"tests/test_{name}.py" for name in TESTS[mutant.module].split()]
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+    try:
+        run = subprocess.run(
+            command, cwd=place, timeout=seconds, capture_output=True, env=os.environ, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return "timed out"
+    finally:
+        path.write_text(original, encoding="utf-8")
+    return "died" if run.returncode else "survived"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Which changes of core no test notices.")
+    parser.add_argument("modules", nargs="*", metavar="MODULE", help="of core, as in bayes; all of them")
+    parser.add_argument("--count", type=int, default=300, help="of changes (%(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="of those drawn, to go on with (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the draw (%(default)s)")
+    parser.add_argument("--seconds", type=float, default=300.0, help="for a module's tests (%(default)g)")
+    options = parser.parse_args()
+    every = [place for module in options.modules or TESTS for place in places_of(module)]
+    chosen = random.Random(options.seed).sample(every, min(options.count, len(every)))[options.first :]
+    outcomes = []
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        for name in COPIED:
+            copied = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+            copied(ROOT / name, place / name)
+        for number in chosen:
+            mutant = mutant_at(*number)
+            outcomes.append(outcome(mutant, place, options.seconds))
+            if outcomes[-1] == "survived":
+                print(mutant.said, flush=True)
+            print(f"\r{len(outcomes)} of {len(chosen)}", end="", file=sys.stderr, flush=True)
+    survived, late = outcomes.count("survived"), outcomes.count("timed out")
+    print(f"{len(outcomes) - survived} of {len(outcomes)} changes were noticed, {late} by the time limit.")
+    print(f"Seed {options.seed}, of {len(every)} changes that there could be.")
+
+
+if __name__ == "__main__":
+    main()
