@@ -7,7 +7,7 @@ import pytest
 import surfaces
 
 import core
-from core.exploration.one_touch import NOTICEABLE, _is_enough
+from core.exploration.one_touch import NOTICEABLE, is_enough
 from core.reconstruction.status import DOUBTFUL_STD
 
 PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
@@ -191,9 +191,9 @@ def test_whether_contacts_are_enough_is_no_matter_of_the_unit(noise):
     surface, found = surfaces.pear(), []
     for step in (0.25, 0.5, 1.0, 3.0):
         r = surface.fit(surface.track(surfaces.planes((0, 60, 120)), step=step, noise=noise, rng=1))
-        found.append(_is_enough(r))
+        found.append(is_enough(r))
         for scale in (1e-3, 1.0 / r.radius, 30.0):
-            assert _is_enough(r.moved(np.diag([scale, scale, scale, 1.0]))) == found[-1]
+            assert is_enough(r.moved(np.diag([scale, scale, scale, 1.0]))) == found[-1]
     assert found[-1] == (noise == 0.0)
 
 
@@ -206,4 +206,4 @@ def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
         twice = surface.fit(surface.track(planes, step=step / 2.0, noise=noise, rng=1))
         share = twice.mean_height_std / once.mean_height_std
         if abs(share - (1.0 - NOTICEABLE)) > 0.1:
-            assert _is_enough(once) == (share > 1.0 - NOTICEABLE)
+            assert is_enough(once) == (share > 1.0 - NOTICEABLE)
