@@ -93,7 +93,7 @@ def main():
     addon, exploration, clock = extension.tactile_addon, extension.core.reconstruction.exploration, Clock()
     clock.wrap(addon.touch.surface.MeshSurface, "ray_cast", "ray casts")
     clock.wrap(exploration, "track", "tracking")
-    clock.wrap(exploration, "reconstruct", "fit")
+    clock.wrap(exploration, "reconstruct_many", "fit")
     clock.wrap(addon.touch.touch_object, "reconstruction_report", "fit")
     clock.wrap(addon.scene.patch_object, "rewrite", "mesh write")
     # As in a window, where what is dear waits for the end of the gesture.

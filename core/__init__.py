@@ -23,7 +23,7 @@ from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
 from .patch.monge import MongePatch
 from .reconstruction.deviations import mean_height_stds, with_height_stds
-from .reconstruction.exploration import Exploration, explore, explore_many
+from .reconstruction.exploration import explore, explore_many
 from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.result import Reconstruction
@@ -31,6 +31,7 @@ from .reconstruction.serialization import from_dict, to_dict
 from .scan.pose_search import Pose, register
 from .scan.sampling import spaced
 from .scan.verification import reachable, verify
+from .touching import Exploration
 
 __all__ = [
     "CREASE",
