@@ -21,6 +21,7 @@ from core import SamplingPlane, reconstruct, track
 from . import ROOT, SCANS_FOLDER, accuracy, table
 from .real import Scan
 
+BATCH = 20  # touches of each scan at once
 POINTS, PLANES, EXTENT, STEPS = 6, (3, 5), 1.0 / 16.0, 12  # of each scan; of its size
 KINDS = {"batch": 1, "planes": 1, "touch": 2, "fit": 5, "spline": 5}  # with the rounds of each
 
@@ -78,6 +79,7 @@ def cases():
     """What speed_worker.py reads; and which of the fits have no residual, booleans."""
     scans = [Scan(path) for path in sorted(SCANS_FOLDER.glob("*.*"))]
     places = [list(scan.places(POINTS, 1)) for scan in scans]
+    together = [[np.array(part) for part in zip(*scan.places(BATCH, 2), strict=True)] for scan in scans]
     touched = [*_exact(), *(each for s, p in zip(scans, places, strict=True) for each in _fixed(s, p))]
     results = [reconstruct(point, contours, outward=outward) for point, outward, contours in touched]
     contacts = [np.vstack([np.zeros(3), r.contacts]) / r.radius for r in results]
@@ -86,7 +88,7 @@ def cases():
         "contacts": contacts,
         "scans": [(scan.points, scan.faces) for scan in scans],
         "touches": [(i, *place) for i, of in enumerate(places) for place in of],
-        "batches": [(i, *(np.array(part) for part in zip(*of, strict=True))) for i, of in enumerate(places)],
+        "batches": [(i, *of) for i, of in enumerate(together)],
     }
     return found, np.array([r.residual is None for r in results])
 

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the time of a fit goes, what its solvers gain, and what fitting many at once gains.
 
-`python -m benchmarks.speed [--base ROOT [TASK ...]]`, from the root of a checkout. With --base it prints how long
-fits and automatic touches take beside those of that checkout and beside scipy's thin plate (ratios.py; bpy to
-read the scans and to cast rays), and nothing else. Otherwise, on the touches of benchmarks.accuracy (eleven exact
-surfaces, three plane sets, three noise levels, 75 contacts) it prints Markdown tables:
+`python -m benchmarks.speed [--base ROOT [TASK ...]]`, from the root of a checkout. With --base it prints how
+long fits and automatic touches take beside those of that checkout and beside scipy's thin plate (ratios.py;
+bpy to read the scans and to cast rays), and nothing else. Otherwise, on the touches of benchmarks.accuracy
+(eleven exact surfaces, three plane sets, three noise levels, 75 contacts) it prints Markdown tables:
 
 (a) the minimization of (9), by Newton's method, by scipy's L-BFGS-B from the same start and on the same grid,
     and by the paper's steepest descent from the paper's start;

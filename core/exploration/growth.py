@@ -24,7 +24,7 @@ from ..reconstruction.status import DOUBTFUL_STD
 CONTACTS = (12, 24, 48)  # Numbers of contacts of the longest half curve: the first that is enough is taken.
 LEAST = 4  # contacts of the shortest half curve
 FELT = 96  # contacts of a half curve as long as may be
-SEEDS = (24, 12, 6, 4)  # Numbers of these contacts that a half curve may begin with.
+SEEDS = (24, 12, 6, 3)  # Numbers of these contacts that a half curve may begin with.
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
 GROWTH = 1.5  # A half curve grows by this factor at once.
 NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
@@ -140,7 +140,7 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
 
 
 def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
-    """The longest of SEEDS that is in no doubt, or the one in the least; all that are tried become `known`."""
+    """The longest of SEEDS that is in no doubt, or the one in the least; what is tried becomes `known`."""
     error, seeds = None, list(SEEDS)
     while seeds:
         counts = np.minimum(seeds.pop(0), felt.whole)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One touch that chooses what is not given, and asks for the fits that it needs by `yield`, as in growth.py."""
+"""One touch that chooses what is not given, and asks by `yield` for its fits, as in growth.py."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
@@ -77,7 +77,7 @@ class Touch:
     step: float | None
     farthest: float
     tolerance: float | None
-    most_planes: int
+    most_planes: float
     is_grown: bool
 
     def steps(self) -> Steps:

@@ -110,7 +110,7 @@ def _wanted(
         "step": between,
         "farthest": number("farthest", farthest, above=0.0) if length is None else length,
         "tolerance": None if tolerance is None else number("tolerance", tolerance, least=0.0),
-        "most_planes": most_planes,
+        "most_planes": number("most_planes", most_planes, least=3.0),
         "is_grown": fit.get("method", "bayes") == "bayes",
     }
 

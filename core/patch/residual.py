@@ -104,7 +104,7 @@ def places_factor(within: Array) -> Array:
 
 
 def cholesky(matrix: Array) -> Array:
-    """Its lower triangular factor; the matrix (m, m) may be used up. scipy's is some times as fast as numpy's."""
+    """Its lower triangular factor; of (m, m), which is used up. scipy's is some times as fast as numpy's."""
     from scipy.linalg.lapack import dpotrf
 
     factor, failed = dpotrf(matrix.T, lower=0, clean=1, overwrite_a=1)
@@ -166,7 +166,7 @@ def own_variance(p: Array, variances: Array) -> Array:
 
 
 def _maternes(distance: Array) -> list[Array]:
-    """M of distances (...), which are used up, over each of LENGTHS; of the shorter by its power of the other's.
+    """M of distances (...), which are used up, over each of LENGTHS; the shorter's by the other's.
 
     What is worked on is passed over memory as seldom as can be.
     """

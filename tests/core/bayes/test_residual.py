@@ -23,6 +23,7 @@ from core.bayes.linear_system import prior_mean
 from core.bayes.posterior import DISK, FREE, nodes
 from core.bayes.residual_evidence import Touch, fitted, system_of
 from core.bayes.rough_fit import SCALE
+from core.patch import residual
 from core.patch.monge import TERMS, exponents, monomials
 from core.patch.residual import kernel, weighted_kernel
 from core.reconstruction.deviations import mean_height_stds
@@ -63,6 +64,35 @@ def touched(seed=0, **options):
 
 def over(r, count=60):
     return r.domain.grid(count)[0]
+
+
+@pytest.mark.parametrize("lengths", [(0.4, 0.8), (0.4, 1.0), (0.5, 0.5)])
+def test_kernels_are_materns_of_each_length(monkeypatch, lengths):
+    monkeypatch.setattr(residual, "LENGTHS", np.array(lengths))
+    p, q = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 7, 2))
+    p[0] = q[0]
+    for values, length in zip(residual.kernels(p, q), lengths, strict=True):
+        a = np.sqrt(5.0) / length * np.linalg.norm(p[:, None] - q, axis=2)
+        assert values == pytest.approx((1.0 + a + a**2 / 3.0) * np.exp(-a), rel=1e-12)
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.3])
+def test_the_mean_alone_is_that_of_the_posterior(weight):
+    flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
+    contacts = np.column_stack([flat, rough(3)(flat)])
+    weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
+    touch = Touch(contacts, weights, 1e-3, 4e-3, prior_mean(0.2, 0.3), None)
+    system = system_of(touch)
+    size = residual_evidence.sizes(touch, system)
+    mean = residual_evidence.mean_given(touch, system, size)
+    whole = fitted(touch, system, size.variances, size.noise)[0]
+    over = np.random.default_rng(1).uniform(-0.6, 0.6, (50, 2))
+    heights = (
+        monomials(*over.T, TERMS) @ m[: len(TERMS)]
+        + weighted_kernel(over, contacts[:, :2], size.variances, m[len(TERMS) :])
+        for m in (mean, whole.mean)
+    )
+    assert next(heights) == pytest.approx(next(heights), abs=1e-4)
 
 
 def test_derivatives_are_those_of_the_height():

@@ -171,9 +171,93 @@ def test_a_point_beside_an_edge_is_refused_as_ever():
         explore(Sliver())
 
 
+def touched_at(places, ball, **more):
+    """Points and outward normals of a ball, and what explore and explore_many find there."""
+    up = np.array(places) / np.linalg.norm(places, axis=1, keepdims=True)
+    points = ball.point - 20.0 * ball.normal + 20.0 * up
+    many = core.explore_many(ball, points, up, PLANES, farthest=30.0, **more)
+    return points, many, [explore(ball, p, n, **more) for p, n in zip(points, up, strict=True)]
+
+
+@pytest.mark.parametrize("more", [{}, {"extent": 8.0}, {"method": "tagc"}, {"tolerance": 0.0}])
+def test_many_are_what_each_is(more):
+    ball = surfaces.sphere(20.0)
+    _, many, single = touched_at([(1.0, 0.2, 0.1), (0.1, 1.0, 0.3), (-0.3, 0.2, 1.0)], ball, **more)
+    for one, other in zip(many, single, strict=True):
+        assert (one.extent, one.step) == (other.extent, other.step)
+        azimuths = ([plane.azimuth for plane in each.planes] for each in (one, other))
+        assert next(azimuths) == pytest.approx(next(azimuths), abs=1e-6)
+        assert [c.stops for c in one.contours] == [c.stops for c in other.contours]
+        assert one.stds == pytest.approx(other.stds, rel=1e-6)
+        assert one.result.patch.k1 == pytest.approx(other.result.patch.k1, rel=1e-6)
+
+
+def test_of_many_one_may_be_no_touch():
+    ball = surfaces.sphere(20.0)
+    points = np.array([ball.point, ball.point + 5.0 * ball.normal])
+    one, other = core.explore_many(ball, points, [ball.normal] * 2, PLANES, farthest=30.0)
+    assert one.result.status == "ok"
+    assert str(other).startswith("point: wanted one on the surface")
+    assert core.explore_many(ball, np.empty((0, 3)), np.empty((0, 3)), PLANES, farthest=30.0) == []
+
+
+def wavy():
+    """Waves that three planes do not show well."""
+    return bowl_with(
+        lambda x, y: 0.8 * np.sin(0.4 * x) * np.cos(0.3 * y),
+        lambda x, y: (0.32 * np.cos(0.4 * x) * np.cos(0.3 * y), -0.24 * np.sin(0.4 * x) * np.sin(0.3 * y)),
+    )
+
+
+def test_planes_are_added_to_what_was_felt_while_they_help():
+    three, more = explore(wavy()), explore(wavy(), tolerance=0.0)
+    added = len(more.planes) - 3
+    assert added > 0
+    assert len(more.stds) == added + 1
+    assert (more.extent, more.step) == (three.extent, three.step)
+    assert more.stds[0] == three.result.mean_height_std
+    assert more.stds[-1] == more.result.mean_height_std < 0.9 * three.result.mean_height_std
+    for old, new in zip(three.contours, more.contours, strict=False):
+        assert np.array_equal(old.points, new.points)
+    azimuth = core.suggest_plane(three.result)[0].azimuth
+    d1 = three.result.frame.axes[:, 0]
+    along = np.cos(azimuth) * d1 + np.sin(azimuth) * three.result.frame.axes[:, 1]
+    assert np.sin(core.azimuth_of(along, UP) - more.planes[3].azimuth) == pytest.approx(0.0, abs=0.02)
+    assert true_error(wavy(), more) < true_error(wavy(), three)
+
+
+def test_planes_are_added_until_it_is_good_enough():
+    stds = explore(wavy(), tolerance=0.0).stds
+    assert explore(wavy(), tolerance=1.001 * stds[1]).stds == pytest.approx(stds[:2])
+    assert len(explore(wavy(), tolerance=1.001 * stds[0]).planes) == 3
+    assert len(explore(wavy(), tolerance=0.0, most_planes=4).planes) == 4
+
+
+class Counted:
+    """A surface that counts its rays."""
+
+    def __init__(self, surface):
+        self.surface, self.rays = surface, 0
+
+    def ray_cast(self, *ray):
+        self.rays += 1
+        return self.surface.ray_cast(*ray)
+
+
+def test_nothing_is_felt_twice():
+    """On a plane: a quarter of the way, then all of it, whose contacts are those that are fitted."""
+    surface, whole = Counted(surfaces.plane()), Counted(surfaces.plane())
+    found = explore(surface)
+    core.track(whole, (0.0, 0.0, 0.0), UP, PLANES, extent=30.0, step=30.0 / 96.0)
+    assert found.extent == pytest.approx(30.0)
+    assert surface.rays < 1.3 * whole.rays
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [
+        ({"tolerance": -1.0}, "tolerance: wanted a finite number of 0 or more, got -1"),
+        ({"most_planes": 2}, "most_planes: wanted a finite number of 3 or more, got 2"),
         ({"extent": "far"}, "extent: wanted a finite number above 0, got 'far'"),
         ({"step": -1.0}, "step: wanted a finite number above 0, got -1"),
         ({"farthest": 0.0}, "farthest: wanted a finite number above 0, got 0"),

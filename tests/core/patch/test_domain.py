@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from core.patch.domain import closed_spline_domain
 
@@ -22,6 +23,21 @@ def test_six_even_ends_make_nearly_a_disk():
     domain = closed_spline_domain(circle(SIXTH, 12.0), 12.0)
     assert domain.area == pytest.approx(np.pi * 144, rel=0.02)
     assert np.linalg.norm(domain.boundary(500), axis=1) == pytest.approx(12.0, rel=0.01)
+
+
+@pytest.mark.parametrize("ends", [circle([10, 130, 250]), circle(SIXTH), UNEVEN, STUBBY])
+def test_the_boundary_is_the_closed_cubic_spline_over_the_chords(ends):
+    domain = closed_spline_domain(ends, 1.0)
+    closed = np.vstack([domain.ends, domain.ends[:1]])
+    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    theirs = CubicSpline(at, closed, bc_type="periodic")(np.linspace(0.0, at[-1], 1001)).T
+    azimuth = np.arctan2(theirs[1], theirs[0])
+    assert domain.points_at(np.column_stack([np.cos(azimuth), np.sin(azimuth)])) == pytest.approx(
+        theirs.T, abs=1e-4
+    )
+    points, weights = domain.nodes
+    assert weights.sum() == pytest.approx(1.0, rel=1e-12)
+    assert domain.contains(*points.T).all()
 
 
 @pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
