@@ -102,7 +102,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         beside = (given[i].strokes - points[i]) @ axes[row] / radii[row]
         if len(beside):
             beside = beside[_over(curves.at(row), local[row], beside)]
-        beside, size = means(beside, k1[row], k2[row])
+        beside, size = means(beside)
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
@@ -143,7 +143,7 @@ def strokes_start(
     if not firsts:
         return None, none, errors
     good = list(firsts)
-    thin = [means(first.contacts, first.k1, first.k2) for first in firsts.values()]
+    thin = [means(first.contacts) for first in firsts.values()]
     stds = [
         _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
     ]

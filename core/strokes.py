@@ -3,8 +3,8 @@
 """Strokes: contacts that run beside the reference point, and the frame they show where there are no contours.
 
 A robot that wipes over an object has thousands of them, with noise in all directions, and the fit takes where
-one lies in the tangent plane for exact. So the fit gets means of neighbors, whose heights are those over a
-quadric: what curvature adds to a mean is not noise.
+one lies in the tangent plane for exact. So the fit gets means of neighbors, of their heights over a quartic:
+what the shape adds to a mean is no noise.
 """
 
 import math
@@ -20,10 +20,12 @@ from .contours.contour import Contour, cross
 from .contours.local_geometry import DegenerateCurvesError
 from .patch.monge import exponents, monomials
 
-STRIPS = 20  # of means, and as many means in each
+# Of means, and as many means in each; of more the offsets of rows count for texture (benchmarks.robot).
+STRIPS = 10
+SOME = 2000  # contacts that the quartic is fitted to
 NEAR = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
 DETERMINED = 0.02  # the least singular value of a quadric's terms in the mean over contacts, in unit radius
-QUADRIC = exponents(0, 2)
+QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 FAR = 0.999  # of the greatest distance, that is as far: rounding must not choose
 
 
@@ -53,10 +55,8 @@ def gathered(strokes: Sequence[ArrayLike | Contour]) -> tuple[Array, float]:
     return np.vstack([np.empty((0, 3)), *arrays]), noise
 
 
-def means(contacts: Array, k1: float, k2: float) -> tuple[Array, int]:
-    """Contacts (n, 3), or STRIPS^2 means of as many neighbors each; and of how many at least.
-
-    k1, k2 : curvatures along the axes, which the contacts are nearly principal in
+def means(contacts: Array) -> tuple[Array, int]:
+    """Contacts (n, 3) in unit radius, or STRIPS^2 means of neighbors; and of how many these are, at least.
 
     By equal counts in strips along the first axis, and along the second in each strip.
     """
@@ -69,15 +69,17 @@ def means(contacts: Array, k1: float, k2: float) -> tuple[Array, int]:
     order = order[np.lexsort((contacts[order, 1], np.repeat(np.arange(STRIPS), lengths)))]
     starts = (firsts[:, None] + np.arange(STRIPS) * lengths[:, None] // STRIPS).ravel()
     counts = np.diff(starts, append=n)[:, None]
+    some = contacts[:: max(1, n // SOME)]
+    quartic = np.linalg.lstsq(_basis(some), some[:, 2], rcond=None)[0]
     over = contacts[order]
-    over[:, 2] -= _bent(over, k1, k2)
+    over[:, 2] -= _basis(over) @ quartic
     found: Array = np.add.reduceat(over, starts, axis=0) / counts
-    found[:, 2] += _bent(found, k1, k2)
+    found[:, 2] += _basis(found) @ quartic
     return found, int(counts.min())
 
 
-def _bent(contacts: Array, k1: float, k2: float) -> Array:
-    return 0.5 * (k1 * contacts[:, 0] ** 2 + k2 * contacts[:, 1] ** 2)
+def _basis(contacts: Array) -> Array:
+    return monomials(contacts[:, 0], contacts[:, 1], QUARTIC)
 
 
 def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | DegenerateCurvesError:

@@ -83,9 +83,9 @@ def test_strokes_alone_show_an_exact_surface(name, rows):
 
 
 @pytest.mark.parametrize("name", SURFACES)
-def test_the_error_falls_faster_than_the_square_of_the_extent(name):
+def test_the_error_falls_as_the_square_of_the_extent_to_what_no_polynomial_tells(name):
     errors = [judged(SURFACES[name], alone(name, wiped(name, 500, 0, extent)))[0] for extent in (16.0, 4.0)]
-    assert errors[1] < errors[0] / 4.0**2
+    assert errors[1] < max(errors[0] / 4.0**2, 1e-4 * 4.0)
 
 
 @pytest.mark.parametrize("rows", [0, 9])
@@ -98,8 +98,8 @@ def test_intervals_of_strokes_alone_hold_and_rows_do_not_bias(count, rows, share
             within.append(judged(surface, r)[1])
             mean, true = 0.5 * (r.patch.k1 + r.patch.k2), 0.5 * (surface.k1 + surface.k2)
             steepness.append((mean - true) / r.mean_curvature_std)
-    # Where the means are better than a polynomial is taken to describe a surface, intervals are wide.
-    assert 0.8 <= np.mean(within) <= (1.0 if share == 0.002 else 0.97)
+    # Few contacts, and means better than a polynomial is taken to describe a surface, leave intervals wide.
+    assert 0.8 <= np.mean(within) <= (0.97 if (count, share) == (3000, 0.02) else 1.0)
     assert abs(np.mean(steepness)) < 4.0 / np.sqrt(len(steepness))
 
 
@@ -141,7 +141,7 @@ def test_beside_contours_the_point_l_and_domain_are_theirs_and_far_strokes_are_i
     assert len(r.strokes) == 0
     assert json.dumps(to_dict(r)) == json.dumps(to_dict(plain))
     r = surface.fit(contours, strokes=[wiped("pear", 200, 9), far])
-    assert 100 < len(r.strokes) <= 200
+    assert len(r.strokes) == STRIPS**2
     assert r.radius == pytest.approx(plain.radius, rel=1e-3)
     assert r.domain.boundary(40) == pytest.approx(plain.domain.boundary(40), abs=0.02 * EXTENT)
     assert len(r.contacts) == len(plain.contacts) + len(r.strokes)
@@ -232,19 +232,24 @@ def test_the_patch_moves_with_its_contacts(count, with_contours, scale, turn, sh
     assert again.mean_height_std == pytest.approx(scale * one.mean_height_std)
 
 
-def test_means_of_neighbors_lie_on_a_quadric_and_take_all_contacts():
-    rng = np.random.default_rng(0)
-    flat = rng.uniform(-1.0, 1.0, (5000, 2))
-    contacts = np.column_stack([flat, 0.3 * flat[:, 0] ** 2 - 0.2 * flat[:, 1] ** 2])
-    found, size = means(contacts, 0.6, -0.4)
+def test_means_of_neighbors_lie_on_a_quartic_and_take_all_contacts():
+    def height(x, y):
+        return 0.3 * x**2 - 0.2 * y**2 + 0.1 * x**3 * y
+
+    contacts = np.random.default_rng(0).uniform(-1.0, 1.0, (5000, 3))
+    contacts[:, 2] = height(*contacts[:, :2].T)
+    found, size = means(contacts)
     assert len(found) == STRIPS**2
-    assert size == 12
-    assert found[:, 2] == pytest.approx(0.3 * found[:, 0] ** 2 - 0.2 * found[:, 1] ** 2, abs=1e-12)
-    few, size = means(contacts[: STRIPS**2], 0.6, -0.4)
+    assert size == 5000 // STRIPS**2
+    assert found[:, 2] == pytest.approx(height(*found[:, :2].T), abs=1e-12)
+    contacts[:, 2] = 1.0
+    contacts[17, 2] += 500.0
+    assert means(contacts)[0][:, 2].max() > 5.0
+    few, size = means(contacts[: STRIPS**2])
     assert size == 1
     assert np.array_equal(few, contacts[: STRIPS**2])
     # All in one place, or in one row, are no other case.
-    assert np.isfinite(means(np.zeros((5000, 3)), 0.0, 0.0)[0]).all()
+    assert np.isfinite(means(np.zeros((5000, 3)))[0]).all()
 
 
 def test_the_residual_takes_what_a_sextic_leaves_of_strokes_too():
@@ -300,13 +305,13 @@ def test_through_json_and_back_it_is_the_same_to_the_last_bit(with_contours):
 
 
 def test_a_stroke_may_be_a_contour_and_brings_its_noise():
-    points = noisy(wiped("pear", 300), 0.2, 0)
+    points = noisy(wiped("pear", 120), 0.2, 0)
     one = alone("pear", points, noise=0.2)
     r = reconstruct(
         SURFACES["pear"].point,
         [],
         outward=SURFACES["pear"].normal,
-        strokes=[Contour(points[:100], noise=0.2), Contour(points[100:])],
+        strokes=[Contour(points[:40], noise=0.2), Contour(points[40:])],
     )
     assert r.accuracy == one.accuracy == pytest.approx(0.2 / r.radius)
     assert np.array_equal(r.height(1.0, 2.0), one.height(1.0, 2.0))
