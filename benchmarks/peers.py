@@ -55,28 +55,36 @@ def gaussian_process(case, nu=2.5):
 
 def quadric_process(case):
     """The same of what a quadric leaves over, with its deviation: what suits real surfaces better."""
+    r, contacts, _ = _start(case)
+    height, height_std = matern_on_quadric(contacts)
+    fit = _scaled_fit(r, height)
+    return fit._replace(height_std=lambda x, y: r.radius * height_std(np.column_stack([x, y]) / r.radius))
+
+
+def matern_on_quadric(contacts, noisiest=0.1):
+    """Of contacts (n, 3) in unit radius: functions of points (m, 2) for the height and its deviation.
+
+    noisiest : variance of the noise at most, over that of what the quadric leaves
+    """
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
-    r, contacts, _ = _start(case)
     terms = exponents(0, 2)
     basis = monomials(*contacts[:, :2].T, terms)
     b = np.linalg.lstsq(basis, contacts[:, 2], rcond=None)[0]
     left = contacts[:, 2] - basis @ b
     scale = max(left.std(), 1e-9)
     kernel = ConstantKernel(1.0, (1e-4, 1e4)) * Matern(0.5, (0.05, 20.0), nu=2.5)
-    process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-9, 0.1)))
+    process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-9, noisiest)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of hyperparameters at their bounds
         process.fit(contacts[:, :2], left / scale)
 
-    def height_std(x, y):
-        points = np.column_stack([x, y]) / r.radius
+    def height_std(points):
         noisy = process.predict(points, return_std=True)[1] ** 2 - process.kernel_.k2.noise_level
-        return r.radius * scale * np.sqrt(np.maximum(noisy, 0.0))
+        return scale * np.sqrt(np.maximum(noisy, 0.0))
 
-    fit = _scaled_fit(r, lambda points: monomials(*points.T, terms) @ b + scale * process.predict(points))
-    return fit._replace(height_std=height_std)
+    return lambda points: monomials(*points.T, terms) @ b + scale * process.predict(points), height_std
 
 
 def radial_basis(case, kernel, **options):

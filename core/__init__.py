@@ -33,7 +33,6 @@ from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
 from .scan.sampling import spaced
 from .scan.verification import reachable, verify
-from .touching import Exploration
 
 __all__ = [
     "CREASE",

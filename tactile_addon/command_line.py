@@ -24,7 +24,7 @@ from .touch.wording import readable, verification_columns
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 # What the operators take as it is given.
 PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
-PLAIN |= {"tolerance", "unit", "point", "flip"}
+PLAIN |= {"tolerance", "unit", "point", "flip", "radius"}
 
 
 def main(args):
@@ -74,6 +74,9 @@ def _add_fit(command):
     add("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply, curves of one patch")
     add("--unit", choices=list(contact_file.LENGTHS), help="of the numbers (what the file says)")
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
+    help = "a place among strokes, which all curves are then (default, of strokes alone: their mean)"
+    add("--location", **VECTOR, help=help)
+    add("--radius", type=float, help="of strokes alone: how far from that place contacts count (all)")
     add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
     add("--flip", action="store_true", default=None, help="the other side is the outer one")
     add("--noise", type=float, help="standard deviation of a contact, at least")
@@ -135,6 +138,10 @@ def _arguments(options):
     if options.normal_std is not None:
         given["normal_std"] = math.radians(options.normal_std)
     if "files" in options:
+        if "location" in given:
+            if "point" in given:
+                options.fail("--location: wanted it or --point, got both")
+            given |= {"point": given.pop("location"), "strokes": True}
         return given | _open_contacts(options)
     given["target"] = options.target or _default_target()
     if options.azimuths is not None:

@@ -63,6 +63,7 @@ def joint_fit(
     tangent: Array,
     accuracy: Array,
     normals: Array | None = None,
+    through: bool = True,
 ) -> tuple[Array, Posterior, Array]:
     """The Darboux frames and the surfaces that the contacts of b touches show, and how well they show them.
 
@@ -72,6 +73,7 @@ def joint_fit(
     tangent : (b, 3), in that frame, which d1 is to follow
     accuracy : (b,), standard deviation of a contact, at least
     normals : (b, n, 3), measured, over their standard deviation; 0 where there is none
+    through : whether the surfaces pass through the origin; where not, their height there is free
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, the posteriors in the new one, where
     the means of the slopes and of the mixed second derivative are 0, and the weights (b, n) that the
@@ -83,7 +85,7 @@ def joint_fit(
     touches = _Touches(contacts, given, tangent, np.maximum(accuracy, MISFIT), axes, k1, k2, weights)
     pending, found = np.arange(len(contacts)), []
     for step in range(PASSES):
-        touches, settled, surface = _pass(touches, step)
+        touches, settled, surface = _pass(touches, step, through)
         if surface is not None:
             found.append((pending[settled], touches.axes[settled], touches.weights[settled], *surface))
         if settled.all():
@@ -98,11 +100,13 @@ def joint_fit(
     return turns[back], Posterior(*(values[back] for values in surfaces)), found_weights[back]
 
 
-def _pass(touches: _Touches, step: int) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
+def _pass(
+    touches: _Touches, step: int, through: bool
+) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
     """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
     expected = np.array([prior_mean(*pair) for pair in zip(touches.k1, touches.k2, strict=True)])
     local, normals = touches.contacts @ touches.axes, touches.normals @ touches.axes
-    system, data = linear_system(local, touches.weights, expected, normals), None
+    system, data = linear_system(local, touches.weights, expected, normals, through), None
     if step == 0:
         waviness = np.full(len(expected), USUAL_WAVINESS)
         hyper = Hyperparameters(waviness, prior_variances(waviness), touches.floor)

@@ -28,6 +28,8 @@ class System(NamedTuple):
 
     gram (b, 27, 27) and seen (b, 27) are basis' basis and basis' heights, weighted. slopes (b, 2n, 27)
     @ coefficients ~ steepness (b, 2n) in units of their deviation, weighted; None without normals.
+    pivot (b, 27) is 0 where surfaces pass through the origin. Where their height there is free it is the mean
+    of the basis over the contacts; the basis is less that, and the heights are less their mean.
     """
 
     basis: Array
@@ -36,6 +38,7 @@ class System(NamedTuple):
     seen: Array
     slopes: Array | None = None
     steepness: Array | None = None
+    pivot: Array = np.zeros(len(TERMS))
 
 
 def prior_mean(k1: float, k2: float) -> Array:
@@ -59,16 +62,24 @@ def prior_mean(k1: float, k2: float) -> Array:
     return mean
 
 
-def linear_system(local: Array, weights: Array, expected: Array, normals: Array) -> System:
+def linear_system(
+    local: Array, weights: Array, expected: Array, normals: Array, through: bool = True
+) -> System:
     """The linear system of contacts (b, n, 3) and their weights (b, n), less the prior's means (b, 27).
 
     normals : (b, n, 3), measured, over their standard deviations, or (b, 0, 3)
+    through : whether the surfaces pass through the origin
     """
     flat = local.reshape(-1, 3)
     basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
     heights = local[..., 2] - (basis @ expected[..., None])[..., 0]
+    pivot = np.zeros_like(expected)
+    if not through:
+        shares = weights[:, None] / weights.sum(axis=1)[:, None, None]
+        pivot = (shares @ basis)[:, 0]
+        basis, heights = basis - pivot[:, None], heights - (shares @ heights[..., None])[..., 0]
     weighted = np.swapaxes(weights[..., None] * basis, 1, 2)
-    system = System(basis, heights, weighted @ basis, (weighted @ heights[..., None])[..., 0])
+    system = System(basis, heights, weighted @ basis, (weighted @ heights[..., None])[..., 0], pivot=pivot)
     if not normals.shape[1]:
         return system
     slopes, steepness = slope_equations(normals, local, weights)
@@ -117,7 +128,16 @@ def posterior(
         )
         triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
         visibility = SCALE * triangle[:, FREE:, FREE:]
-    return Posterior(mean, covariance, hyper.noise, visibility)
+    return Posterior(mean, covariance, hyper.noise, visibility, _level(covariance, system, hyper, weights))
+
+
+def _level(covariance: Array, system: System, hyper: Hyperparameters, weights: Array) -> Array:
+    """Of a Posterior: the height at the origin is the contacts' mean less what the terms are at the pivot."""
+    level = np.zeros((len(weights), len(TERMS) + 1))
+    if system.pivot.any():
+        level[:, 1:] = -(covariance @ system.pivot[..., None])[..., 0]
+        level[:, 0] = hyper.noise**2 / weights.sum(axis=1) - np.einsum("bi,bi->b", level[:, 1:], system.pivot)
+    return level
 
 
 def _precision(system: System, variances: Array, noise: Array) -> Array:

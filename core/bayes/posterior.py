@@ -29,12 +29,15 @@ class Posterior(NamedTuple):
     visibility : (..., 22, 22), upper triangular: its singular values are what the contacts show of
         directions among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1;
         those of a leading block, of the terms to a lower degree
+    level : (..., 28), variance of the height at the origin, and its covariances with the terms; 0 where
+        that is exact, as at a reference point that was touched
     """
 
     mean: Array
     covariance: Array
     noise: Array
     visibility: Array
+    level: Array
 
     __eq__, __hash__ = object.__eq__, object.__hash__  # type: ignore[misc]  # Arrays have no single truth value.
 
@@ -47,20 +50,27 @@ class Posterior(NamedTuple):
         f = np.asarray(factor)
         factors = f[..., None] ** (1.0 - ORDERS)
         covariance = factors[..., :, None] * factors[..., None, :] * self.covariance
-        return self._replace(mean=factors * self.mean, covariance=covariance, noise=f * self.noise)
+        level = f[..., None] * np.concatenate([f[..., None], factors], axis=-1) * self.level
+        return self._replace(
+            mean=factors * self.mean, covariance=covariance, noise=f * self.noise, level=level
+        )
 
     def turned(self, angle: Array) -> "Posterior":
         """These surfaces in axes that are turned by `angle` (...) about the normal."""
         turn = _turn(angle)
-        mean = (turn @ self.mean[..., None])[..., 0]
-        return self._replace(mean=mean, covariance=turn @ self.covariance @ np.swapaxes(turn, -1, -2))
+        mean, level = (turn @ self.mean[..., None])[..., 0], self.level.copy()
+        level[..., 1:] = (turn @ level[..., 1:, None])[..., 0]
+        return self._replace(
+            mean=mean, covariance=turn @ self.covariance @ np.swapaxes(turn, -1, -2), level=level
+        )
 
     # What follows is of one only.
 
     def height_std(self, x: Array, y: Array) -> Array:
         """Standard deviations of the height at n points, (n,)."""
         basis = monomials(x, y, TERMS)
-        return np.sqrt(np.maximum(np.einsum("ni,ni->n", basis @ self.covariance, basis), 0.0))
+        variance = np.einsum("ni,ni->n", basis @ self.covariance, basis) + self._levels(basis, basis)
+        return np.sqrt(np.maximum(variance, 0.0))
 
     def height_covariance(self, p: Array, q: Array) -> Array:
         """Covariances of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
@@ -68,7 +78,12 @@ class Posterior(NamedTuple):
         at_p, at_q = (monomials(v[:, 0], v[:, 1], TERMS) for v in flat)
         at_p, at_q = at_p.reshape(*p.shape[:-1], -1), at_q.reshape(*q.shape[:-1], -1)
         covariance: Array = (at_p @ self.covariance) @ np.swapaxes(at_q, -1, -2)
-        return covariance
+        return covariance + self._levels(at_p[..., :, None, :], at_q[..., None, :, :])
+
+    def _levels(self, at_p: Array, at_q: Array) -> Array:
+        """What the height at the origin adds to the covariance of heights of terms (..., 27), (...)."""
+        added: Array = self.level[0] + (at_p + at_q) @ self.level[1:]
+        return added
 
     def height(self, x: Array, y: Array) -> Array:
         """The mean height at n points, (n,)."""

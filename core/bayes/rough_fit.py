@@ -44,6 +44,7 @@ def rough_fit(
     accuracy: Array,
     tangent: Array,
     normals: Array | None = None,
+    through: bool = True,
 ) -> RoughFit:
     """The fits of b touches with a residual where their contacts ask for one; where not, as they were.
 
@@ -53,6 +54,7 @@ def rough_fit(
     accuracy : (b,), standard deviation of a contact, at least
     tangent : (b, 3), which d1 is to follow
     normals : (b, n, 3), measured, over their standard deviation; they act on the terms alone
+    through : whether the origin was touched
     """
     b = len(contacts)
     found = RoughFit(np.eye(3)[None].repeat(b, axis=0), np.ones(b), posterior, [None] * b)
@@ -62,10 +64,10 @@ def rough_fit(
     found = found._replace(posterior=Posterior(*(values.copy() for values in posterior)))
     for i in candidates.tolist():
         there, least = weights[i] > 0.0, max(float(accuracy[i]), MISFIT)
-        point = np.zeros((1, 3))  # a contact like the others: on facets it may be off as they are
+        point = np.zeros((int(through), 3))  # a contact like the others: on facets it may be off as they are
         touch = Touch(
             np.vstack([contacts[i][there], point]),
-            np.append(weights[i][there], 1.0),
+            np.append(weights[i][there], np.ones(len(point))),
             least,
             max(float(posterior.noise[i]), least),
             prior_mean(2.0 * posterior.mean[i, 2], 2.0 * posterior.mean[i, 4]),

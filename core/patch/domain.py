@@ -13,6 +13,8 @@ from ..arguments import Array
 
 GRID = 600  # Points of the grid (8) over a domain.
 SAMPLES = 1024  # Samples of the boundary, whose radius is then good to 1e-5.
+AROUND = 32  # places on the hull of contacts that bound a domain
+INSIDE = 0.05  # of the radius, that the origin is inside such a hull at least
 ALONG, ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
 
 
@@ -157,3 +159,17 @@ def closed_spline_domain(ends: ArrayLike, radius: float) -> Domain:
     if count < 3:
         raise ValueError(f"ends: wanted three or more apart from each other, got {count}")
     return Domain(np.array([x[apart], y[apart]]).T)
+
+
+def hull_domain(points: ArrayLike, radius: float) -> Domain:
+    """Through places on the convex hull of points (n, 2). Raises ValueError for an origin beside it."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(np.asarray(points, dtype=float)).equations  # outward normals, and less their distances
+    turns = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    rays = np.array([np.cos(turns), np.sin(turns)])
+    ahead = hull[:, :2] @ rays
+    if hull[:, 2].max() > -INSIDE * radius:
+        raise ValueError("points: wanted the origin among them, got it beside them or at their rim")
+    reach = np.where(ahead > 0.0, -hull[:, 2:] / np.maximum(ahead, 1e-300), np.inf).min(axis=0)
+    return closed_spline_domain((reach * rays).T, radius)

@@ -44,5 +44,7 @@ def _mean_stds_of_sextics(results: Sequence[Reconstruction]) -> list[float]:
     x, y = points.reshape(-1, 2).T
     basis = monomials(x, y, TERMS).reshape(len(results), most, len(TERMS))
     variance = np.einsum("bni,bni->bn", basis @ covariance, basis) + (basis @ off[..., None])[..., 0] ** 2
+    level = np.array([r.posterior.level for r in results]).reshape(-1, len(TERMS) + 1)
+    variance += level[:, :1] + 2.0 * (basis @ level[:, 1:, None])[..., 0]
     means: Array = np.einsum("bn,bn->b", weights, np.sqrt(np.maximum(variance, 0.0)))
     return means.tolist()

@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From contours to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
+"""From contacts to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import (
     LARGEST,
@@ -22,33 +21,21 @@ from ..bayes.joint_fit import joint_fit
 from ..bayes.posterior import Posterior
 from ..bayes.rough_fit import rough_fit
 from ..contours.contour import Contour
-from ..contours.curves import (
-    Curves,
-    curves_through,
-    has_measured_normals,
-    misses,
-    stacked,
-)
-from ..contours.local_geometry import (
-    DegenerateCurvesError,
-    Frame,
-    darboux_frames,
-    degeneracy,
-    surface_normals,
-)
-from ..contours.thinning import thinned
+from ..contours.curves import Curves, has_measured_normals, misses
+from ..contours.local_geometry import DegenerateCurvesError, Frame
 from ..paper.by_method import PAPER_METHODS, SOLVERS, coefficients
-from ..patch.domain import Domain, closed_spline_domain
+from ..patch.domain import Domain, hull_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import DEGREE, MongePatch
 from ..patch.residual import Residual
 from .result import Reconstruction
+from .start import Given, Start, curves_start, domain_of, levels, strokes_start
+from .strokes import gathered
 
 METHODS = ("bayes", *PAPER_METHODS)
 # lambda L^2: of TAGC the paper's 9.99/mm^2 at L = 10 mm; quadratic variation in the paper is subject to
 # f = 0, which 1e5 comes near.
 WEIGHTS = {"tagc": 1e3, "quadratic-variation": 1e5}
-COARSE = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
 STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache
 
 
@@ -57,15 +44,22 @@ def reconstruct(
     contours: Sequence[Contour],
     *,
     outward: ArrayLike,
+    strokes: Sequence[ArrayLike | Contour] = (),
+    radius: float | None = None,
     method: str = "bayes",
     degree: int | str = 4,
     noise: float | None = None,
     weight: float | None = None,
     solver: str = "fast",
 ) -> Reconstruction:
-    """The surface patch around `point` from three or more contours through it.
+    """The surface patch around `point` from three or more contours through it, from strokes, or from both.
 
     point : (3,), exact; outward : (3,), on the outer side of the surface
+    strokes : contacts beside the point, (n, 3) each or Contours, whose normals are not fitted; only "bayes"
+        takes them. With contours those beyond the domain are ignored. From strokes alone (no contours) the
+        point is only a place: the origin is its foot on the polynomial, L is that of the farthest contact and
+        the domain is the hull of the contacts
+    radius : from strokes alone, of the contacts around the point that are used; None for all
     method : "bayes" (bayes.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)
     degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
@@ -77,8 +71,9 @@ def reconstruct(
     method. A fit in doubt comes back with a status.
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
-    options = _options(method, degree, noise, weight, solver)
-    (result,) = _stack(p[None], [list_of("contours", contours, Contour)], up[None], options)
+    options = _options(method, degree, noise, weight, solver, radius)
+    touch = _given(list_of("contours", contours, Contour), strokes, options)
+    (result,) = _stack(p[None], [touch], up[None], options)
     if isinstance(result, DegenerateCurvesError):
         raise result
     return result
@@ -89,6 +84,8 @@ def reconstruct_many(
     contours_list: Sequence[Sequence[Contour]],
     *,
     outward: ArrayLike,
+    strokes_list: Sequence[Sequence[ArrayLike | Contour]] | None = None,
+    radius: float | None = None,
     method: str = "bayes",
     degree: int | str = 4,
     noise: float | None = None,
@@ -97,26 +94,30 @@ def reconstruct_many(
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """What `reconstruct` gives for each of n touches; in stacks, which makes "bayes" some times as fast.
 
-    points : (n, 3); contours_list : n lists of contours; outward : (n, 3)
+    points : (n, 3); contours_list : n lists of contours; outward : (n, 3); strokes_list : n lists of strokes
 
     In the place of a touch that cannot carry the method stands its DegenerateCurvesError. Raises
     ValueError for bad arguments.
     """
     p = finite_array("points", points, (None, 3), LARGEST)
-    touches = [
-        list_of("contours", c, Contour)
-        for c in list_of("contours_list", contours_list, Sequence)  # type: ignore[type-abstract]
-    ]
-    if len(touches) != len(p):
-        raise ValueError(f"contours_list: wanted {len(p)} lists of contours, got {len(touches)}")
+    options = _options(method, degree, noise, weight, solver, radius)
+    lists = list_of("contours_list", contours_list, Sequence)  # type: ignore[type-abstract]
+    beside = [()] * len(lists) if strokes_list is None else list_of("strokes_list", strokes_list, Sequence)  # type: ignore[type-abstract]
+    for name, given in (("contours_list", lists), ("strokes_list", beside)):
+        if len(given) != len(p):
+            raise ValueError(f"{name}: wanted {len(p)} lists of {name[:-5]}, got {len(given)}")
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
-    options = _options(method, degree, noise, weight, solver)
+    touches = [
+        _given(list_of("contours", c, Contour), s, options) for c, s in zip(lists, beside, strict=True)
+    ]
     # Touches of like size together: a stack has room for its longest contour in all places.
-    sizes = [len(c) * max((len(contour.points) for contour in c), default=0) for c in touches]
+    sizes = [touch.size for touch in touches]
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
-    for measured in (False, True):  # slopes of some would cost time in the fits of all
-        order = [i for i, contours in enumerate(touches) if has_measured_normals(contours) is measured]
+    # Slopes of some would cost time in the fits of all, and touches of strokes alone start otherwise.
+    kinds = [(has_measured_normals(touch.contours), touch.is_of_strokes) for touch in touches]
+    for kind in dict.fromkeys(kinds):
+        order = [i for i in range(len(touches)) if kinds[i] == kind]
         order.sort(key=sizes.__getitem__, reverse=True)
         while order:
             count = max(1, STACK // max(sizes[order[0]], 1))
@@ -132,6 +133,7 @@ class _Options(NamedTuple):
     noise: float | None  # None for the contours' own
     weight: float
     solver: str
+    radius: float | None  # of strokes alone
 
 
 class _Touch(NamedTuple):
@@ -140,6 +142,7 @@ class _Touch(NamedTuple):
     frame: Frame
     radius: float
     curves: Curves
+    strokes: Array  # (m, 3)
     misses: Array  # Distances of the curves from the point, and their deviations, (c, 2).
     k1: float
     k2: float
@@ -150,7 +153,12 @@ class _Touch(NamedTuple):
 
 
 def _options(
-    method: str, degree: int | str, noise: float | None, weight: float | None, solver: str
+    method: str,
+    degree: int | str,
+    noise: float | None,
+    weight: float | None,
+    solver: str,
+    radius: float | None,
 ) -> _Options:
     for name, value, choices in (("method", method, METHODS), ("solver", solver, SOLVERS)):
         if not isinstance(value, str) or value not in choices:
@@ -163,75 +171,68 @@ def _options(
         None if noise is None else number("noise", noise, least=0.0),
         WEIGHTS.get(method, 1.0) if weight is None else number("weight", weight, above=0.0),
         solver,
+        None if radius is None else number("radius", radius, above=0.0),
     )
+
+
+def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: _Options) -> Given:
+    found = Given(contours, *gathered(strokes))
+    if len(found.strokes) and options.method != "bayes":
+        raise ValueError(
+            f'strokes: wanted none with "{options.method}", which is a method of contours: take "bayes"'
+        )
+    if contours and options.radius is not None:
+        raise ValueError("radius: wanted none beside contours, which say how far the patch reaches")
+    return found
 
 
 def _stack(
-    points: Array, touches: Sequence[Sequence[Contour]], outward: Array, options: _Options
+    points: Array, touches: Sequence[Given], outward: Array, options: _Options
 ) -> list[Reconstruction | DegenerateCurvesError]:
-    """Results of touches, whose arguments are in order."""
-    thin = [[thinned(contour, point) for contour in c] for point, c in zip(points, touches, strict=True)]
-    touches = [[contour for contour, _ in c] for c in thin]
-    sizes = np.array([min((size for _, size in c), default=1) for c in thin])
-    curves = curves_through(*stacked(points, touches))
-    normals = surface_normals(curves.tangents, outward)
-    each = zip(touches, curves.present, curves.tangents, normals, strict=True)
-    apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
-    errors = [
-        degeneracy(*touch) or (_coarse(gap, size) if gap > COARSE * size else None)
-        for touch, gap, size in zip(each, apart, reach, strict=True)
-    ]
-    good = [i for i, error in enumerate(errors) if error is None]
-    std = options.noise
-    stds = [
-        max(c.noise or 0.0 for c in touches[i]) if std is None else std / math.sqrt(sizes[i]) for i in good
-    ]
-    found = iter(
-        _framed(points[good], curves.at(good), normals[good], np.array(stds), options) if good else ()
-    )
-    return [
-        error or _result(next(found), contours, options)
-        for error, contours in zip(errors, touches, strict=True)
-    ]
+    """Results of touches, all of strokes alone or none, whose arguments are in order."""
+    if touches[0].is_of_strokes:
+        start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
+    else:
+        start, contours, errors = curves_start(points, touches, outward, options.noise)
+    found = iter(() if start is None else _fitted(start, options))
+    return [error or _result(next(found), c, options) for error, c in zip(errors, contours, strict=True)]
 
 
-def _coarse(gap: float, size: float) -> DegenerateCurvesError:
-    return DegenerateCurvesError(
-        f"the coordinates at the point are {gap:.2g} apart in double precision, too coarse for curves of "
-        f"{size:.2g}: move the origin nearer to the point"
-    )
-
-
-def _framed(points: Array, curves: Curves, normals: Array, stds: Array, options: _Options) -> list[_Touch]:
+def _fitted(start: Start, options: _Options) -> list[_Touch]:
     """Touches in the Darboux frames that the method finds."""
-    axes, k1, k2, radii = darboux_frames(curves, normals)
-    local, tangents = curves.points @ axes[:, None] / radii[:, None, None, None], curves.tangents @ axes
+    points, axes, k1, k2, radii, _, curves, strokes, stds = start
+    contacts, present = start.contacts()
+    tangents, places = curves.tangents @ axes, curves.present[0].size
     count, posteriors = len(points), None
     beside: list[Residual | None] = [None] * count
     degrees = [options.degree or 0] * count
     if options.method == "bayes" or options.degree is None:
-        turns, fitted, weights = _joint(curves, local, axes, k1, k2, tangents[:, 0], stds / radii)
+        turns, fitted, weights = _joint(start, contacts, present)
+        turned = contacts @ turns
         if options.degree is None:
-            turned = local @ turns[:, None]
-            degrees = [fitted.at(i).degree_shown(turned[i][curves.present[i]]) for i in range(count)]
+            degrees = [fitted.at(i).degree_shown(turned[i][present[i]]) for i in range(count)]
         if options.method == "bayes":
-            axes, local, tangents = axes @ turns, local @ turns[:, None], tangents @ turns
-            farthest = np.hypot(local[..., 0], local[..., 1]).max(axis=(1, 2))
-            radii, local = radii * farthest, local / farthest[:, None, None, None]
-            contacts = local.reshape(count, -1, 3)
+            axes, contacts, tangents = axes @ turns, turned, tangents @ turns
+            if start.alone:
+                level = levels(contacts, weights, fitted)
+                contacts[..., 2] -= level[:, None]
+                points = points + (radii * level)[:, None] * axes[..., 2]
+            radii, contacts, farthest = _in_unit_radius(radii, contacts, 0 if start.alone else places)
             turns, farthest, posteriors, beside = rough_fit(
                 contacts,
                 weights,
                 fitted.scaled(1.0 / farthest),
                 stds / radii,
-                tangents[:, 0],
+                (start.tangents[:, None] @ axes)[:, 0],
                 _normals(curves, axes, contacts),
+                through=not start.alone,
             )
             if any(residual is not None for residual in beside):
-                axes, local, tangents = axes @ turns, local @ turns[:, None], tangents @ turns
-                radii, local = radii * farthest, local / farthest[:, None, None, None]
+                axes, contacts, tangents = axes @ turns, contacts @ turns, tangents @ turns
+                radii, contacts = radii * farthest, contacts / farthest[:, None, None]
     along = curves.along / radii[:, None, None]
     curvatures = radii[:, None, None] * (curves.curvatures @ axes)
+    local = contacts[:, :places].reshape(curves.points.shape)
     curves = Curves(local, curves.present, along, tangents, curvatures)
     missed = misses(curves)
     return [
@@ -239,6 +240,7 @@ def _framed(points: Array, curves: Curves, normals: Array, stds: Array, options:
             Frame(points[i], axes[i]),
             float(radii[i]),
             curves.at(i),
+            contacts[i, places : places + len(strokes[i])],
             missed[i],
             float(k1[i]),
             float(k2[i]),
@@ -251,40 +253,51 @@ def _framed(points: Array, curves: Curves, normals: Array, stds: Array, options:
     ]
 
 
-def _joint(
-    curves: Curves, local: Array, axes: Array, k1: Array, k2: Array, tangent: Array, accuracy: Array
-) -> tuple[Array, Posterior, Array]:
+def _in_unit_radius(radii: Array, contacts: Array, places: int) -> tuple[Array, Array, Array]:
+    """The farthest of the first `places` contacts, or of all, put at 1; and where it was."""
+    farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, : places or None].max(axis=1)
+    return radii * farthest, contacts / farthest[:, None, None], farthest
+
+
+def _joint(start: Start, contacts: Array, present: NDArray[np.bool_]) -> tuple[Array, Posterior, Array]:
     """The joint fit of all the contacts of each touch."""
-    contacts, present = local.reshape(len(local), -1, 3), curves.present.reshape(len(local), -1)
-    normals = _normals(curves, axes, contacts)
+    normals = _normals(start.curves, start.axes, contacts)
+    tangent, accuracy = (start.tangents[:, None] @ start.axes)[:, 0], start.stds / start.radii
+    first, through = (start.k1, start.k2, tangent, accuracy), not start.alone
     most = present.sum(axis=1).max()
     if most == present.shape[1]:
-        return joint_fit(contacts, present.astype(float), k1, k2, tangent, accuracy, normals)
+        return joint_fit(contacts, present.astype(float), *first, normals, through)
     # Short curves beside a long one are filled up with what costs time.
     kept = np.argsort(~present, axis=1, kind="stable")[:, :most]
     rows = np.arange(len(kept))[:, None]
     few, some = contacts[rows, kept], present[rows, kept].astype(float)
     normals = None if normals is None else normals[rows, kept]
-    turns, posteriors, found = joint_fit(few, some, k1, k2, tangent, accuracy, normals)
+    turns, posteriors, found = joint_fit(few, some, *first, normals, through)
     weights = np.zeros(present.shape)
     weights[rows, kept] = found
     return turns, posteriors, weights
 
 
 def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
-    """The measured normals in these axes, in the shape of the contacts."""
-    return None if curves.normals is None else (curves.normals @ axes[:, None]).reshape(contacts.shape)
+    """The measured normals in these axes, in the shape of the contacts; of strokes there are none."""
+    if curves.normals is None:
+        return None
+    normals = np.zeros_like(contacts)
+    normals[:, : curves.present[0].size] = (curves.normals @ axes[:, None]).reshape(len(contacts), -1, 3)
+    return normals
 
 
 def _result(
     touch: _Touch, contours: Sequence[Contour], options: _Options
 ) -> Reconstruction | DegenerateCurvesError:
     try:
-        domain = _domain(touch.curves)
+        domain = domain_of(touch.curves) if contours else hull_domain(touch.strokes[:, :2], 1.0)
     except ValueError:
         return DegenerateCurvesError(
             "the curves end in fewer than three places apart from each other, so they bound no patch: "
             "turn the sampling planes, or move the point away from the edge"
+            if contours
+            else "the point is beside the strokes or at their rim: give a place among them"
         )
     converged = True
     if touch.posterior is None:
@@ -304,14 +317,6 @@ def _result(
         accuracy=touch.accuracy,
         method=options.method,
         converged=converged,
+        strokes=touch.frame.to_world(scale * touch.strokes),
         joint_posterior=touch.posterior,
     )
-
-
-def _domain(curves: Curves) -> Domain:
-    """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing."""
-    last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
-    rows = np.arange(len(last))
-    before, after = curves.present[:, 0] & (curves.along[:, 0] < 0.0), curves.along[rows, last] > 0.0
-    ends = np.vstack([curves.points[before, 0], curves.points[rows, last][after & curves.present[:, 0]]])
-    return closed_spline_domain(ends[:, :2], 1.0)

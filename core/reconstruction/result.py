@@ -3,7 +3,7 @@
 """A patch with its frame, and everything one may ask of it."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -33,6 +33,7 @@ class Reconstruction:
     geometry : the surface that was found: of "bayes" the posterior's mean, else `patch`
     patch : equation (1) of the degree asked for, in the frame
     contours : what was fitted, in the world
+    strokes : contacts beside them that were fitted, in the world, (n, 3); means of neighbors, of many
     misses : at which distance each of the c curves passes the reference point, and its deviation, (c, 2)
     accuracy : standard deviation of a contact, at least, in units of L
     method : of the fit
@@ -50,6 +51,7 @@ class Reconstruction:
     accuracy: float
     method: str
     converged: bool = True
+    strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     joint_posterior: Posterior | None = None
     known_height_std: float | None = None
 
@@ -77,7 +79,8 @@ class Reconstruction:
     def contacts(self) -> Array:
         """What was fitted besides the reference point, (n, 3), in the frame."""
         curves = [contour.points - self.frame.origin for contour in self.contours]
-        return np.vstack([r[besides_point(r)[1]] for r in curves]) @ self.frame.axes
+        beside = self.strokes - self.frame.origin
+        return np.vstack([*(r[besides_point(r)[1]] for r in curves), beside]) @ self.frame.axes
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -195,6 +198,7 @@ class Reconstruction:
             geometry=geometry,
             patch=self.patch.scaled(scale),
             contours=tuple(contour.moved(scale, turn, start, end) for contour in self.contours),
+            strokes=end + scale * (self.strokes - start) @ turn.T,
             misses=scale * self.misses,
             known_height_std=None,
         )

@@ -49,6 +49,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         },
         "patch": _polynomial_dict(r.patch),
         "contours": [_plain(vars(contour)) for contour in r.contours],
+        "strokes": r.strokes.tolist() if len(r.strokes) else None,
         "misses": r.misses.tolist(),
         "posterior": None if posterior is None else _plain(posterior._asdict()),
     }
@@ -79,17 +80,19 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         raise ValueError(
             f"version: wanted {VERSION}, got {shown(d['version'])}: this was written by another release"
         )
-    method, posterior, contours = _of(d, "method"), _of(d, "posterior"), _contours(_of(d, "contours"))
+    method, posterior, strokes = _of(d, "method"), _of(d, "posterior"), _of(d, "strokes")
+    contours = _contours(_of(d, "contours"), strokes is not None)
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: wanted one of {', '.join(METHODS)}, got {shown(method)}")
     r = Reconstruction(
         geometry=_geometry(_of(d, "geometry")),
         patch=_polynomial(_of(d, "patch")),
         contours=contours,
-        misses=finite_array("misses", _of(d, "misses"), (len(contours), 2)),
+        misses=finite_array("misses", _of(d, "misses") if contours else np.empty((0, 2)), (len(contours), 2)),
         accuracy=number("accuracy", _of(d, "accuracy"), least=0.0),
         method=method,
         converged=bool(_of(d, "converged")),
+        strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),
         joint_posterior=None if posterior is None else _posterior(posterior),
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
     )
@@ -130,8 +133,8 @@ def _polynomial(d: Any) -> MongePatch:
     return MongePatch(number("k1", _of(d, "k1")), number("k2", _of(d, "k2")), coefficients)
 
 
-def _contours(contours: Any) -> tuple[Contour, ...]:
-    if not isinstance(contours, Sequence) or not contours:
+def _contours(contours: Any, may_be_none: bool) -> tuple[Contour, ...]:
+    if not isinstance(contours, Sequence) or not (contours or may_be_none):
         raise ValueError(f"contours: wanted a list of some, got {shown(contours)}")
     names = [field.name for field in fields(Contour)]
     return tuple(Contour(**{name: _of(contour, name) for name in names}) for contour in contours)
@@ -144,6 +147,7 @@ def _posterior(d: Any) -> Posterior:
         "covariance": (size, size),
         "noise": (),
         "visibility": (size - FREE, size - FREE),
+        "level": (size + 1,),
     }
     posterior = Posterior(*(finite_array(name, _of(d, name), shape) for name, shape in shapes.items()))
     _require_covariance(posterior.covariance)

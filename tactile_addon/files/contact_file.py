@@ -4,6 +4,7 @@
 
 import csv
 import io
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ TITLE = "# Tactile Patch contacts, version "
 LENGTHS = dict(units.METERS.values())  # meters in each unit
 DIRECTIONS, DEVIATIONS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
 NAMES = ("curve", "time", *POINT, *NORMAL)
+STROKE = "stroke"  # the name of a curve that runs beside the reference point begins with it
 BLOCK = 1000  # rows of a .ply that are read together
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -37,12 +39,13 @@ PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">
 
 
 class Contacts(NamedTuple):
-    """What a file holds: contours, the unit it names or "", and the point and outward direction or None."""
+    """What a file holds: contours and strokes, its unit or "", the point and outward direction or None."""
 
     contours: list
     unit: str
     point: list | None = None
     outward: list | None = None
+    strokes: tuple = ()
 
 
 def read(path):
@@ -68,7 +71,8 @@ def contacts_of(r):
     """The Contacts that a reconstruction was fitted to: a fit of them gives the same again."""
     noise, (origin, normal) = r.accuracy * r.radius, (r.frame.origin, r.frame.axes[:, 2])
     contours = [replace(contour, noise=noise) for contour in r.contours]
-    return Contacts(contours, "", origin.tolist(), normal.tolist())
+    strokes = (core.Contour(r.strokes, noise=noise),) if len(r.strokes) else ()
+    return Contacts(contours, "", origin.tolist(), normal.tolist(), strokes)
 
 
 def write(path, contacts):
@@ -77,7 +81,10 @@ def write(path, contacts):
     Normals are there where a contour has some. Comments say what else a fit takes: the reference point,
     the outward direction, and the deviations of contacts and of normals, of all contours or of each.
     """
-    contours, unit, point, outward = contacts
+    contours, unit, point, outward, strokes = contacts
+    labels = [str(number) for number in range(1, len(contours) + 1)]
+    labels += [f"{STROKE} {number}" for number in range(1, len(strokes) + 1)]
+    contours = [*contours, *strokes]
     names = POINT + (NORMAL if any(c.normals is not None for c in contours) else ())
     told = {"point": point, "outward": outward}
     for key in DEVIATIONS:
@@ -91,13 +98,13 @@ def write(path, contacts):
             print("#", key, *("-" if value is None else repr(value) for value in values), file=text)
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["curve", *(f"{name} [{unit}]" if unit and name in POINT else name for name in names)])
-    for number, contour in enumerate(contours, 1):
+    for label, contour in zip(labels, contours, strict=True):
         rows = contour.points.tolist()
         if len(names) == 6:
             blank = [[""] * 3] * len(rows)
             normals = blank if contour.normals is None else contour.normals.tolist()
             rows = [row + normal for row, normal in zip(rows, normals, strict=True)]
-        table.writerows([number, *row] for row in rows)
+        table.writerows([label, *row] for row in rows)
     whole_file.write_text(path, text.getvalue())
 
 
@@ -126,7 +133,10 @@ def _read_csv(name, path):
         if len(stds) != len(contours):
             raise ValueError(f"{name}: wanted one {key} or {len(contours)}, one a curve, got {len(stds)}")
         contours = [_with(name, c, key, std) for c, std in zip(contours, stds, strict=True)]
-    return Contacts(contours, unit, **told)
+    beside = [label.lower().startswith(STROKE) for label in rows.labels]
+    strokes = tuple(itertools.compress(contours, beside))
+    contours = [c for c, stroke in zip(contours, beside, strict=True) if not stroke]
+    return Contacts(contours, unit, **told, strokes=strokes)
 
 
 def _with(name, contour, key, std):
@@ -258,7 +268,10 @@ def _read_ply(name, path):
         raise ValueError(f"{at}: wanted finite coordinates up to {LARGEST:g}, got others")
     normals = np.column_stack([table[key] for key in NORMAL]) if set(NORMAL) <= set(table) else None
     labels, titles = _in_order(table.get("curve", np.ones(count)))
-    return Contacts(contact_rows.contours(name, labels, points, normals, table.get("time"), titles), "")
+    contours = contact_rows.contours(name, labels, points, normals, table.get("time"), titles)
+    if not {"curve", "time"} & set(table):  # bare points, in no order
+        return Contacts([], "", strokes=tuple(contours))
+    return Contacts(contours, "")
 
 
 def _in_order(labels):

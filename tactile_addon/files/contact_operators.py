@@ -34,7 +34,7 @@ UNITS = [
 
 
 class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
-    """Rebuild the surface patch that measured contours show"""
+    """Rebuild the surface patch that measured contours and strokes show"""
 
     bl_idname = "tactile.import_contacts"
     bl_label = "Import Contact Data"
@@ -52,8 +52,20 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     point: FloatVectorProperty(
         name="Reference Point",
         subtype="TRANSLATION",
-        description="Where the curves meet, exact; in units of the scene",
+        description="Where the curves meet, exact, or a place among strokes; in units of the scene",
         options={"SKIP_PRESET"},
+    )
+    strokes: BoolProperty(
+        name="Strokes",
+        description="All curves run beside the reference point, which is only a place among them",
+        options={"SKIP_PRESET"},
+    )
+    radius: FloatProperty(
+        name="Radius",
+        subtype="DISTANCE",
+        description="How far from a place among strokes they count, in units of the scene; 0: all do",
+        min=0.0,
+        precision=4,
     )
     use_outward: BoolProperty(
         name="Given Outward Direction",
@@ -100,6 +112,8 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
                 point=self._given("point"),
                 outward=self._given("outward"),
                 flip=self.flip,
+                all_strokes=self.strokes,
+                radius=self.radius,
                 noise=self.noise,
                 normal_std=self.normal_std,
                 method=self.method,
@@ -135,7 +149,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
             layout.prop(self, f"use_{name}")
             if getattr(self, f"use_{name}"):
                 layout.prop(self, name)
-        for name in ("flip", "noise", "normal_std"):
+        for name in ("strokes", "radius", "flip", "noise", "normal_std"):
             layout.prop(self, name)
         draw_solver(layout, self)
 

@@ -64,6 +64,11 @@ class Rows:
         self._labels.append(np.array(ids, dtype=np.intp))
         self._numbers.append(numbers)
 
+    @property
+    def labels(self):
+        """Of the curves, in the order of `contours`."""
+        return list(self._curves)
+
     def contours(self):
         numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
         if not len(numbers):
@@ -75,7 +80,7 @@ class Rows:
             numbers[:, :3],
             normals,
             numbers[:, -1] if "time" in self._columns else None,
-            list(self._curves),
+            self.labels,
         )
 
     def _together(self, block):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured contours, from files to a reconstruction and its report; nothing in the scene changes."""
+"""Measured contacts, from files to a reconstruction and its report; nothing in the scene changes."""
 
 import math
 from dataclasses import replace
@@ -26,21 +26,23 @@ def read(paths, unit, meters):
 
     Raises ValueError where files name different reference points, and what contact_file.read raises.
     """
-    contours, points, directions, found = [], [], [], "" if unit in ("FILE", "NONE") else unit
+    contours, strokes, points, directions = [], [], [], []
+    found = "" if unit in ("FILE", "NONE") else unit
     for path in paths:
-        curves, named, point, outward = contact_file.read(path)
+        curves, named, point, outward, beside = contact_file.read(path)
         named = {"FILE": named, "NONE": ""}.get(unit, unit)
         factor = contact_file.LENGTHS[named] / meters if named else 1.0
         # 1 / 0.1 and the like are not exact: a file in the world's unit stays as it is.
         factor = 1.0 if math.isclose(factor, 1.0, rel_tol=1e-6) else factor
         contours += [_scaled(curve, factor) for curve in curves]
+        strokes += [_scaled(stroke, factor) for stroke in beside]
         points += [] if point is None else [[factor * x for x in point]]
         directions += [] if outward is None else [outward]
         found = named or found
     if any(not np.allclose(point, points[0], rtol=1e-12, atol=0.0) for point in points):
         raise ValueError("The files name different reference points: import each of them by itself")
     point, outward = (given[0] if given else None for given in (points, directions))
-    return contact_file.Contacts(contours, found, point, outward)
+    return contact_file.Contacts(contours, found, point, outward, tuple(strokes))
 
 
 def _scaled(curve, factor):
@@ -48,10 +50,25 @@ def _scaled(curve, factor):
     return replace(curve, points=factor * curve.points, noise=noise)
 
 
-def fit(source, contacts, *, point=None, outward=None, flip=False, noise=0.0, normal_std=0.0, **options):
+def fit(
+    source,
+    contacts,
+    *,
+    point=None,
+    outward=None,
+    flip=False,
+    noise=0.0,
+    normal_std=0.0,
+    all_strokes=False,
+    radius=0.0,
+    **options,
+):
     """The patch that contact_file.Contacts show, as a Touch without a surface.
 
-    point : where the curves meet, exact; None for that of the file, or core.common_point
+    point : where the curves meet, exact; None for that of the file, or core.common_point. From strokes alone
+        a place among them; None for that of the file, or their mean
+    all_strokes : whether curves are strokes, too
+    radius : from strokes alone, of the contacts that are used; 0 for all
     outward : None for that of the file or the mean of the normals, or where there are none for the side to
         which the surface bulges, +z where it is flat; `flip` takes the other
     noise, normal_std : in the contours' unit and in radians; 0 for those of the file. Where it has none
@@ -60,27 +77,32 @@ def fit(source, contacts, *, point=None, outward=None, flip=False, noise=0.0, no
 
     Raises ValueError with a sentence for the user.
     """
+    if all_strokes:
+        contacts = contacts._replace(contours=[], strokes=(*contacts.contours, *contacts.strokes))
+    options |= {"noise": noise or None, "radius": radius or None}
     try:
-        return _fit(source, contacts, point, outward, flip, noise, normal_std, options)
+        return _fit(source, contacts, point, outward, flip, normal_std, options)
     except MemoryError:
         raise ValueError("There are more contacts than fit into memory: take fewer of them") from None
 
 
-def _fit(source, contacts, point, outward, flip, noise, normal_std, options):
+def _fit(source, contacts, point, outward, flip, normal_std, options):
     start = perf_counter()
-    contours, unit, of_file, up = contacts
+    contours, unit, of_file, up, strokes = contacts
     point = of_file if point is None else point
     outward = up if outward is None else outward
     if normal_std:
         contours = [c if c.normals is None else replace(c, normal_std=normal_std) for c in contours]
     distances = None
-    if point is None:
+    if point is None and contours:
         point, distances = core.common_point(contours)
-    contours = [core.in_running_order(contour, point) for contour in contours]
-    reconstruct = partial(core.reconstruct, point, contours, noise=noise or None, **options)
-    result = reconstruct(outward=_mean_normal(contours) if outward is None else outward)
+    elif point is None:
+        point = np.mean(np.vstack([stroke.points for stroke in strokes]), axis=0)
+    contours, felt = [core.in_running_order(c, point) for c in contours], [*contours, *strokes]
+    reconstruct = partial(core.reconstruct, point, contours, strokes=strokes, **options)
+    result = reconstruct(outward=_mean_normal(felt) if outward is None else outward)
     bulges = (result.patch.k1 + result.patch.k2) * result.radius
-    unknown = outward is None and not any(c.normals is not None for c in contours)
+    unknown = outward is None and not any(c.normals is not None for c in felt)
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     require_single(result)
@@ -92,6 +114,7 @@ def _fit(source, contacts, point, outward, flip, noise, normal_std, options):
         **reconstruction_report(result),
         "unit": unit,
         "curves": len(contours),
+        "strokes": len(strokes),
         "axes": axes.tolist(),
         "vertices": 0,
         **measures(result),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tracked contours as a mesh: tubes and contacts."""
+"""The contours as a mesh, tubes and contacts; and the contacts of strokes."""
 
 import numpy as np
 
@@ -10,24 +10,26 @@ from .mesh_data import fill
 def fill_contours(mesh, touched):
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
-    Point attributes tell them apart: `contour` counts the contours, `contact` the contacts along
-    one, and is -1 on the tubes. They show what the patch keeps in its reconstruction.
+    Point attributes tell them apart: `contour` counts the contours and is -1 for strokes, `contact` the
+    contacts along one, and is -1 on the tubes. They show what the patch keeps in its reconstruction.
     """
     frame, thickness = touched.result.frame, 0.009 * touched.result.radius
-    points, triangles, contour_index, contact_index = [], [], [], []
-    count = 0
+    parts = []  # (number of the contour, points, triangles, index of the contact)
     for number, contour in enumerate(touched.result.contours):
         path = frame.to_local(contour.points)
         across = frame.axes.T @ contour.plane_normal if contour.plane_normal is not None else _across(path)
-        for mesh_points, mesh_triangles, contact in (
-            (*_tube(path, across, thickness), np.full(4 * len(path), -1)),
-            (*_octahedra(path, 3.6 * thickness), np.repeat(np.arange(len(path)), 6)),
-        ):
-            points.append(mesh_points)
-            triangles.append(mesh_triangles + count)
-            contour_index.append(np.full(len(mesh_points), number))
-            contact_index.append(contact)
-            count += len(mesh_points)
+        parts.append((number, *_tube(path, across, thickness), np.full(4 * len(path), -1)))
+        parts.append((number, *_contacts(path, thickness)))
+    if len(touched.result.strokes):
+        parts.append((-1, *_contacts(frame.to_local(touched.result.strokes), thickness)))
+    points, triangles, contour_index, contact_index = [], [], [], []
+    count = 0
+    for number, mesh_points, mesh_triangles, contact in parts:
+        points.append(mesh_points)
+        triangles.append(mesh_triangles + count)
+        contour_index.append(np.full(len(mesh_points), number))
+        contact_index.append(contact)
+        count += len(mesh_points)
     attributes = [
         ("contour", "INT", np.concatenate(contour_index)),
         ("contact", "INT", np.concatenate(contact_index)),
@@ -52,6 +54,11 @@ def _across(path):
     """A direction in the tangent plane across a path (n, 3) that is in no plane."""
     x, y, _ = path[-1] - path[0]
     return np.array([-y, x, 0.0]) / max(np.hypot(x, y), 1e-30)
+
+
+def _contacts(path, thickness):
+    """Octahedra at contacts (n, 3): points, triangles, and which contact each point is of."""
+    return *_octahedra(path, 3.6 * thickness), np.repeat(np.arange(len(path)), 6)
 
 
 def _octahedra(centers, radius):

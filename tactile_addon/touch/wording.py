@@ -20,9 +20,7 @@ VERIFIED = (
 def readable(report):
     """Lines of label and value; lengths in the unit of the scene or file."""
     seconds = report["seconds"]
-    contacts = (
-        f"{report['contacts']} on {report['curves']} curves" if "curves" in report else _tracked(report)
-    )
+    contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
     rows = [
         ("touched", report["source"]),
         ("status", f"{report['status']}: {report['message']}"),
@@ -60,6 +58,11 @@ def added_planes(report, unit):
     before, after = (say(added[i][key], 1, unit) for i, key in ((0, "height_std_before"), (-1, "height_std")))
     azimuths = ", ".join(f"{plane['azimuth']:.0f}°" for plane in added)
     return f"Planes added at {azimuths}: ± {before} has become ± {after}"
+
+
+def _measured_contacts(report):
+    kinds = [f"{report[kind]} {kind}" for kind in ("curves", "strokes") if report[kind] or kind == "curves"]
+    return f"{report['contacts']} on {' and '.join(kinds)}"
 
 
 def _tracked(report):

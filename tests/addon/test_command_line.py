@@ -4,6 +4,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from scenes import PLACE
 
@@ -95,6 +96,26 @@ def test_the_degree_may_be_left_to_the_contacts(command, files):
     code, out, _ = command("reconstruct", files / "ball.ply", *PLACE, "--degree", "auto")
     assert code == 0
     assert "bayes, degree 4" in out
+
+
+def test_strokes_are_fitted_around_a_place(command, empty, tmp_path):
+    turns, reach = np.meshgrid(np.linspace(0.0, 6.0, 30), np.linspace(0.05, 0.9, 12))
+    x, y = (reach * np.cos(turns)).ravel(), (reach * np.sin(turns)).ravel()
+    rows = np.column_stack([x, y, np.sqrt(4.0 - x**2 - y**2)]).tolist()
+    path = tmp_path / "strokes.csv"
+    path.write_text("x,y,z\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows))
+    place = ["--location", "0.1", "-5e-2", "2.1"]
+    code, out, _ = command("fit", path, *place, "--radius", 0.7, "--json", "-")
+    assert code == 0
+    report = json.loads(next(line for line in out.splitlines() if line.startswith("{")))
+    assert report["k1"] == pytest.approx(-0.5, rel=0.02)
+    assert 0.5 < report["radius"] < 0.7
+    code, out, _ = command("fit", path, *place)
+    assert code == 0
+    assert "100 on 0 curves and 1 strokes" in out
+    code, _, err = command("fit", path, *place, "--point", "0", "0", "2")
+    assert code == 2
+    assert "--location: wanted it or --point, got both" in err
 
 
 def test_the_open_scene_is_touched_without_a_file(command, files):

@@ -41,7 +41,7 @@ def test_lengths_and_angles_know_their_units(empty):
     empty.ops.mesh.primitive_cube_add()
     for _, properties in interfaces(empty):
         for known in properties:
-            if known.identifier in ("extent", "step", "noise", "spacing"):
+            if known.identifier in ("extent", "step", "noise", "spacing", "radius"):
                 assert (known.subtype, known.unit) == ("DISTANCE", "LENGTH"), known.identifier
             if known.identifier in ("azimuths", "tilts"):
                 assert known.unit == "ROTATION"

@@ -89,6 +89,37 @@ def test_the_unit_is_in_the_columns(read, header, unit):
     assert points(contours) == WANTED.tolist()
 
 
+def test_curves_named_strokes_run_beside_the_point(contact_file, read, tmp_path):
+    text = PLAIN.replace("\n2,", "\nStroke 7,")
+    assert points(read(text)[0]) == [WANTED[0].tolist()]
+    found = contact_file.read(tmp_path / "contacts.csv")
+    assert points(found.strokes) == [WANTED[1].tolist()]
+    read(PLAIN.replace("\n1,", "\nstroke,"))
+    found = contact_file.read(tmp_path / "contacts.csv")
+    assert (points(found.contours), points(found.strokes)) == ([WANTED[1].tolist()], [WANTED[0].tolist()])
+
+
+@pytest.mark.parametrize("curves", [0, 1, 2])
+def test_strokes_are_written_as_they_are_read(contact_file, tmp_path, curves):
+    every = [Contour(curve, noise=0.1 * (i + 1)) for i, curve in enumerate(WANTED)]
+    given = contact_file.Contacts(every[:curves], "mm", [0.0, 1.0, 2.0], None, tuple(every[curves:]))
+    contact_file.write(tmp_path / "all.csv", given)
+    found = contact_file.read(tmp_path / "all.csv")
+    assert found.point == given.point
+    for kind in ("contours", "strokes"):
+        ours, theirs = getattr(found, kind), getattr(given, kind)
+        assert points(ours) == points(theirs)
+        assert [c.noise for c in ours] == [c.noise for c in theirs]
+
+
+def test_a_ply_of_bare_points_is_a_stroke(contact_file, read, tmp_path):
+    rows = struct.pack("<18d", *WANTED.ravel())
+    properties = "property double x\nproperty double y\nproperty double z\n"
+    assert read(ply("binary_little_endian", 6, properties) + rows, "scan.ply")[0] == []
+    (stroke,) = contact_file.read(tmp_path / "scan.ply").strokes
+    assert len(stroke.points) == 5  # one of them is there twice
+
+
 def test_times_put_contacts_in_order(read):
     contours, _ = read("curve,time [s],x,y,z\na,3,2,4,6.5\na,1,0,0,0\nb,9,0,0,0\na,2.5,1,2,3\n")
     assert points(contours) == [WANTED[0].tolist(), [[0, 0, 0]]]
@@ -188,7 +219,7 @@ def test_what_was_exported_and_is_read_gives_the_same_patch(
         contours[1:] = [replace(c, normals=None, normal_std=None) for c in contours[1:]]
     r = core.reconstruct(s.point, contours, outward=s.normal, noise=noise)
     contact_file.write(tmp_path / "out.csv", contact_file.contacts_of(r))
-    found, _, point, outward = contact_file.read(tmp_path / "out.csv")
+    found, _, point, outward, _ = contact_file.read(tmp_path / "out.csv")
     again = extension.core.reconstruct(point, found, outward=outward)
     near = {"rel": 1e-9, "abs": 1e-12}
     assert again.patch.coefficients == pytest.approx(r.patch.coefficients, **near)
@@ -203,7 +234,7 @@ def test_comments_that_are_not_ours_say_nothing(contact_file, tmp_path):
     titles = "# made by a robot\n", "# Tactile Patch contacts, version 1, lengths in no unit\n", ""
     for text in (titles[0] + told + PLAIN, titles[1] + PLAIN, titles[2] + told + PLAIN, PLAIN + told):
         (tmp_path / "other.csv").write_text(text)
-        contours, unit, point, outward = contact_file.read(tmp_path / "other.csv")
+        contours, unit, point, outward, _ = contact_file.read(tmp_path / "other.csv")
         assert (unit, point, outward, contours[0].noise) == ("", None, None, None)
 
 
@@ -215,7 +246,7 @@ def test_any_numbers_come_back_as_they_were(contact_file, tmp_path_factory, coor
     path = tmp_path_factory.getbasetemp() / "any.csv"
     contours = [Contour(coordinates[:2]), Contour(coordinates[2:])]
     contact_file.write(path, contact_file.Contacts(contours, unit))
-    contours, found, _, _ = contact_file.read(path)
+    contours, found = contact_file.read(path)[:2]
     assert found == unit
     assert np.array_equal(np.vstack([c.points for c in contours]), coordinates)
 

@@ -12,7 +12,7 @@ pytest.importorskip("bpy", reason="needs Blender as a Python module: run make te
 import surfaces
 from scenes import PLACE, datablocks, made, positions, values
 
-from core import from_dict
+from core import Contour, from_dict
 
 SURFACE = surfaces.torus(40, 20, 0.6)
 HIDDEN = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})
@@ -110,6 +110,71 @@ def test_units(empty, measured, named, unit, scale, factor):
     assert report["frame"]["origin"] == pytest.approx(factor * SURFACE.point, abs=0.03 * factor)
     assert report["k1"] * factor == pytest.approx(SURFACE.k1, abs=2e-3)
     assert report["unit"] == {"FILE": named, "NONE": ""}.get(unit, unit)
+
+
+def wiped(extension, path, marked, noise=0.02, also=()):
+    """Writes rows of contacts on the torus as a robot's raster, strokes or curves; the path."""
+    rows = []
+    for c in SURFACE.track(surfaces.planes((0, 35, 90, 120)), extent=12.0, step=0.4, noise=noise, rng=1):
+        rows += [Contour(c.points[i::3] - 1e-3 * i) for i in range(3)]
+    contact_file = extension.tactile_addon.files.contact_file
+    contours, strokes = ([*also], rows) if marked else ([*also, *rows], [])
+    contact_file.write(path, contact_file.Contacts(contours, "", None, None, tuple(strokes)))
+    return str(path)
+
+
+@pytest.mark.parametrize("marked", [True, False])
+def test_strokes_alone_become_a_patch_around_a_place(extension, empty, tmp_path, marked):
+    path = wiped(extension, tmp_path / "wiped.csv", marked)
+    options = {"point": list(SURFACE.point + 0.3), **({} if marked else {"strokes": True})}
+    patch, report = imported(empty, path, **options)
+    assert report["status"] == "ok"
+    assert (report["curves"], report["strokes"]) == (0, 12)
+    assert [report["k1"], report["k2"]] == pytest.approx([SURFACE.k1, SURFACE.k2], abs=3e-3)
+    off = SURFACE.point + 0.3 - report["frame"]["origin"]
+    assert np.linalg.norm(np.cross(off, report["frame"]["normal"])) < 0.01
+    assert report["frame"]["normal"] == pytest.approx(SURFACE.normal, abs=0.03)
+    assert "misses" not in report
+    (lines,) = patch.children
+    assert set(values(lines.data, "contour")) == {-1}
+    assert len(set(values(lines.data, "contact"))) == report["contacts"]
+    _, near = imported(empty, path, radius=6.0, **options)
+    assert near["radius"] < 6.0 < report["radius"]
+    r = extension.reconstruction_of(patch)
+    assert len(r.strokes) == report["contacts"]
+    assert report["k1"] == pytest.approx(r.patch.k1)
+
+
+def test_without_a_place_it_is_the_mean_of_the_strokes(extension, empty, tmp_path):
+    _, report = imported(empty, wiped(extension, tmp_path / "wiped.csv", True))
+    assert report["status"] == "ok"
+    assert report["frame"]["origin"] == pytest.approx(SURFACE.point, abs=2.0)
+
+
+def test_strokes_beside_contours_are_fitted_and_go_out_again(extension, empty, tmp_path):
+    path = wiped(extension, tmp_path / "both.csv", True, also=contours_of(SURFACE))
+    _, report = imported(empty, path, point=list(SURFACE.point))
+    assert (report["curves"], report["strokes"]) == (3, 12)
+    assert report["contacts"] > 150
+    out = tmp_path / "out.csv"
+    empty.ops.tactile.export_contacts(filepath=str(out))
+    _, again = imported(empty, str(out))
+    assert (again["curves"], again["strokes"]) == (3, 1)
+    for key in ("k1", "k2", "radius", "height_std"):
+        assert again[key] == pytest.approx(report[key], rel=1e-2)
+
+
+def test_strokes_that_carry_no_patch_are_refused_with_a_sentence(extension, empty, tmp_path):
+    line = np.column_stack([np.linspace(-9, 9, 50), np.zeros((50, 2))])
+    contact_file = extension.tactile_addon.files.contact_file
+    path = tmp_path / "line.csv"
+    contact_file.write(path, contact_file.Contacts([], "", None, None, (Contour(line),)))
+    before = datablocks(empty)
+    with pytest.raises(RuntimeError, match="The strokes run along a line, two lines or a ring"):
+        empty.ops.tactile.import_contacts(filepath=str(path))
+    with pytest.raises(RuntimeError, match=r"wanted none with .*which is a method of contours"):
+        empty.ops.tactile.import_contacts(filepath=str(path), method="tagc")
+    assert datablocks(empty) == before
 
 
 def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):

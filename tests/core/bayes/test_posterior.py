@@ -34,7 +34,7 @@ def test_turning_coefficients_about_the_normal_turns_the_surface():
 def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
     rng = np.random.default_rng(2)
     mean = np.concatenate([[0.0, 0.0, 0.2, 0.0, 0.3], rng.normal(size=22)])
-    whole = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)))
+    whole = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)), np.zeros(28))
     x, y = rng.uniform(-1.0, 1.0, (2, 200_000))
     inside = np.hypot(x, y) < posterior.DISK
     x, y = x[inside], y[inside]

@@ -1,0 +1,245 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How near the fits come to what a real robot has felt, and whether their intervals are true there.
+
+`python -m benchmarks.robot FOLDER [--points N] [--radius MM]`, from the root of a checkout; FOLDER has a copy
+of github.com/vu-arma-dev/robot-palpation-data. mat-io, which reads it, needs numpy 2, as Python 3.13 has it.
+
+Prints Markdown tables. A surgical robot has wiped over kidney and organ phantoms, under control of the force,
+in rows; contact = position - 3.15 mm x force direction where |force| > 0.1 N. At seeded random places of each
+exploration, blocks of contacts that follow each other are held out, a fifth of them. Of the others within the
+radius all are fitted as strokes, or three curves of 50 contacts cut out of them, with and without the others.
+The held-out contacts over the domain tell the error, and whether an interval of deviation and scatter holds
+them; the scatter of a method is that of the contacts it was given about its own surface.
+"""
+
+import argparse
+import math
+import sys
+import warnings
+from collections import defaultdict
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+
+from core import Contour, reconstruct
+from core.reconstruction.strokes import means
+
+from . import machine, table, timed
+from .peers import matern_on_quadric
+
+BALL, LEAST_FORCE = 3.15, 0.1  # mm, N
+BLOCK, SHARE = 60, 5  # contacts that follow each other; of the blocks one in so many is held out
+BAND, IN_BAND = 0.35, 50  # mm to either side of a curve's plane; contacts of a curve
+FEWEST = 300  # contacts at a place
+SUBSET, MOST = 200, 600  # random contacts that a process, and a spline, are fitted to
+SMOOTHINGS = (1.0, 10.0, 100.0)  # the best are among them; 0.001 to 0.1 were tried
+
+
+class Place(NamedTuple):
+    """Contacts around a place of an exploration, in mm."""
+
+    place: np.ndarray
+    outward: np.ndarray
+    given: np.ndarray  # (n, 3)
+    held_out: np.ndarray  # (m, 3)
+
+
+class Score(NamedTuple):
+    """Mean |dz| in mm, over what deviation and scatter expect of it, the share within 90 %, and seconds."""
+
+    error: float
+    ratio: float
+    within: float
+    seconds: float
+
+
+def explorations(folder):
+    """(name, contacts (n, 3), force directions (n, 3)) of each, contacts in the order of time."""
+    from matio import load_from_mat
+
+    for path in sorted(Path(folder).rglob("exploration/*.mat")):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of MATLAB classes that it does not know
+            (logger,) = load_from_mat(path).values()
+        logs = logger.properties["logs"].ravel()
+        position, force = (np.concatenate([log[key].T for log in logs]) for key in ("position", "force"))
+        size = np.linalg.norm(force, axis=1)
+        felt = size > LEAST_FORCE
+        direction = force[felt] / size[felt, None]
+        yield path.stem, position[felt] - BALL * direction, direction
+
+
+def places(contacts, directions, count, radius):
+    """At random contacts; some that have too few around them are left out."""
+    rng = np.random.default_rng(0)
+    for i in rng.integers(len(contacts), size=count):
+        blocks = (np.arange(len(contacts)) + rng.integers(BLOCK)) // BLOCK
+        held_out = rng.integers(SHARE, size=blocks[-1] + 1)[blocks] == 0
+        near = np.linalg.norm(contacts - contacts[i], axis=1) < radius
+        outward = directions[near].mean(axis=0)
+        if np.count_nonzero(near & ~held_out) >= FEWEST:
+            yield Place(contacts[i], outward, contacts[near & ~held_out], contacts[near & held_out])
+
+
+def curves(r, given):
+    """Three bands of contacts through the origin of a reconstruction, thinned."""
+    local = r.frame.to_local(given)
+    for azimuth in np.pi / 3.0 * np.arange(3):
+        across = local[:, 1] * math.cos(azimuth) - local[:, 0] * math.sin(azimuth)
+        band = given[np.abs(across) < BAND]
+        along = np.argsort(r.frame.to_local(band)[:, :2] @ [math.cos(azimuth), math.sin(azimuth)])
+        yield Contour(band[along][:: max(1, len(band) // IN_BAND)])
+
+
+# Peers: contacts in a frame and in unit radius -> height, deviation ------------------------------------
+
+
+def process(contacts, thin):
+    height, height_std = matern_on_quadric(thin(contacts), noisiest=10.0)
+    return height, height_std
+
+
+def spline(contacts, thin, **options):
+    from scipy.interpolate import RBFInterpolator
+
+    chosen = thin(contacts)
+    return RBFInterpolator(chosen[:, :2], chosen[:, 2], **options), None
+
+
+def some(contacts, most):
+    """Random contacts, so many at most."""
+    chosen = np.random.default_rng(0).permutation(len(contacts))[:most]
+    return contacts[chosen]
+
+
+def averaged(contacts):
+    """What the strokes are thinned to."""
+    return means(contacts)[0]
+
+
+KERNELS = {
+    "RBF thin plate": {"kernel": "thin_plate_spline"},
+    "RBF cubic": {"kernel": "cubic", "degree": 2},
+}
+SUBSETS = {f"{MOST} contacts": partial(some, most=MOST), "the same means": averaged}
+PEERS = {
+    f"Matérn process, {SUBSET} contacts": partial(process, thin=partial(some, most=SUBSET)),
+    "Matérn process, the same means": partial(process, thin=averaged),
+    **{
+        f"{name}, {subset}, smoothing {smoothing:g}": partial(
+            spline, thin=thin, smoothing=smoothing, **options
+        )
+        for name, options in KERNELS.items()
+        for subset, thin in SUBSETS.items()
+        for smoothing in SMOOTHINGS
+    },
+}
+ALL, CROSSED, BOTH = "strokes alone", "three curves", "curves and strokes"
+
+
+def scored(at, height, height_std, given, held_out, seconds):
+    """Of contacts (n, 3) in unit radius, `at` mm."""
+    off = np.abs(held_out[:, 2] - height(held_out[:, :2]))
+    if height_std is None:
+        return Score(at * off.mean(), np.nan, np.nan, seconds)
+    scatter = np.sqrt(np.mean((given[:, 2] - height(given[:, :2])) ** 2))
+    std = np.hypot(height_std(held_out[:, :2]), scatter)
+    return Score(at * off.mean(), np.mean(off) / (0.8 * np.mean(std)), np.mean(off < 1.645 * std), seconds)
+
+
+def of_reconstruction(r, seconds, judge, place):
+    """Score of one of ours, on the same contacts as all, along the normal of `judge`."""
+    given, held_out = in_unit_radius(r, judge, place)
+    height, std = (lambda p, f=f: f(*(r.radius * p).T) / r.radius for f in (r.height, r.height_std))
+    return scored(r.radius, height, std, given, held_out, seconds)
+
+
+def in_unit_radius(r, judge, place):
+    """Given and held-out contacts over the domain of `judge`, in the frame and the radius of r."""
+    return (r.frame.to_local(inside(judge, points)) / r.radius for points in (place.given, place.held_out))
+
+
+def inside(r, points):
+    """Those over the domain, and not of another side."""
+    local = r.frame.to_local(points)
+    return points[r.domain.contains(*local[:, :2].T) & (np.abs(local[:, 2]) <= r.radius)]
+
+
+def scores_at(place, radius):
+    """{method: Score} of a place, or None where the strokes carry no patch."""
+    try:
+        seconds, judge = timed(
+            reconstruct, place.place, [], outward=place.outward, strokes=[place.given], radius=radius
+        )
+    except ValueError:
+        return None
+    if len(inside(judge, place.held_out)) < FEWEST // SHARE:
+        return None
+    scores = {ALL: of_reconstruction(judge, seconds, judge, place)}
+    given, held_out = in_unit_radius(judge, judge, place)
+    for name, peer in PEERS.items():
+        seconds, found = timed(peer, given)
+        scores[name] = scored(judge.radius, *found, given, held_out, seconds)
+    try:
+        crossed = list(curves(judge, place.given))
+        for name, strokes in ((CROSSED, []), (BOTH, [place.given])):
+            options = {"outward": place.outward, "strokes": strokes}
+            seconds, r = timed(reconstruct, judge.frame.origin, crossed, **options)
+            scores[name] = of_reconstruction(r, seconds, judge, place)
+    except ValueError:  # rows too far apart for curves
+        pass
+    return scores
+
+
+def best(scores, prefix):
+    """Of the methods of that name, the one with the least mean error over all places."""
+    names = {name for of in scores for name in of if name.startswith(prefix)}
+    return min(names, key=lambda name: np.mean([of[name].error for of in scores if name in of]))
+
+
+def row(title, scores, name):
+    found = [of[name] for of in scores if name in of]
+    errors, ratios, within, seconds = zip(*found, strict=True)
+    more = ["", ""] if np.isnan(ratios[0]) else [f"{np.mean(ratios):.2f}", f"{np.mean(within):.2f}"]
+    return [
+        title, str(len(found)), f"{np.mean(errors):.3f}", f"{np.median(errors):.3f}", *more,
+        f"{1e3 * median(seconds):.1f}",
+    ]  # fmt: skip
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", help="of the data")
+    parser.add_argument("--points", type=int, default=20, help="of each exploration (%(default)s)")
+    parser.add_argument("--radius", type=float, default=8.0, help="mm (%(default)s)")
+    options = parser.parse_args()
+    scores = defaultdict(list)
+    for name, contacts, directions in explorations(options.folder):
+        for place in places(contacts, directions, options.points, options.radius):
+            found = scores_at(place, options.radius)
+            if found is not None:
+                scores[name].append(found)
+    if not scores:
+        sys.exit(f"robot: there is no exploration/*.mat in {options.folder}")
+    every = [of for found in scores.values() for of in found]
+    prefixes = [ALL, BOTH, CROSSED, *list(PEERS)[:2]]
+    prefixes += [f"{name}, {subset}" for name in KERNELS for subset in SUBSETS]
+    named = {prefix: best(every, prefix) for prefix in prefixes}
+    head = ["method", "places", "mean error, mm", "median", "error / expected", "within 90 %", "ms"]
+    table(head, [row(name, every, name) for name in named.values()])
+    peers = [name for name in named.values() if name in PEERS]
+    rows = []
+    for name, found in scores.items():
+        errors = {m: np.mean([of[m].error for of in found]) for m in [ALL, *peers]}
+        least = min(peers, key=errors.__getitem__)
+        rows.append([name, str(len(found)), f"{errors[ALL]:.3f}", f"{errors[least]:.3f}", least])
+    table(["exploration", "places", "strokes alone, mm", "best peer, mm", "which"], rows)
+    print(f"Radius {options.radius:g} mm; {machine('numpy', 'scipy', 'scikit-learn')}.")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where fits start: the contacts of touches in frames of the paper, or in those that strokes show."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from ..bayes.posterior import Posterior
+from ..contours.contour import Contour
+from ..contours.curves import Curves, curves_through, stacked
+from ..contours.local_geometry import (
+    DegenerateCurvesError,
+    darboux_frames,
+    degeneracy,
+    surface_normals,
+)
+from ..contours.thinning import thinned
+from ..patch.domain import Domain, closed_spline_domain
+from ..patch.monge import TERMS, monomials
+from .strokes import STRIPS, FirstFrame, first_frame, means
+
+COARSE = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
+
+
+class Given(NamedTuple):
+    """The contacts of one touch: contours, strokes (n, 3), and the largest deviation that strokes bring."""
+
+    contours: list[Contour]
+    strokes: Array
+    noise: float
+
+    @property
+    def is_of_strokes(self) -> bool:
+        """Whether there is nothing else."""
+        return len(self.strokes) > 0 and not self.contours
+
+    @property
+    def size(self) -> int:
+        """How many places its contacts take in a stack."""
+        longest = max((len(contour.points) for contour in self.contours), default=0)
+        return len(self.contours) * longest + min(len(self.strokes), STRIPS**2)
+
+
+class Start(NamedTuple):
+    """b touches as the joint fit gets them, in axes near to the Darboux frames."""
+
+    points: Array  # (b, 3), in the world
+    axes: Array
+    k1: Array
+    k2: Array
+    radii: Array
+    tangents: Array  # (b, 3), in the world, which d1 is to follow
+    curves: Curves  # relative to the points, in the world
+    strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
+    stds: Array  # (b,)
+
+    @property
+    def alone(self) -> bool:
+        """Whether there are strokes only."""
+        return not self.curves.present.any()
+
+    def contacts(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Of the curves and then of the strokes, (b, n, 3), in the axes and in unit radius; which are any."""
+        b, most = len(self.points), max(map(len, self.strokes))
+        local = (self.curves.points @ self.axes[:, None] / self.radii[:, None, None, None]).reshape(b, -1, 3)
+        beside, there = np.zeros((b, most, 3)), np.zeros((b, most), dtype=bool)
+        for i, stroke in enumerate(self.strokes):
+            beside[i, : len(stroke)], there[i, : len(stroke)] = stroke, True
+        present = self.curves.present.reshape(b, -1)
+        return np.concatenate([local, beside], axis=1), np.concatenate([present, there], axis=1)
+
+
+Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | None]]
+
+
+def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: float | None) -> Started:
+    """Of contours with strokes beside them: what their fits start from, contours as fitted, and errors."""
+    thin = [[thinned(c, point) for c in touch.contours] for point, touch in zip(points, given, strict=True)]
+    touches = [[contour for contour, _ in c] for c in thin]
+    curves = curves_through(*stacked(points, touches))
+    normals = surface_normals(curves.tangents, outward)
+    each = zip(touches, curves.present, curves.tangents, normals, strict=True)
+    apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
+    errors = [
+        degeneracy(*touch) or (_coarse(gap, size) if gap > COARSE * size else None)
+        for touch, gap, size in zip(each, apart, reach, strict=True)
+    ]
+    good = [i for i, error in enumerate(errors) if error is None]
+    if not good:
+        return None, touches, errors
+    curves = curves.at(good)
+    axes, k1, k2, radii = darboux_frames(curves, normals[good])
+    local = curves.points @ axes[:, None] / radii[:, None, None, None]
+    strokes, stds = [], []
+    for row, i in enumerate(good):
+        beside = (given[i].strokes - points[i]) @ axes[row] / radii[row]
+        if len(beside):
+            beside = beside[_over(curves.at(row), local[row], beside)]
+        beside, size = means(beside)
+        strokes.append(beside)
+        sizes = [size for _, size in thin[i]]
+        known = [contour.noise or 0.0 for contour in touches[i]]
+        stds.append(_std(noise, max(size, min(sizes)), [*known, given[i].noise / math.sqrt(size)]))
+    first = Start(points[good], axes, k1, k2, radii, curves.tangents[:, 0], curves, strokes, np.array(stds))
+    return first, touches, errors
+
+
+def _std(noise: float | None, size: int, known: list[float]) -> float:
+    """The least deviation of contacts, the means of `size` others of that noise; or what is known of them."""
+    return max(known) if noise is None else noise / math.sqrt(size)
+
+
+def _over(curves: Curves, local: Array, strokes: Array) -> NDArray[np.bool_]:
+    """Which strokes (n, 3) are over the domain of curves, all in unit radius; none where they bound none."""
+    try:
+        domain = domain_of(replace(curves, points=local))
+    except ValueError:
+        return np.zeros(len(strokes), dtype=bool)
+    return domain.contains(strokes[:, 0], strokes[:, 1]) & (np.abs(strokes[:, 2]) <= 1.0)
+
+
+def strokes_start(
+    points: Array, given: Sequence[Given], outward: Array, noise: float | None, radius: float | None
+) -> Started:
+    """The same of strokes alone."""
+    found = [
+        first_frame(touch.strokes - point, up, radius)
+        for point, touch, up in zip(points, given, outward, strict=True)
+    ]
+    for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
+        first = found[i]
+        if isinstance(first, FirstFrame) and gap > COARSE * first.radius:
+            found[i] = _coarse(gap, first.radius)
+    errors = [None if isinstance(first, FirstFrame) else first for first in found]
+    firsts = {i: first for i, first in enumerate(found) if isinstance(first, FirstFrame)}
+    none: list[list[Contour]] = [[] for _ in given]
+    if not firsts:
+        return None, none, errors
+    good = list(firsts)
+    thin = [means(first.contacts) for first in firsts.values()]
+    stds = [
+        _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
+    ]
+    axes = np.array([first.axes for first in firsts.values()])
+    k1, k2, radii = np.array([(first.k1, first.k2, first.radius) for first in firsts.values()]).T
+    curves = curves_through(*stacked(points[good], [[]] * len(good)))
+    strokes = [beside for beside, _ in thin]
+    return (
+        Start(points[good], axes, k1, k2, radii, axes[:, :, 0], curves, strokes, np.array(stds)),
+        none,
+        errors,
+    )
+
+
+def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
+    """The heights at the origin, (b,), that contacts (b, n, 3) ask of surfaces that pass through it."""
+    b, n = weights.shape
+    basis = monomials(contacts[..., 0].ravel(), contacts[..., 1].ravel(), TERMS).reshape(b, n, -1)
+    off = contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0]
+    found: Array = (weights * off).sum(axis=1) / weights.sum(axis=1)
+    return found
+
+
+def domain_of(curves: Curves) -> Domain:
+    """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing."""
+    last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
+    rows = np.arange(len(last))
+    before, after = curves.present[:, 0] & (curves.along[:, 0] < 0.0), curves.along[rows, last] > 0.0
+    ends = np.vstack([curves.points[before, 0], curves.points[rows, last][after & curves.present[:, 0]]])
+    return closed_spline_domain(ends[:, :2], 1.0)
+
+
+def _coarse(gap: float, size: float) -> DegenerateCurvesError:
+    return DegenerateCurvesError(
+        f"the coordinates at the point are {gap:.2g} apart in double precision, too coarse for curves of "
+        f"{size:.2g}: move the origin nearer to the point"
+    )
