@@ -14,7 +14,7 @@ from ..bayes.contradiction import contradiction, measured_normals
 from ..bayes.joint_fit import posterior_of
 from ..bayes.posterior import FREE, Posterior, terms_to
 from ..contours.contour import Contour
-from ..contours.curves import besides_point
+from ..contours.curves import besides_point, has_measured_normals
 from ..contours.local_geometry import Frame
 from ..paper import least_squares
 from ..patch.domain import Domain
@@ -225,9 +225,9 @@ class Reconstruction:
     @cached_property
     def contradiction(self) -> tuple[float, float]:
         """By how many deviations, and by what angle in radians, fitted normals contradict the contacts."""
-        contacts, normals = measured_normals(self.contours, self.frame, self.radius)
-        if self.joint_posterior is None or not len(normals):
+        if self.joint_posterior is None or not has_measured_normals(self.contours):
             return 0.0, 0.0
+        contacts, normals = measured_normals(self.contours, self.frame, self.radius)
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
         alone = posterior_of(k1, k2, self.contacts / self.radius, self.accuracy)
         return contradiction(contacts, normals, alone)

@@ -240,3 +240,13 @@ def test_contacts_are_a_step_apart_to_a_thousandth_however_bent_the_surface_is(r
     steps = np.linalg.norm(np.diff(contour.points, axis=0), axis=1)
     assert len(steps) >= 6
     assert np.abs(steps / 2.0 - 1.0).max() < 1e-3
+
+
+def test_a_plane_leans_by_less_than_a_right_angle():
+    for degrees in (-89.0, 65.0, 89.0):
+        t, u, across = SamplingPlane(0.3, np.radians(degrees)).axes((0, 0, 1)).T
+        assert u[2] == pytest.approx(np.cos(np.radians(degrees)))
+        assert np.cross(t, u) == pytest.approx(across)
+    for degrees in (-90.0, 90.0, 100.0):
+        with pytest.raises(ValueError, match="tilt: wanted less than 90 degrees, got"):
+            SamplingPlane(0.3, np.radians(degrees)).axes((0, 0, 1))

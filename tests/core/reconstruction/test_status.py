@@ -9,6 +9,7 @@ import pytest
 import surfaces
 
 from core import METHODS, Contour, reconstruct
+from core.bayes.posterior import Posterior
 from core.contours.curves import curves_through, misses, stacked
 
 EXTENT = 12.0
@@ -220,3 +221,40 @@ def test_single_precision_far_from_the_origin_is_refused_and_near_it_taken():
     assert far.patch.k1 == pytest.approx(near.patch.k1, rel=0.05)
     with pytest.raises(ValueError, match=r"points: numbers of single precision are 0\.5 apart here"):
         at(1e6)
+
+
+@pytest.mark.parametrize(
+    ("share", "std", "doubt"),
+    [(0.0049, 0.0, False), (0.0051, 0.0, True), (0.0099, 0.002, False), (0.0101, 0.002, True)],
+)
+def test_a_curve_may_miss_the_point_by_half_a_percent_of_the_radius_or_five_deviations(share, std, doubt):
+    s = surfaces.pear()
+    r = s.fit(contours_of(s, noise=0.0))
+    misses = np.zeros((3, 2))
+    misses[2] = share * r.radius, std * r.radius
+    assert (replace(r, misses=misses).status == "uncertain") == doubt
+    # A contact's accuracy is the least that curves scatter by, but for a third.
+    rough = replace(r, misses=np.array([[0.01 * r.radius, 0.0]] * 3), accuracy=0.01)
+    assert rough.status == "ok"
+    assert replace(rough, accuracy=0.006).status == "uncertain"
+
+
+@pytest.mark.parametrize(("share", "doubt"), [(0.0199, False), (0.0201, True)])
+def test_heights_may_be_good_to_two_percent_of_the_radius(share, doubt):
+    s = surfaces.pear()
+    r = s.fit(contours_of(s))
+    assert (replace(r, known_height_std=share * r.radius).status == "uncertain") == doubt
+
+
+@pytest.mark.parametrize(
+    ("degrees", "std", "doubt"), [(9.9, 0.099, ""), (10.1, 0.0, "principal"), (0.0, 0.101, "known least")]
+)
+def test_the_frame_may_be_ten_degrees_off_and_curvatures_a_tenth_of_one_over_the_radius(
+    monkeypatch, degrees, std, doubt
+):
+    s = surfaces.pear()
+    r = s.fit(contours_of(s))
+    monkeypatch.setattr(Posterior, "turn", lambda *_: np.radians(degrees))
+    monkeypatch.setattr(Posterior, "curvature_std", lambda _: std)
+    assert (r.status == "uncertain") == bool(doubt)
+    assert doubt in r.message

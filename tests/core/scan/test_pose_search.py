@@ -308,3 +308,13 @@ def test_places_that_are_tried_are_a_fifth_of_the_radius_apart_and_leave_no_gap(
     assert tree.query(origins, 2)[0][:, 1].min() >= 0.2
     assert tree.query(mesh.centers)[0].max() < 0.2 + 2.0 * pose_search.SPACING
     assert np.abs(places[..., :3].swapaxes(1, 2) @ places[..., :3] - np.eye(3)).max() < 1e-12
+
+
+def test_long_triangles_are_halved_until_a_patch_covers_many():
+    corners = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 2.0, 0.0], [0.0, 2.0, 0.0]])
+    mesh = scanned_mesh.mesh_of(corners, np.array([[0, 1, 2], [0, 2, 3]]), 1.0)
+    edges = np.linalg.norm(np.roll(mesh.triangles, 1, axis=1) - mesh.triangles, axis=2)
+    assert 0.125 < edges.max() <= 0.25
+    assert np.linalg.norm(scanned_mesh._across(mesh.triangles), axis=1).sum() / 2.0 == pytest.approx(6.0)
+    assert mesh.centers == pytest.approx(mesh.triangles.mean(axis=1))
+    assert mesh.smooth == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(mesh.smooth), 1)))
