@@ -12,6 +12,7 @@ from time import perf_counter
 import bpy
 from bpy.app.handlers import persistent
 
+from .. import deleted
 from ..scene import patch_object
 from ..scene.family import remembered
 from .probe import (
@@ -32,7 +33,6 @@ SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
 SLICE = 0.2  # seconds of work between two events, in a window
 GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
-_deleted = set()  # session_uids
 _unsure = True  # whether any patch may be another than its inputs ask for, as after undo
 
 
@@ -55,7 +55,8 @@ def on_depsgraph_update(scene, depsgraph):
 def _look_at(probe, depsgraph, reshaped, moved, in_time):
     """Brings one up to date; where there is no time for that now, once the gesture has ended."""
     settings = probe.tactile_probe
-    _forget_deleted(probe)
+    deleted.relink(probe)
+    deleted.forget_target(probe)
     measure_shape(settings, depsgraph, reshaped)
     patch = patch_of(probe)
     outdated = is_outdated(probe, depsgraph)
@@ -110,31 +111,6 @@ def _concerned(depsgraph):
     ]
 
 
-def _forget_deleted(probe):
-    """A target that was deleted lives on as long as the probe points to it: lets go, so that it is gone."""
-    settings, record = probe.tactile_probe, record_of(probe)
-    target = settings.target
-    # One that has never been touched is a script's, which may be about to put it into the scene.
-    # A library's is not deleted by being in no scene of this file.
-    if target is None or target.users_scene or not target.is_editable:
-        return
-    if record is None or record["source"] != target.name:
-        return
-    settings.property_unset("target")
-    if not target.users:  # A handler may not delete what is being evaluated.
-        _deleted.add(target.session_uid)
-        # Without a window no timer runs, and one that is left keeps Blender's module from ending.
-        if not bpy.app.background and not bpy.app.timers.is_registered(_remove_deleted):
-            bpy.app.timers.register(_remove_deleted)
-
-
-def _remove_deleted():
-    """Takes away the objects that were deleted and that no probe points to any more; a timer."""
-    for obj in [obj for obj in bpy.data.objects if obj.session_uid in _deleted and not obj.users]:
-        bpy.data.objects.remove(obj)
-    _deleted.clear()
-
-
 def is_pending(probe):
     """Whether what is dear is still to be filled in."""
     record = record_of(probe)
@@ -182,7 +158,7 @@ def register():
 
 
 def unregister():
-    for timer in filter(bpy.app.timers.is_registered, (_settle, _remove_deleted)):
+    for timer in filter(bpy.app.timers.is_registered, (_settle, deleted.remove)):
         bpy.app.timers.unregister(timer)
     for name, handler in HANDLERS.items():
         with suppress(ValueError):  # another script may have taken it away

@@ -44,7 +44,7 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
         description="The mesh object to touch",
         type=bpy.types.Object,
         poll=lambda _, obj: obj.type == "MESH" and not is_result(obj),
-        update=lambda settings, context: _appointed(settings, context),
+        update=lambda settings, context: _chosen(settings, context),
         override=OVERRIDABLE,
     )
     live: BoolProperty(
@@ -64,6 +64,7 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     message: StringProperty(description="Why there is no patch; empty where there is one", options={"HIDDEN"})
     digest: StringProperty(options={"HIDDEN"})
     shape: StringProperty(options={"HIDDEN"})
+    lost: StringProperty(description="Number and name of a target that was deleted", options={"HIDDEN"})
 
 
 _targets = None  # session_uids of what there are probes on, 0 for none; None where it is to be looked up
@@ -87,6 +88,11 @@ def forget_targets():
 def _appointed(settings, context):
     forget_targets()
     changed(settings, context)
+
+
+def _chosen(settings, context):
+    settings.lost = ""
+    _appointed(settings, context)
 
 
 def is_probe(obj):

@@ -467,7 +467,7 @@ NO_TARGET = "The probe has no target: choose the mesh to touch"
 def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
     empty, extension, ball, capfd, spoil, sentence, left
 ):
-    live = extension.tactile_addon.probe.change_handlers
+    deleted = extension.tactile_addon.deleted
     probe, patch = pick(empty)
     before, there = state_but_status(patch), in_world(patch)
     spoil(empty, ball)
@@ -475,8 +475,8 @@ def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
         update(empty)
         assert sentence in probe.tactile_probe.message
         if left == SET[1:] and "Sphere" in names(empty):  # the handler itself deletes nothing
-            assert not empty.app.timers.is_registered(live._remove_deleted)  # nothing runs one here
-            live._remove_deleted()  # as Blender does once it is idle, in a window
+            assert not empty.app.timers.is_registered(deleted.remove)  # nothing runs one here
+            deleted.remove()  # as Blender does once it is idle, in a window
         assert names(empty) == left
         assert state_but_status(patch) == before
         assert in_world(patch) == pytest.approx(there, abs=1e-5)
