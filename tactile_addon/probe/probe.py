@@ -20,7 +20,7 @@ from ..scene import patch_object
 from ..scene.family import children_of
 from ..stability_map import map_object
 from ..touch.settings import OVERRIDABLE, TouchSettings, changed, touch_arguments
-from ..touch.surface import MeshSurface
+from ..touch.surface import checksum_of
 from ..touch.touch_object import touch, verify
 from ..touch.wording import sentence
 
@@ -231,6 +231,18 @@ def adopt(probe, touched, depsgraph, complete):
     _sign(probe, depsgraph)
 
 
+def stand_by(probe, outdated):
+    """Has the patch of a probe that is not touched again now stay where it was, and say whether it is outdated."""
+    patch = patch_of(probe)
+    if patch is None:
+        return
+    patch_object.hold(patch)
+    if outdated:
+        patch_object.mark_stale(patch)
+    elif not probe.tactile_probe.message:
+        patch_object.mark_current(patch)
+
+
 def touch_at(probe, depsgraph, complete, **more):
     """A touch with the probe's inputs. Raises ValueError, with a sentence, where there can be none."""
     settings, matrix, record = probe.tactile_probe, probe.matrix_world, record_of(probe)
@@ -320,7 +332,7 @@ def measure_shape(settings, depsgraph, reshaped=None):
     checksum = reshaped.get(target)
     if checksum is None:
         try:
-            checksum = MeshSurface(target, depsgraph).checksum
+            checksum = checksum_of(target, depsgraph)
         except ValueError:  # the touch will say what is wrong
             checksum = 0
         if target in reshaped:

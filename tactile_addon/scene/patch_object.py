@@ -17,6 +17,7 @@ from .mesh_data import emission, fill, own_mesh, values, write
 COLLECTION = "Tactile Patches"
 RECORD = "tactile"  # the patch object's custom property that holds the report,
 RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
+VERDICT = "tactile_verdict"  # and the one with its status and message while these say that it is outdated
 COLOR = "curvature_color"
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
@@ -68,6 +69,7 @@ def rewrite(patch, touched):
     _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
+    patch.pop(VERDICT, None)
     if touched.report["is_verified"]:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolor(patch)
@@ -104,13 +106,34 @@ def _is_whole(mesh):
 
 def mark_failed(patch, why):
     """The patch is that of an earlier touch, for the last one failed."""
+    _outdate(patch, {"message": f"This is the patch of an earlier touch, for the last one failed. {why}"})
+
+
+def mark_stale(patch):
+    """The patch is that of an earlier touch, and nothing has been felt since."""
+    _outdate(
+        patch,
+        {
+            "message": "This is the patch of an earlier touch, for the probe or its target has changed "
+            "since: touch again."
+        },
+    )
+
+
+def _outdate(patch, verdict):
     report = report_of(patch)
-    if report is not None:
-        verdict = {
-            "status": "outdated",
-            "message": f"This is the patch of an earlier touch, for the last one failed. {why}",
-        }
-        report.update(verdict)
+    if report is None:
+        return
+    if VERDICT not in patch:
+        patch[VERDICT] = {key: report[key] for key in ("status", "message")}
+    report.update({"status": "outdated", **verdict})
+
+
+def mark_current(patch):
+    """The patch is again what its probe asks for."""
+    verdict = patch.pop(VERDICT, None)
+    if verdict is not None and report_of(patch) is not None:
+        patch[RECORD].update(verdict)
 
 
 def reconstruction_of(patch):
@@ -147,8 +170,11 @@ def _place(patch, matrix):
 
 
 def hold(patch):
-    """Keeps the patch where it was touched while its probe moves on without it."""
-    if report_of(patch) is None:
+    """Keeps the patch where it was touched, while its probe moves on without it or by whom it is moved.
+
+    One that constraints or an animation would take back stays as it is.
+    """
+    if report_of(patch) is None or patch.constraints or patch.animation_data:
         return
     axes, origin = touched_frame(patch)
     if not is_at(patch, axes, origin):
