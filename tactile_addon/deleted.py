@@ -4,10 +4,12 @@
 
 import bpy
 
-from .probe.probe import record_of
+from .probe.probe import DIGEST, is_result, record_of
+from .scene import patch_object
 from .touch.settings import silent
 
-_deleted = set()  # session_uids
+_deleted = set()  # session_uids of targets
+_owners = {}  # those of contours, and of the patches they were seen with last
 
 
 def forget_target(probe):
@@ -26,11 +28,16 @@ def forget_target(probe):
         return
     settings.lost = f"{target.session_uid} {target.name}"
     settings.property_unset("target")
-    if not target.users:  # A handler may not delete what is being evaluated.
+    if not target.users:
         _deleted.add(target.session_uid)
-        # Without a window no timer runs, and one that is left keeps Blender's module from ending.
-        if not bpy.app.background and not bpy.app.timers.is_registered(remove):
-            bpy.app.timers.register(remove)
+        _remove_soon()
+
+
+def _remove_soon():
+    """Not now: a handler may not delete what is being evaluated."""
+    # Without a window no timer runs, and one that is left keeps Blender's module from ending.
+    if not bpy.app.background and not bpy.app.timers.is_registered(remove):
+        bpy.app.timers.register(remove)
 
 
 def relink(probe):
@@ -45,8 +52,33 @@ def relink(probe):
             settings.target = target
 
 
+def has_contours():
+    return bool(_owners)
+
+
+def look_for_contours():
+    """Has the contours go whose patch was deleted: they are in its coordinates, and mean nothing without it."""
+    there = {obj.session_uid: obj for obj in bpy.data.objects}
+    for number, obj in there.items():
+        if patch_object.CONTOURS in obj and obj.parent is not None:
+            _owners[number] = obj.parent.session_uid
+    if any(number not in there or _is_left(there[number], there) for number in _owners):
+        _remove_soon()
+
+
+def _is_left(lines, there):
+    return lines.parent is None and lines.is_editable and _owners.get(lines.session_uid) not in there
+
+
 def remove():
-    """Takes away the objects that were deleted and that no probe points to any more; a timer."""
-    for obj in [obj for obj in bpy.data.objects if obj.session_uid in _deleted and not obj.users]:
-        bpy.data.objects.remove(obj)
+    """Takes away what was deleted, and what nothing is left of but a datablock that nobody uses; a timer."""
+    there = {obj.session_uid: obj for obj in bpy.data.objects}
+    gone = [there[number] for number in _deleted if number in there and not there[number].users]
+    left = [there[number] for number in _owners if number in there and _is_left(there[number], there)]
+    for number in [number for number in _owners if number not in there]:
+        del _owners[number]
     _deleted.clear()
+    patch_object.remove_objects([obj for obj in left if is_result(obj)])
+    for obj in gone:
+        bpy.data.objects.remove(obj)
+    patch_object.remove_meshes([mesh for mesh in bpy.data.meshes if DIGEST in mesh])

@@ -52,7 +52,15 @@ def on_frame_change(scene, depsgraph):
 
 def _bring_up_to_date(depsgraph, dearest):
     """dearest : seconds that a touch may take now, by those of the last; the others say "outdated"."""
-    if not targets() or depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
+    global _unsure
+    if not (targets() or deleted.has_contours() or _unsure):
+        return
+    if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
+        return
+    if _unsure or _has_come_or_gone(depsgraph):
+        deleted.look_for_contours()
+    if not targets():
+        _unsure = False
         return
     with remembered():
         concerned, unsure = _concerned(depsgraph)
@@ -107,6 +115,11 @@ def on_other_data(*_):
         _settle_soon()
 
 
+def _has_come_or_gone(depsgraph):
+    """Whether some object may have: its scene and collections are updated then."""
+    return any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in depsgraph.updates)
+
+
 def _concerned(depsgraph):
     """The probes that something has happened to: to them, their patch or target, or to what is there.
 
@@ -119,7 +132,7 @@ def _concerned(depsgraph):
     updated = {u.id.original for u in updates if u.is_updated_geometry or u.is_updated_transform}
     objects = [datablock for datablock in updated if isinstance(datablock, bpy.types.Object)]
     owners = {probe_of(obj) for obj in objects} - {None}
-    scene = unsure or any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
+    scene = unsure or _has_come_or_gone(depsgraph)
     if not (scene or owners or any(obj.session_uid in known for obj in objects)):
         return [], False
     _unsure, _seen = False, layer

@@ -225,22 +225,34 @@ def adopt(probe, touched, depsgraph, complete):
     probe.empty_display_size = 0.6 * touched.report["extent"]
     patch = patch_of(probe)
     if patch is None:
-        patch_object.insert(depsgraph.scene, touched, parent=probe)
+        patch_object.insert(depsgraph.scene, touched, parent=probe, lines=_left_contours(probe))
     else:
         patch_object.rewrite(patch, touched)
     _sign(probe, depsgraph)
 
 
 def stand_by(probe, outdated):
-    """Has the patch of a probe that is not touched again now stay where it was, and say whether it is outdated."""
-    patch = patch_of(probe)
+    """Where there is no touch now: has the patch stay where it was, and say whether it is outdated."""
+    settings, patch = probe.tactile_probe, patch_of(probe)
     if patch is None:
+        if settings.digest and not settings.message:
+            settings.message = "The probe has no patch: touch again for one, or delete the probe too"
         return
     patch_object.hold(patch)
+    record = record_of(patch)
+    if settings.message and record is not None and patch_object.VERDICT not in patch:
+        settings.message = ""  # there was no patch, and undo has brought it back
     if outdated:
         patch_object.mark_stale(patch)
-    elif not probe.tactile_probe.message:
+    elif not settings.message:
         patch_object.mark_current(patch)
+
+
+def _left_contours(probe):
+    """Those of a patch that was deleted, where they are still there."""
+    lines = (obj for obj in bpy.data.objects if patch_object.CONTOURS in obj and obj.parent is None)
+    own = (obj for obj in lines if obj.is_editable and obj.data is not None)
+    return next((obj for obj in own if obj.data.get(DIGEST) == probe.tactile_probe.digest), None)
 
 
 def touch_at(probe, depsgraph, complete, **more):

@@ -35,22 +35,43 @@ POSITIVE = ("height_std",)  # never below zero: half a scale says it all
 FLOOR = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
 
 
-def insert(scene, touched, parent=None):
-    """Adds the patch and its contours to `scene`, in a collection of their own; returns the patch object."""
+def insert(scene, touched, parent=None, lines=None):
+    """Adds the patch and its contours to `scene`, in a collection of their own; returns the patch object.
+
+    lines : contours that have lost their patch, to be those of this one
+    """
     name = touched.report["source"]
-    patch, lines = (
-        bpy.data.objects.new(f"{name} {what}", bpy.data.meshes.new(f"{name} {what}"))
-        for what in ("Patch", "Contours")
-    )
+    patch = _new(scene, f"{name} Patch", emission("Tactile Curvature", attribute=COLOR))
+    lines = lines or _new(scene, f"{name} Contours", emission("Tactile Contour", color=CONTOUR_COLOR))
     patch.parent, lines.parent, lines[CONTOURS] = parent, patch, True
     for obj in (patch, lines):
         add(obj)
-        obj.show_in_front = True  # it lies in the surface it describes
-        collection(scene).objects.link(obj)
-    patch.data.materials.append(emission("Tactile Curvature", attribute=COLOR))
-    lines.data.materials.append(emission("Tactile Contour", color=CONTOUR_COLOR))
     rewrite(patch, touched)
     return patch
+
+
+def _new(scene, name, material):
+    obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+    obj.show_in_front = True  # it lies in the surface it describes
+    collection(scene).objects.link(obj)
+    obj.data.materials.append(material)
+    return obj
+
+
+def remove_objects(objects):
+    """Deletes objects, with what nobody else uses of them."""
+    meshes = [obj.data for obj in objects if obj.data is not None]
+    for obj in objects:
+        bpy.data.objects.remove(obj)
+    remove_meshes(meshes)
+
+
+def remove_meshes(meshes):
+    """Deletes those that nobody uses, and their materials where nobody uses these."""
+    meshes = [mesh for mesh in meshes if not mesh.users]
+    materials = {material for mesh in meshes for material in mesh.materials if material is not None}
+    bpy.data.batch_remove(meshes)
+    bpy.data.batch_remove([material for material in materials if not material.users])
 
 
 def rewrite(patch, touched):
@@ -65,6 +86,7 @@ def rewrite(patch, touched):
     names = {"patch": patch.name}
     if lines is not None:
         fill_contours(lines.data, touched)
+        _place_contours(lines)
         names["contours"] = lines.name
     _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
     patch[RECORD] = touched.report | names
@@ -179,6 +201,15 @@ def hold(patch):
     axes, origin = touched_frame(patch)
     if not is_at(patch, axes, origin):
         _place(patch, _matrix(axes, origin))
+    _place_contours(contours_of(patch))
+
+
+def _place_contours(lines):
+    """Puts contours where their patch is, in whose coordinates they are."""
+    if lines is None or lines.constraints or lines.animation_data:
+        return
+    if lines.matrix_basis != Matrix() or lines.matrix_parent_inverse != Matrix():
+        lines.matrix_parent_inverse = lines.matrix_basis = Matrix()
 
 
 def touched_frame(patch):
