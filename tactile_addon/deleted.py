@@ -4,6 +4,7 @@
 
 import bpy
 
+from . import anchor
 from .probe.probe import DIGEST, is_result, record_of
 from .scene import patch_object
 from .touch.settings import silent
@@ -24,9 +25,17 @@ def forget_target(probe):
     # A library's is not deleted by being in no scene of this file.
     if target is None or target.users_scene or not target.is_editable:
         return
+    if target.override_library is not None:
+        # One that was made for the probe's sake and is in no scene: the library's own is there to be touched.
+        if target.override_library.reference.users_scene:
+            with silent():
+                settings.target = target.override_library.reference
+        return
     if record is None or record["source"] != target.name:
         return
-    settings.lost = f"{target.session_uid} {target.name}"
+    settings.lost = f"{target.session_uid} {int(anchor.is_attached(probe))} {target.name}"
+    if anchor.is_attached(probe):  # to an object that is in no scene any more
+        anchor.detach(probe)
     settings.property_unset("target")
     if not target.users:
         _deleted.add(target.session_uid)
@@ -45,11 +54,13 @@ def relink(probe):
     settings = probe.tactile_probe
     if settings.target is not None or not settings.lost:
         return
-    number, _, name = settings.lost.partition(" ")
+    number, was_attached, name = settings.lost.split(" ", 2)
     target = bpy.data.objects.get(name)
     if target is not None and str(target.session_uid) == number and target.users_scene:
         with silent():
             settings.target = target
+        if int(was_attached) and probe.parent is None:
+            anchor.attach(probe, target)
 
 
 def has_contours():
@@ -57,7 +68,7 @@ def has_contours():
 
 
 def look_for_contours():
-    """Has the contours go whose patch was deleted: they are in its coordinates, and mean nothing without it."""
+    """Has the contours go whose patch was deleted: without its coordinates they mean nothing."""
     there = {obj.session_uid: obj for obj in bpy.data.objects}
     for number, obj in there.items():
         if patch_object.CONTOURS in obj and obj.parent is not None:

@@ -13,7 +13,7 @@ from time import perf_counter
 import bpy
 from bpy.app.handlers import persistent
 
-from .. import deleted
+from .. import anchor, deleted
 from ..scene.family import remembered
 from .probe import (
     forget_targets,
@@ -91,8 +91,9 @@ def _look_at(probe, depsgraph, reshaped, in_time):
     if outdated and settings.live and in_time:
         update(probe, depsgraph, complete=bpy.app.background)
     else:
-        stand_by(probe, outdated)
-    if not bpy.app.background and (is_pending(probe) or (outdated and settings.live and not in_time)):
+        stand_by(probe, outdated, complete=bpy.app.background)
+    late = outdated and settings.live and not in_time
+    if not bpy.app.background and (late or is_pending(probe) or anchor.is_carried(probe)):
         _settle_soon()
 
 
@@ -179,10 +180,14 @@ def _settle():
                 on_depsgraph_update(window.scene, depsgraph)
             for probe in filter(is_probe, list(window.view_layer.objects)):
                 late = probe.tactile_probe.live and is_outdated(probe, depsgraph)
-                if (late or is_pending(probe)) and is_free(probe):
+                if not is_free(probe):
+                    continue
+                if late or is_pending(probe):
                     update(probe, depsgraph, complete=True)
                     if perf_counter() > end:
                         return 0.01
+                else:
+                    stand_by(probe, is_outdated(probe, depsgraph), complete=True)
     return None
 
 

@@ -88,7 +88,7 @@ def rewrite(patch, touched):
         fill_contours(lines.data, touched)
         _place_contours(lines)
         names["contours"] = lines.name
-    _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
+    place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
     patch.pop(VERDICT, None)
@@ -175,20 +175,19 @@ def reconstruction_of(patch):
         return r
     placed = np.array(patch.matrix_world, dtype=float)
     try:
-        return r.moved(placed @ np.linalg.inv(_matrix(r.frame.axes, r.frame.origin)))
+        return r.moved(placed @ np.linalg.inv(matrix_of(r.frame.axes, r.frame.origin)))
     except ValueError as error:
         raise ValueError(
             f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
         ) from error
 
 
-def _place(patch, matrix):
-    """Puts the patch there in the world, under its probe or not; it stays where the probe is deleted."""
-    if patch.parent is not None:
-        patch.matrix_parent_inverse = patch.parent.matrix_world.inverted_safe()
-    matrix = Matrix(matrix.tolist())
-    patch.matrix_world = matrix  # known before the next evaluation
-    patch.matrix_basis = matrix
+def place(obj, matrix):
+    """Puts an object there in the world, so that it stays there where its parent is deleted."""
+    if obj.parent is not None:
+        obj.matrix_parent_inverse = obj.parent.matrix_world.inverted_safe()
+    obj.matrix_world = matrix  # known before the next evaluation
+    obj.matrix_basis = matrix
 
 
 def hold(patch):
@@ -200,7 +199,7 @@ def hold(patch):
         return
     axes, origin = touched_frame(patch)
     if not is_at(patch, axes, origin):
-        _place(patch, _matrix(axes, origin))
+        place(patch, Matrix(matrix_of(axes, origin).tolist()))
     _place_contours(contours_of(patch))
 
 
@@ -218,9 +217,24 @@ def touched_frame(patch):
     return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
 
 
+def move_record(patch, axes, origin):
+    """Has the record say that the patch was touched at another place, where it is no longer at that one."""
+    report, (before, at) = patch[RECORD], touched_frame(patch)
+    if np.array_equal(axes, before) and np.array_equal(origin, at):
+        return
+    turn = axes @ before.T
+    if np.shape(report.get("axes")) == (3, 3):
+        report["axes"] = (turn @ np.array(report["axes"])).tolist()
+    plane = report.get("suggested_plane")
+    if plane is not None and np.shape(plane.get("tangent")) == (3,):
+        plane["tangent"] = (turn @ np.array(plane["tangent"])).tolist()
+    d1, d2, normal = axes.T.tolist()
+    report["frame"].update({"origin": origin.tolist(), "d1": d1, "d2": d2, "normal": normal})
+
+
 def is_at(patch, axes, origin):
     near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
-    return np.allclose(patch.matrix_world, _matrix(axes, origin), **near)
+    return np.allclose(patch.matrix_world, matrix_of(axes, origin), **near)
 
 
 def meshes(patch):
@@ -246,7 +260,7 @@ def recolor(patch):
     record["color_limit"] = limit
 
 
-def _matrix(axes, origin):
+def matrix_of(axes, origin):
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = axes, origin
     return matrix

@@ -190,6 +190,13 @@ def checksum_of(obj, depsgraph):
     return zlib.crc32(co)
 
 
+def is_disabled(obj):
+    """Whether it is disabled in viewports, yet perhaps evaluated, as somebody's parent."""
+    return obj.hide_viewport or (
+        bool(obj.users_collection) and all(found.hide_viewport for found in obj.users_collection)
+    )
+
+
 def disabled(obj):
     """The error to raise for an object that Blender has not evaluated."""
     return ValueError(
@@ -204,6 +211,8 @@ def evaluated_object(obj, depsgraph):
     """
     if obj.type != "MESH":
         raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
+    if is_disabled(obj):
+        raise disabled(obj)
     evaluated = obj.evaluated_get(depsgraph)
     if obj.data.is_editmode:
         # The evaluated mesh is an empty shell around the edited one until somebody asks for it.

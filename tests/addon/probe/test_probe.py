@@ -332,7 +332,7 @@ def test_the_patch_follows_its_target(empty, ball, change, height, radius):
     ball.modifiers.new("Displace", "DISPLACE").mid_level = 0.0
     ball.modifiers["Displace"].strength = 0.0
     ball.modifiers.new("Subdivision", "SUBSURF").levels = 0
-    probe, patch = pick(empty)
+    probe, patch = pick(empty, parent=False)
     blocks, digest = datablocks(empty), probe.tactile_probe.digest
     mark(patch)
     change(ball)
@@ -362,7 +362,7 @@ def test_what_does_not_concern_the_probe_leaves_its_patch_alone(empty, ball):
 
 
 def test_a_probe_that_is_not_live_waits_to_touch_again(empty, ball):
-    probe, patch = pick(empty)
+    probe, patch = pick(empty, parent=False)
     before, there, settings = state_but_status(patch), in_world(patch), probe.tactile_probe
     settings.live = False
     settings.extent = 0.5
