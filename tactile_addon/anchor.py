@@ -57,7 +57,7 @@ def put(probe, matrix):
 
 
 def is_carried(probe):
-    """Whether its target has carried it away from its own coordinates, to be settled once a gesture has ended."""
+    """Whether its target has carried it away from its own coordinates, until a gesture has ended."""
     if not is_attached(probe) or probe.constraints or probe.animation_data:
         return False
     own, there = np.array(probe.matrix_basis), np.array(probe.matrix_world)

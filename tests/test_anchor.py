@@ -90,7 +90,7 @@ def test_a_target_that_moves_as_a_whole_takes_its_probe_along_and_is_not_touched
 
 
 def test_a_thousand_small_motions_do_not_wear_a_patch_off_its_place(empty, suzanne, touches):
-    probe, patch = pick(empty, (-0.05, -0.9, 0.6))
+    _, patch = pick(empty, (-0.05, -0.9, 0.6))
     there = suzanne.matrix_world.inverted() @ patch.matrix_world
     for angle in range(1000):
         suzanne.rotation_euler.z = 0.1 * angle
@@ -215,7 +215,7 @@ def test_a_target_that_depends_on_the_probe_does_not_become_its_parent(empty, ex
 def test_a_probe_that_stands_alone_touches_a_target_that_was_moved(empty, touches):
     empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.0)
     ball = empty.context.object
-    probe, patch = pick(empty, TOP, parent=False)
+    probe, _ = pick(empty, TOP, parent=False)
     ball.location.z = 0.1
     empty.context.view_layer.update()
     assert touches == [probe.name]

@@ -26,6 +26,7 @@ DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise this many times larg
 DOUBTFUL_TURN = math.radians(10.0)  # Angle that the frame may be off.
 LIKELY = 0.5  # that it is off by less, of a rough surface: its directions are others at each scale
 DOUBTFUL_CURVATURE = 0.1  # of 1 / radius; as well is it known along a curve that ends at a quarter of it
+FLAT = 1e-4  # of 1 / radius, a curvature that is none
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point,
 SIGNIFICANT = 5.0  # standard deviations of it,
 LEAST_SCATTER = 0.3  # Share of a contact's accuracy: few contacts may happen to scatter less.
@@ -262,7 +263,9 @@ class Reconstruction:
                 ", more than its scatter explains: set the point where the curves meet."
             )
         turn = self.posterior.turn() if self.residual is None else self.posterior.turn(LIKELY)
-        if turn > DOUBTFUL_TURN:
+        # A plane has no directions to be off, and a longer extent would give it none.
+        has_directions = self.radius * max(abs(self.patch.k1), abs(self.patch.k2)) > FLAT
+        if turn > DOUBTFUL_TURN and has_directions:
             return "uncertain", (
                 f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
                 "extent, or add sampling planes."

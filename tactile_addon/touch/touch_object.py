@@ -15,6 +15,7 @@ from .settings import MOST_PLANES, STEEPEST
 from .single_precision import require_single
 from .surface import MeshSurface
 from .touch_report import (
+    early_ends,
     ends,
     judgment,
     measures,
@@ -122,7 +123,7 @@ def touch_along(
         "step": found.step,
         "noise": noise,
         "seed": seed,
-        **reconstruction_report(result, "" if extent else ends(result.contours)),
+        **reconstruction_report(result, (early_ends if extent else ends)(result.contours)),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in planes],
         "axes": axes.tolist(),
         "stops": [list(contour.stops) for contour in result.contours],
