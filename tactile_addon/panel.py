@@ -107,8 +107,16 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             return
         _draw_colors(context, layout, patch, "tactile_colors")
         box, unit = layout.box(), units.unit_of(context.scene, record["radius"])
-        _draw_rows(box, patch_rows(record, unit))
-        _draw_sentence(context, box, record["message"], ICONS.get(record["status"], "ERROR"))
+        outdated = record["status"] == "outdated"
+        if outdated and found is not None and found.tactile_probe.message:
+            pass  # which stands above already
+        else:
+            _draw_sentence(context, box, record["message"], ICONS.get(record["status"], "ERROR"))
+        if outdated:
+            if found is not None:
+                box.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
+            box.label(text="Last Touch")
+        _draw_rows(box, patch_rows(record, unit), active=not outdated)
         box.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
         if found is None:
             box.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
@@ -144,9 +152,10 @@ def _draw_colors(context, layout, obj, name):
         layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
 
 
-def _draw_rows(layout, rows):
-    """Labels and values side by side."""
+def _draw_rows(layout, rows, active=True):
+    """Labels and values side by side, gray where they are not active."""
     column = layout.column(align=True)
+    column.active = active
     for label, value in rows:
         row = column.row(align=True).split(factor=0.55, align=True)
         row.label(text=label)

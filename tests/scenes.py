@@ -33,3 +33,23 @@ def datablocks(bpy):
     """Their names, by kind."""
     kinds = ("objects", "meshes", "materials", "collections", "node_groups", "images", "curves")
     return {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
+
+
+def by_hand(bpy, operator, **arguments):
+    """Runs an operator as a key does: its step of undo is stored first, then the handlers run."""
+    assert operator("EXEC_DEFAULT", True, **arguments) == {"FINISHED"}
+    bpy.context.view_layer.update()
+
+
+def step(bpy, name):
+    """Undo or redo."""
+    getattr(bpy.ops.ed, name)()
+    bpy.context.view_layer.update()
+
+
+def select(bpy, obj):
+    bpy.ops.object.select_all(action="DESELECT")
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="selected")

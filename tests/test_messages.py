@@ -30,12 +30,14 @@ def text_of(node):
 
 
 def sentences(node):
-    """The nodes that are messages: of errors, of reports, of a status."""
+    """The nodes that are messages: of errors, of reports, of a status, of a probe."""
     if isinstance(node, ast.Call):
         name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
         return node.args[:1] if name in ERRORS else node.args[1:2] if name == "report" else []
     if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
         return node.value.elts[1:] if isinstance(node.value.elts[0], ast.Constant) else []
+    if isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", None) == "message":
+        return [node.value]
     if isinstance(node, ast.Dict):
         keys = zip(node.keys, node.values, strict=True)
         return [value for key, value in keys if isinstance(key, ast.Constant) and key.value == "message"]

@@ -6,14 +6,15 @@ A depsgraph handler, for Blender has no callback for an object that moves. In a 
 part at once, and a timer what is dear, once the gesture has ended; without a window all of it at once.
 """
 
+import math
 from contextlib import suppress
 from time import perf_counter
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..scene import patch_object
 from ..scene.family import remembered
+from . import anchor, deleted
 from .probe import (
     forget_targets,
     is_free,
@@ -21,49 +22,78 @@ from .probe import (
     is_probe,
     may_be_outdated,
     measure_shape,
-    patch_of,
     probe_of,
     record_of,
+    stand_by,
     targets,
     update,
 )
 
 SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
 SLICE = 0.2  # seconds of work between two events, in a window
+CHEAP = 0.05  # seconds that a touch may take to be made in every frame of an animation
 GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
-_deleted = set()  # session_uids
 _unsure = True  # whether any patch may be another than its inputs ask for, as after undo
+_seen = None  # the scene and view layer that were looked at last
 
 
 @persistent
 def on_depsgraph_update(scene, depsgraph):
     """Brings the patches of outdated live probes up to date; nothing happens where no input has changed."""
-    if not targets() or depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
+    _bring_up_to_date(depsgraph, math.inf)
+
+
+@persistent
+def on_frame_change(scene, depsgraph):
+    """The same in another frame, where it takes no longer than playback has time for."""
+    _bring_up_to_date(depsgraph, CHEAP)
+
+
+def _bring_up_to_date(depsgraph, dearest):
+    """dearest : seconds that a touch may take now, by those of the last; the others say "outdated"."""
+    global _unsure
+    if not (targets() or deleted.has_contours() or _unsure):
+        return
+    if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
+        return
+    if _unsure or _has_come_or_gone(depsgraph):
+        deleted.look_for_contours()
+    if not targets():
+        _unsure = False
         return
     with remembered():
-        concerned = _concerned(depsgraph)
+        concerned, unsure = _concerned(depsgraph)
         if not concerned:
             return
         reshaped = {u.id.original: None for u in depsgraph.updates if u.is_updated_geometry}
-        moved = {u.id.original for u in depsgraph.updates if u.is_updated_transform}
+        if unsure:  # edited where no handler was told, as while the extension was off
+            reshaped |= {probe.tactile_probe.target: None for probe in concerned}
         end = perf_counter() + SLICE
         for probe in filter(is_free, concerned):
-            _look_at(probe, depsgraph, reshaped, moved, bpy.app.background or perf_counter() < end)
+            in_time = bpy.app.background or (perf_counter() < end and _seconds(probe) <= dearest)
+            _look_at(probe, depsgraph, reshaped, in_time)
 
 
-def _look_at(probe, depsgraph, reshaped, moved, in_time):
+def _seconds(probe):
+    """What its last touch took, without what is filled in once a gesture has ended."""
+    record = record_of(probe)
+    return 0.0 if record is None else sum(record["seconds"].get(key, 0.0) for key in ("prepare", "touch"))
+
+
+def _look_at(probe, depsgraph, reshaped, in_time):
     """Brings one up to date; where there is no time for that now, once the gesture has ended."""
     settings = probe.tactile_probe
-    _forget_deleted(probe)
+    deleted.relink(probe)
+    deleted.forget_target(probe)
     measure_shape(settings, depsgraph, reshaped)
-    patch = patch_of(probe)
     outdated = is_outdated(probe, depsgraph)
     if outdated and settings.live and in_time:
         update(probe, depsgraph, complete=bpy.app.background)
-    elif patch is not None and (outdated or probe in moved):  # on its way back, or scaled
-        patch_object.hold(patch)
-    if not bpy.app.background and (is_pending(probe) or (outdated and settings.live and not in_time)):
+    else:
+        stand_by(probe, outdated, complete=bpy.app.background)
+    late = outdated and settings.live and not in_time
+    if not bpy.app.background and (late or is_pending(probe) or anchor.is_carried(probe)):
         _settle_soon()
 
 
@@ -82,25 +112,36 @@ def on_other_data(*_):
     global _unsure
     forget_targets()
     _unsure = True
+    if not bpy.app.background:  # nothing may be updated by itself
+        _settle_soon()
+
+
+def _has_come_or_gone(depsgraph):
+    """Whether some object may have: its scene and collections are updated then."""
+    return any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in depsgraph.updates)
 
 
 def _concerned(depsgraph):
-    """The probes that something has happened to: to them, their patch or target, or to what is there."""
-    global _unsure
-    updates, known, unsure = depsgraph.updates, targets(), _unsure
+    """The probes that something has happened to: to them, their patch or target, or to what is there.
+
+    And whether anything may have happened to them, as after undo, or in a scene that was not there.
+    """
+    global _unsure, _seen
+    layer = depsgraph.scene.session_uid, depsgraph.view_layer.name
+    updates, known, unsure = depsgraph.updates, targets(), _unsure or layer != _seen
     # Where an object comes or goes, all others are among the updates too, with none of these two.
     updated = {u.id.original for u in updates if u.is_updated_geometry or u.is_updated_transform}
     objects = [datablock for datablock in updated if isinstance(datablock, bpy.types.Object)]
     owners = {probe_of(obj) for obj in objects} - {None}
-    scene = unsure or any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in updates)
+    scene = unsure or _has_come_or_gone(depsgraph)
     if not (scene or owners or any(obj.session_uid in known for obj in objects)):
-        return []
-    _unsure = False
+        return [], False
+    _unsure, _seen = False, layer
     there = set(depsgraph.view_layer.objects)
     found = [obj for obj in there if is_probe(obj)]
     if scene and not found:
         forget_targets()  # the last one may have been deleted
-    return [
+    concerned = [
         obj
         for obj in sorted(found, key=lambda probe: probe.name)
         if unsure
@@ -108,31 +149,7 @@ def _concerned(depsgraph):
         or obj.tactile_probe.target in updated
         or (scene and may_be_outdated(obj, there))
     ]
-
-
-def _forget_deleted(probe):
-    """A target that was deleted lives on as long as the probe points to it: lets go, so that it is gone."""
-    settings, record = probe.tactile_probe, record_of(probe)
-    target = settings.target
-    # One that has never been touched is a script's, which may be about to put it into the scene.
-    # A library's is not deleted by being in no scene of this file.
-    if target is None or target.users_scene or not target.is_editable:
-        return
-    if record is None or record["source"] != target.name:
-        return
-    settings.property_unset("target")
-    if not target.users:  # A handler may not delete what is being evaluated.
-        _deleted.add(target.session_uid)
-        # Without a window no timer runs, and one that is left keeps Blender's module from ending.
-        if not bpy.app.background and not bpy.app.timers.is_registered(_remove_deleted):
-            bpy.app.timers.register(_remove_deleted)
-
-
-def _remove_deleted():
-    """Takes away the objects that were deleted and that no probe points to any more; a timer."""
-    for obj in [obj for obj in bpy.data.objects if obj.session_uid in _deleted and not obj.users]:
-        bpy.data.objects.remove(obj)
-    _deleted.clear()
+    return concerned, unsure
 
 
 def is_pending(probe):
@@ -149,6 +166,8 @@ def _settle_soon():
 
 def _settle():
     """Completes what the gesture has left, once it has ended, some at a time; a timer."""
+    if not targets():
+        return None
     windows = bpy.context.window_manager.windows
     running = [operator.bl_idname for window in windows for operator in window.modal_operators]
     if bpy.app.is_job_running("RENDER") or any(name.startswith(GESTURES) for name in running):
@@ -157,17 +176,24 @@ def _settle():
     for window in windows:
         with bpy.context.temp_override(window=window), remembered():
             depsgraph = bpy.context.evaluated_depsgraph_get()
+            if _unsure:
+                on_depsgraph_update(window.scene, depsgraph)
             for probe in filter(is_probe, list(window.view_layer.objects)):
                 late = probe.tactile_probe.live and is_outdated(probe, depsgraph)
-                if (late or is_pending(probe)) and is_free(probe):
+                if not is_free(probe):
+                    continue
+                if late or is_pending(probe):
                     update(probe, depsgraph, complete=True)
                     if perf_counter() > end:
                         return 0.01
+                else:
+                    stand_by(probe, is_outdated(probe, depsgraph), complete=True)
     return None
 
 
 HANDLERS = {
     "depsgraph_update_post": on_depsgraph_update,
+    "frame_change_post": on_frame_change,
     "blend_import_post": on_blend_import,
     "load_post": on_other_data,
     "undo_post": on_other_data,
@@ -182,7 +208,7 @@ def register():
 
 
 def unregister():
-    for timer in filter(bpy.app.timers.is_registered, (_settle, _remove_deleted)):
+    for timer in filter(bpy.app.timers.is_registered, (_settle, deleted.remove)):
         bpy.app.timers.unregister(timer)
     for name, handler in HANDLERS.items():
         with suppress(ValueError):  # another script may have taken it away

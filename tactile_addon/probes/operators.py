@@ -9,7 +9,7 @@ from ..scene import patch_object
 from ..touch.settings import TouchSettings, draw_all, touch_arguments
 from ..touch.touch_object import touch, verify
 from ..touch.wording import fit_summary, sentence
-from .probe import lock_of, record_of
+from .probe import lock_of, probe_of, record_of
 
 
 class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
@@ -91,7 +91,9 @@ def report_error(operator, error):
 def target_object(context, name):
     """The object to touch: by name, or the active one, or what the active patch or map was touched on."""
     obj = context.view_layer.objects.active
-    record = record_of(obj) or (obj and obj.get(patch_object.MAP_RECORD))
+    record, found = record_of(obj) or (obj and obj.get(patch_object.MAP_RECORD)), probe_of(obj)
+    if not name and found is not None and found.tactile_probe.target is not None:
+        return found.tactile_probe.target
     if not name and record is not None:
         name = record["source"]
     if name:

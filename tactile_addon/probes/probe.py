@@ -9,19 +9,26 @@ where they differ afterwards the handler of live.py touches again.
 """
 
 import hashlib
-import math
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 from mathutils import Matrix, Vector
 
 from ..scene import patch_object
 from ..scene.family import children_of
 from ..touch.settings import OVERRIDABLE, TouchSettings, changed, touch_arguments
-from ..touch.surface import MeshSurface
+from ..touch.surface import checksum_of, is_disabled
 from ..touch.touch_object import touch, verify
 from ..touch.wording import sentence
+from . import anchor
 
 DIGEST = "tactile_digest"
 NO_SHAPE = " 00000000"  # the checksum of a mesh that cannot be touched, as settings.shape ends
@@ -43,7 +50,7 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
         description="The mesh object to touch",
         type=bpy.types.Object,
         poll=lambda _, obj: obj.type == "MESH" and not is_result(obj),
-        update=lambda settings, context: _appointed(settings, context),
+        update=lambda settings, context: _chosen(settings, context),
         override=OVERRIDABLE,
     )
     live: BoolProperty(
@@ -63,6 +70,10 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     message: StringProperty(description="Why there is no patch; empty where there is one", options={"HIDDEN"})
     digest: StringProperty(options={"HIDDEN"})
     shape: StringProperty(options={"HIDDEN"})
+    seat: FloatVectorProperty(size=anchor.SEAT, options={"HIDDEN"})
+    lost: StringProperty(
+        description="What there was to know of a target that was deleted", options={"HIDDEN"}
+    )
 
 
 _targets = None  # session_uids of what there are probes on, 0 for none; None where it is to be looked up
@@ -86,6 +97,15 @@ def forget_targets():
 def _appointed(settings, context):
     forget_targets()
     changed(settings, context)
+
+
+def _chosen(settings, context):
+    """A probe that was a child of its target is one of the new target."""
+    settings.lost, probe, record = "", settings.id_data, record_of(settings.id_data)
+    before = None if record is None else bpy.data.objects.get(record["source"])
+    if settings.target not in (None, before) and before is not None and probe.parent == before:
+        anchor.attach(probe, settings.target)
+    _appointed(settings, context)
 
 
 def is_probe(obj):
@@ -186,8 +206,10 @@ def _put(probe, touched):
     old, new = np.array(probe.matrix_world.normalized()), np.array(wanted)
     # Put there again and again, it would creep by rounding.
     near = 1e-5 * touched.report["extent"]
-    if not np.allclose(old[:3, :3], new[:3, :3], atol=1e-4) or np.abs(old - new)[:3, 3].max() > near:
-        probe.matrix_world = wanted @ Matrix.Diagonal((*probe.matrix_world.to_scale(), 1.0))
+    is_there = np.allclose(old[:3, :3], new[:3, :3], atol=1e-4) and np.abs(old - new)[:3, 3].max() <= near
+    if not is_there or anchor.is_carried(probe):
+        scale = (probe.matrix_basis if anchor.is_attached(probe) else probe.matrix_world).to_scale()
+        anchor.put(probe, wanted @ Matrix.Diagonal((*scale, 1.0)))
 
 
 def update(probe, depsgraph, complete):
@@ -202,6 +224,7 @@ def update(probe, depsgraph, complete):
     except ValueError as error:
         settings.message = sentence(error)
         if patch is not None:
+            anchor.carry(probe, patch)
             patch_object.hold(patch)
             patch_object.mark_failed(patch, settings.message)
         _sign(probe, depsgraph)
@@ -218,10 +241,38 @@ def adopt(probe, touched, depsgraph, complete):
     probe.empty_display_size = 0.6 * touched.report["extent"]
     patch = patch_of(probe)
     if patch is None:
-        patch_object.insert(depsgraph.scene, touched, parent=probe)
+        patch = patch_object.insert(depsgraph.scene, touched, parent=probe, lines=_left_contours(probe))
     else:
         patch_object.rewrite(patch, touched)
+    anchor.keep(probe, patch)
     _sign(probe, depsgraph)
+
+
+def stand_by(probe, outdated, complete):
+    """Where there is no touch now: has the patch stay where it was, and say whether it is outdated."""
+    settings, patch = probe.tactile_probe, patch_of(probe)
+    if complete:
+        anchor.settle(probe, _extent_of(probe))
+    if patch is None:
+        if settings.digest and not settings.message:
+            settings.message = "The probe has no patch: touch again for one, or delete the probe too"
+        return
+    anchor.carry(probe, patch)
+    patch_object.hold(patch)
+    record = record_of(patch)
+    if settings.message and record is not None and patch_object.VERDICT not in patch:
+        settings.message = ""  # there was no patch, and undo has brought it back
+    if outdated:
+        patch_object.mark_stale(patch)
+    elif not settings.message:
+        patch_object.mark_current(patch)
+
+
+def _left_contours(probe):
+    """Those of a patch that was deleted, where they are still there."""
+    lines = (obj for obj in bpy.data.objects if patch_object.CONTOURS in obj and obj.parent is None)
+    own = (obj for obj in lines if obj.is_editable and obj.data is not None)
+    return next((obj for obj in own if obj.data.get(DIGEST) == probe.tactile_probe.digest), None)
 
 
 def touch_at(probe, depsgraph, complete, **more):
@@ -233,7 +284,7 @@ def touch_at(probe, depsgraph, complete, **more):
         raise ValueError(
             f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
         )
-    if not all(0.0 < abs(scale) < math.inf for scale in matrix.to_scale()):  # where no child can be placed
+    if not anchor.can_have_children(probe):
         raise ValueError("the probe is scaled to nothing, or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)
     if not complete and record is not None:  # Finding out how far a patch can be trusted is dear.
@@ -262,6 +313,7 @@ def may_be_outdated(probe, there):
         bool(settings.message)
         or not made
         or settings.target not in there
+        or is_disabled(settings.target)
         or any(block.get(DIGEST) != settings.digest for block in made)
     )
 
@@ -281,6 +333,7 @@ def _made(probe):
 
 def _sign(probe, depsgraph):
     measure_shape(probe.tactile_probe, depsgraph)
+    probe.tactile_probe.seat = anchor.seat(probe, _extent_of(probe))
     digest = _digest(probe, depsgraph)
     probe.tactile_probe.digest = digest
     for block in _made(probe):
@@ -292,14 +345,16 @@ def _digest(probe, depsgraph):
 
     The checksum of the target's vertices is dear, so it is kept, and taken anew where they may have changed.
     """
-    settings, matrix = probe.tactile_probe, probe.matrix_world
-    target = settings.target
-    # What Blender makes of a rotation and back is not the same to the last digit.
-    axes = [round(v, 5) + 0.0 for row in matrix.normalized().to_3x3() for v in row]
-    inputs = [probe.name, *matrix.translation, *axes, touch_arguments(settings)]
+    settings, target = probe.tactile_probe, probe.tactile_probe.target
+    inputs = [probe.name, *anchor.seat(probe, _extent_of(probe)), touch_arguments(settings)]
     if target is not None:
-        inputs += [_is_there(target, depsgraph), settings.shape, *map(tuple, target.matrix_world)]
+        inputs += [_is_there(target, depsgraph), is_disabled(target), settings.shape]
     return hashlib.sha1(repr(inputs).encode()).hexdigest()
+
+
+def _extent_of(probe):
+    record = record_of(probe)
+    return 0.0 if record is None else record.get("extent", 0.0)
 
 
 def measure_shape(settings, depsgraph, reshaped=None):
@@ -313,7 +368,7 @@ def measure_shape(settings, depsgraph, reshaped=None):
     checksum = reshaped.get(target)
     if checksum is None:
         try:
-            checksum = MeshSurface(target, depsgraph).checksum
+            checksum = checksum_of(target, depsgraph)
         except ValueError:  # the touch will say what is wrong
             checksum = 0
         if target in reshaped:

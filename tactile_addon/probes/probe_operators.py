@@ -152,13 +152,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         patch = probe.patch_of(found)
         lines = None if patch is None else patch_object.contours_of(patch)
-        for obj in filter(None, (lines, patch, found)):
-            mesh = obj.data
-            bpy.data.objects.remove(obj)
-            if mesh is not None and not mesh.users:
-                materials = list(filter(None, mesh.materials))
-                bpy.data.meshes.remove(mesh)
-                bpy.data.batch_remove([material for material in materials if not material.users])
+        patch_object.remove_objects(list(filter(None, (lines, patch, found))))
         return {"FINISHED"}
 
 

@@ -17,6 +17,7 @@ from .mesh_data import emission, fill, own_mesh, values, write
 COLLECTION = "Tactile Patches"
 RECORD = "tactile"  # the patch object's custom property that holds the report,
 RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
+VERDICT = "tactile_verdict"  # and the one with its status and message while these say that it is outdated
 COLOR = "curvature_color"
 MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
@@ -43,22 +44,43 @@ POSITIVE = ("curvedness", "height_std")  # never below zero: half a scale says i
 FLOOR = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
 
 
-def insert(scene, touched, parent=None):
-    """Adds the patch and its contours to `scene`, in a collection of their own; returns the patch object."""
+def insert(scene, touched, parent=None, lines=None):
+    """Adds the patch and its contours to `scene`, in a collection of their own; returns the patch object.
+
+    lines : contours that have lost their patch, to be those of this one
+    """
     name = touched.report["source"]
-    patch, lines = (
-        bpy.data.objects.new(f"{name} {what}", bpy.data.meshes.new(f"{name} {what}"))
-        for what in ("Patch", "Contours")
-    )
+    patch = _new(scene, f"{name} Patch", emission("Tactile Curvature", attribute=COLOR))
+    lines = lines or _new(scene, f"{name} Contours", emission("Tactile Contour", color=CONTOUR_COLOR))
     patch.parent, lines.parent, lines[CONTOURS] = parent, patch, True
     for obj in (patch, lines):
         add(obj)
-        obj.show_in_front = True  # it lies in the surface it describes
-        collection(scene).objects.link(obj)
-    patch.data.materials.append(emission("Tactile Curvature", attribute=COLOR))
-    lines.data.materials.append(emission("Tactile Contour", color=CONTOUR_COLOR))
     rewrite(patch, touched)
     return patch
+
+
+def _new(scene, name, material):
+    obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+    obj.show_in_front = True  # it lies in the surface it describes
+    collection(scene).objects.link(obj)
+    obj.data.materials.append(material)
+    return obj
+
+
+def remove_objects(objects):
+    """Deletes objects, with what nobody else uses of them."""
+    meshes = [obj.data for obj in objects if obj.data is not None]
+    for obj in objects:
+        bpy.data.objects.remove(obj)
+    remove_meshes(meshes)
+
+
+def remove_meshes(meshes):
+    """Deletes those that nobody uses, and their materials where nobody uses these."""
+    meshes = [mesh for mesh in meshes if not mesh.users]
+    materials = {material for mesh in meshes for material in mesh.materials if material is not None}
+    bpy.data.batch_remove(meshes)
+    bpy.data.batch_remove([material for material in materials if not material.users])
 
 
 def rewrite(patch, touched):
@@ -73,10 +95,12 @@ def rewrite(patch, touched):
     names = {"patch": patch.name}
     if lines is not None:
         fill_contours(lines.data, touched)
+        _place_contours(lines)
         names["contours"] = lines.name
-    _place(patch, _matrix(touched.result.frame.axes, touched.result.frame.origin))
+    place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
+    patch.pop(VERDICT, None)
     if touched.report["is_verified"]:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolor(patch)
@@ -113,13 +137,34 @@ def _is_whole(mesh):
 
 def mark_failed(patch, why):
     """The patch is that of an earlier touch, for the last one failed."""
+    _outdate(patch, {"message": f"This is the patch of an earlier touch, for the last one failed. {why}"})
+
+
+def mark_stale(patch):
+    """The patch is that of an earlier touch, and nothing has been felt since."""
+    _outdate(
+        patch,
+        {
+            "message": "This is the patch of an earlier touch, for the probe or its target has changed "
+            "since: touch again."
+        },
+    )
+
+
+def _outdate(patch, verdict):
     report = report_of(patch)
-    if report is not None:
-        verdict = {
-            "status": "outdated",
-            "message": f"This is the patch of an earlier touch, for the last one failed. {why}",
-        }
-        report.update(verdict)
+    if report is None:
+        return
+    if VERDICT not in patch:
+        patch[VERDICT] = {key: report[key] for key in ("status", "message")}
+    report.update({"status": "outdated", **verdict})
+
+
+def mark_current(patch):
+    """The patch is again what its probe asks for."""
+    verdict = patch.pop(VERDICT, None)
+    if verdict is not None and report_of(patch) is not None:
+        patch[RECORD].update(verdict)
 
 
 def reconstruction_of(patch):
@@ -139,29 +184,40 @@ def reconstruction_of(patch):
         return r
     placed = np.array(patch.matrix_world, dtype=float)
     try:
-        return r.moved(placed @ np.linalg.inv(_matrix(r.frame.axes, r.frame.origin)))
+        return r.moved(placed @ np.linalg.inv(matrix_of(r.frame.axes, r.frame.origin)))
     except ValueError as error:
         raise ValueError(
             f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
         ) from error
 
 
-def _place(patch, matrix):
-    """Puts the patch there in the world, under its probe or not; it stays where the probe is deleted."""
-    if patch.parent is not None:
-        patch.matrix_parent_inverse = patch.parent.matrix_world.inverted_safe()
-    matrix = Matrix(matrix.tolist())
-    patch.matrix_world = matrix  # known before the next evaluation
-    patch.matrix_basis = matrix
+def place(obj, matrix):
+    """Puts an object there in the world, so that it stays there where its parent is deleted."""
+    if obj.parent is not None:
+        obj.matrix_parent_inverse = obj.parent.matrix_world.inverted_safe()
+    obj.matrix_world = matrix  # known before the next evaluation
+    obj.matrix_basis = matrix
 
 
 def hold(patch):
-    """Keeps the patch where it was touched while its probe moves on without it."""
-    if report_of(patch) is None:
+    """Keeps the patch where it was touched, while its probe moves on without it or by whom it is moved.
+
+    One that constraints or an animation would take back stays as it is.
+    """
+    if report_of(patch) is None or patch.constraints or patch.animation_data:
         return
     axes, origin = touched_frame(patch)
     if not is_at(patch, axes, origin):
-        _place(patch, _matrix(axes, origin))
+        place(patch, Matrix(matrix_of(axes, origin).tolist()))
+    _place_contours(contours_of(patch))
+
+
+def _place_contours(lines):
+    """Puts contours where their patch is, in whose coordinates they are."""
+    if lines is None or lines.constraints or lines.animation_data:
+        return
+    if lines.matrix_basis != Matrix() or lines.matrix_parent_inverse != Matrix():
+        lines.matrix_parent_inverse = lines.matrix_basis = Matrix()
 
 
 def touched_frame(patch):
@@ -170,9 +226,24 @@ def touched_frame(patch):
     return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
 
 
+def move_record(patch, axes, origin):
+    """Has the record say that the patch was touched at another place, where it is no longer at that one."""
+    report, (before, at) = patch[RECORD], touched_frame(patch)
+    if np.array_equal(axes, before) and np.array_equal(origin, at):
+        return
+    turn = axes @ before.T
+    if np.shape(report.get("axes")) == (3, 3):
+        report["axes"] = (turn @ np.array(report["axes"])).tolist()
+    plane = report.get("suggested_plane")
+    if plane is not None and np.shape(plane.get("tangent")) == (3,):
+        plane["tangent"] = (turn @ np.array(plane["tangent"])).tolist()
+    d1, d2, normal = axes.T.tolist()
+    report["frame"].update({"origin": origin.tolist(), "d1": d1, "d2": d2, "normal": normal})
+
+
 def is_at(patch, axes, origin):
     near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
-    return np.allclose(patch.matrix_world, _matrix(axes, origin), **near)
+    return np.allclose(patch.matrix_world, matrix_of(axes, origin), **near)
 
 
 def meshes(patch):
@@ -198,7 +269,7 @@ def recolor(patch):
     record["color_limit"] = limit
 
 
-def _matrix(axes, origin):
+def matrix_of(axes, origin):
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = axes, origin
     return matrix

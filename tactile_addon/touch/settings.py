@@ -3,6 +3,7 @@
 """The inputs of a touch, as the operators and the probes have them."""
 
 import math
+from contextlib import contextmanager
 
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 from bpy.types import Object
@@ -46,9 +47,23 @@ STEEPEST = math.radians(60)  # Greatest tilt by mouse.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # what the override of a library's probe keeps as its own
 
 
+_is_silent = False
+
+
+@contextmanager
+def silent():
+    """What is set within is looked at by nothing, as in a handler, which looks at it itself."""
+    global _is_silent
+    _is_silent = True
+    try:
+        yield
+    finally:
+        _is_silent = False
+
+
 def changed(settings, context):
     """Has the handler look at a probe at once, so that the patch is part of the same undo step."""
-    if isinstance(settings.id_data, Object) and settings.is_probe:
+    if not _is_silent and isinstance(settings.id_data, Object) and settings.is_probe:
         settings.id_data.update_tag()
         context.view_layer.update()
 

@@ -46,11 +46,6 @@ class MeshSurface:
     def _co(self):
         return coordinates(self._object.name, self._object)
 
-    @property
-    def checksum(self):
-        """Another for another shape of the mesh in the object's coordinates."""
-        return zlib.crc32(self._co)
-
     def ray_cast(self, origin, direction, distance):
         """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
         if self._is_in_place:
@@ -181,6 +176,27 @@ class MeshSurface:
         return x / length, y / length, z / length
 
 
+def checksum_of(obj, depsgraph):
+    """Another number for another shape of the evaluated mesh in the object's coordinates.
+
+    Raises ValueError, with a sentence, where the object cannot be touched.
+    """
+    evaluated, _, _ = evaluated_object(obj, depsgraph)
+    co = coordinates(obj.name, evaluated)
+    try:  # a ray that leaves from beyond all needs an evaluated mesh, but no tree of its faces
+        evaluated.ray_cast((1e18, 0.0, 0.0), (1.0, 0.0, 0.0), distance=1e-30, depsgraph=depsgraph)
+    except RuntimeError as error:
+        raise disabled(obj) from error
+    return zlib.crc32(co)
+
+
+def is_disabled(obj):
+    """Whether it is disabled in viewports, yet perhaps evaluated, as somebody's parent."""
+    return obj.hide_viewport or (
+        bool(obj.users_collection) and all(found.hide_viewport for found in obj.users_collection)
+    )
+
+
 def disabled(obj):
     """The error to raise for an object that Blender has not evaluated."""
     return ValueError(
@@ -195,6 +211,8 @@ def evaluated_object(obj, depsgraph):
     """
     if obj.type != "MESH":
         raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
+    if is_disabled(obj):
+        raise disabled(obj)
     evaluated = obj.evaluated_get(depsgraph)
     if obj.data.is_editmode:
         # The evaluated mesh is an empty shell around the edited one until somebody asks for it.

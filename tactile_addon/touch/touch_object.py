@@ -14,6 +14,7 @@ from .settings import MOST_PLANES, STEEPEST
 from .single_precision import require_single
 from .surface import MeshSurface
 from .touch_report import (
+    early_ends,
     ends,
     judgment,
     measures,
@@ -99,7 +100,7 @@ def touch(
         "step": found.step,
         "noise": noise,
         "seed": seed,
-        **reconstruction_report(result, "" if extent else ends(result.contours)),
+        **reconstruction_report(result, (early_ends if extent else ends)(result.contours)),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in found.planes],
         "added_planes": [
             {"azimuth": math.degrees(plane.azimuth), "height_std_before": before, "height_std": after}

@@ -22,9 +22,21 @@ def ends(contours):
     counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
     if len(counts) == 1:
         return f" All half curves end {ENDS[counts[0][0]]}."
+    return f" Of {2 * len(contours)} half curves {_counted(counts)}."
+
+
+def early_ends(contours):
+    """A sentence on what has ended curves before the extent that was asked for; empty where nothing has."""
+    counts = Counter(stop for contour in contours for stop in contour.stops)
+    del counts[core.EXTENT]
+    if not counts:
+        return ""
+    return f" Of {2 * len(contours)} half curves {_counted(counts.most_common())}, before the extent."
+
+
+def _counted(counts):
     (most, first), *others = [(count, ENDS[stop]) for stop, count in counts]
-    words = [f"{most} end {first}", *(f"{count} {end}" for count, end in others)]
-    return f" Of {2 * len(contours)} half curves {', '.join(words)}."
+    return ", ".join([f"{most} end {first}", *(f"{count} {end}" for count, end in others)])
 
 
 def judgment(result, mean, ended):

@@ -7,6 +7,7 @@ from .units import say
 
 FLAT = 2.0  # A curvature within so many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
+NOTHING = 1e-6  # of a number in unit radius
 SPREAD = ("mean", "median", "max", "rms")
 # What core.verify finds, in the order of a table.
 VERIFIED = (
@@ -170,11 +171,15 @@ def verification_columns(report):
 def patch_rows(record, unit):
     """(label, value) of what matters of a patch, with lengths in a unit of units.py."""
 
+    def value(key, power):
+        # What is left of nothing in single precision is none.
+        return record[key] if abs(record[key]) > NOTHING * record["radius"] ** power else 0.0
+
     def row(label, key, power=1):
-        return label, units.say(record[key], power, unit)
+        return label, units.say(value(key, power), power, unit)
 
     def measured(label, key, power):
-        return label, units.say(record[key], power, unit, record[f"{key}_std"])
+        return label, units.say(value(key, power), power, unit, record[f"{key}_std"])
 
     rows = [
         measured("Curvature κ1", "k1", -1),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles of the active probe: to turn each sampling plane, to tilt the active one, and for the extent."""
+"""Handles of the active probe: for its point, to turn sampling planes, to tilt one, and for the extent."""
 
 import math
 
@@ -10,15 +10,20 @@ from bpy.props import EnumProperty, IntProperty
 from mathutils import Matrix, Vector
 from mathutils.geometry import intersect_line_plane
 
-from ..probes import probe
+from ..probes import anchor, probe
 from ..touch.settings import MOST_PLANES, STEEPEST
+from ..touch.surface import MeshSurface
 from ..touch.touch_object import plane_axes
 from .mouse import draw_hints, mouse_ray
 from .overlay import PLANE_COLORS
 
-TURN, TILT, EXTENT = "TURN", "TILT", "EXTENT"
+TURN, TILT, EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 REACH = 1.15  # Place of the handles, in extents.
 UPRIGHT = 0.75
+EDGE_ON, STEEP = (
+    0.03,
+    0.25,
+)  # sines of the view against a plane: below, nothing can be dragged in it, or not well
 SNAP = math.radians(5.0)
 PRECISE = 0.1
 HINTS = (
@@ -30,10 +35,10 @@ HINTS = (
 
 
 class TACTILE_OT_drag(bpy.types.Operator):
-    """Drag to turn or tilt a sampling plane of the probe, or to feel farther"""
+    """Drag to slide the probe over the surface, to turn or tilt a sampling plane, or to feel farther"""
 
     bl_idname = "tactile.drag"
-    bl_label = "Drag Sampling Plane"
+    bl_label = "Drag Probe"
     bl_options = {"UNDO", "INTERNAL", "BLOCKING"}
 
     what: EnumProperty(
@@ -42,23 +47,24 @@ class TACTILE_OT_drag(bpy.types.Operator):
             (TURN, "Turn", "Turn a sampling plane about the normal"),
             (TILT, "Tilt", "Lean a sampling plane to the side"),
             (EXTENT, "Extent", "Feel farther or less far"),
+            (POINT, "Point", "Slide over the surface"),
         ],
     )
     plane: IntProperty(name="Plane", min=0, max=MOST_PLANES - 1)
 
     @classmethod
     def poll(cls, context):
-        return probe.is_probe(context.object) and probe.lock_of(context.object) is None
+        return _shown_probe(context) is not None
 
     def invoke(self, context, event):
-        settings = context.object.tactile_probe
-        if self.what != EXTENT:
-            settings.active_plane = self.plane
-        self._matrix = context.object.matrix_world.copy()
+        found = _shown_probe(context)
+        if self.what in (TURN, TILT):
+            found.tactile_probe.active_plane = self.plane
+        self._matrix = found.matrix_world.copy()
         # The handle comes to the mouse; where the button went down is not known, for a busy Blender hears
         # of it late, with the mouse already elsewhere.
         self._before = self._value = self._free = self._last = self._get(context)
-        if self._below(context, event) is None:
+        if self.what != POINT and self._below(context, event) is None:
             self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
             return {"CANCELLED"}
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
@@ -82,7 +88,10 @@ class TACTILE_OT_drag(bpy.types.Operator):
         self._end(context)
 
     def _follow(self, context, event):
-        """Moves the value by what the mouse has moved."""
+        """Moves the value by what the mouse has moved, the point to below it."""
+        if self.what == POINT:
+            self._slide(context, event)
+            return
         now = self._below(context, event)
         if now is None:
             return
@@ -98,6 +107,25 @@ class TACTILE_OT_drag(bpy.types.Operator):
             value = min(max(value, -STEEPEST), STEEPEST)
         self._set(context, value)
 
+    def _slide(self, context, event):
+        """Puts the probe on the surface below the mouse, turned by no more than the normal turns."""
+        origin, direction = mouse_ray(context.region, context.region_data, event)
+        depsgraph = context.evaluated_depsgraph_get()
+        try:
+            surface = MeshSurface(probe.probe_of(context.object).tactile_probe.target, depsgraph, sound=True)
+            if not context.region_data.is_perspective:
+                origin -= context.space_data.clip_end * direction
+            hit = surface.ray_cast(list(origin), list(direction), 4.0 * context.space_data.clip_end)
+        except (ValueError, AttributeError):  # the target is gone, or cannot be touched: the panel says so
+            return
+        if hit is None:
+            return
+        upright, normal = self._matrix.col[2].xyz.normalized(), Vector(hit[1])
+        if upright.dot(direction) * normal.dot(direction) < 0.0:  # it stays on its side of the surface
+            normal.negate()
+        turn = upright.rotation_difference(normal) @ self._matrix.to_quaternion()
+        self._set(context, Matrix.LocRotScale(Vector(hit[0]), turn, self._matrix.to_scale()))
+
     def _below(self, context, event):
         """Where the mouse is: an angle, or a distance from the point; None where that cannot be told."""
         origin, direction = mouse_ray(context.region, context.region_data, event)
@@ -105,9 +133,11 @@ class TACTILE_OT_drag(bpy.types.Operator):
         e1 = self._matrix.col[0].xyz.normalized()
         right, up = e1, normal.cross(e1)
         if self.what == TILT:
-            t = Vector(plane_axes(self._matrix, context.object.tactile_probe, self.plane)[:, 0])
+            t = Vector(
+                plane_axes(self._matrix, probe.probe_of(context.object).tactile_probe, self.plane)[:, 0]
+            )
             right, up, normal = normal, normal.cross(t), t
-        if abs(direction.dot(normal)) < 0.03:
+        if abs(direction.dot(normal)) < EDGE_ON:
             return None
         at = intersect_line_plane(origin, origin + direction, center, normal)
         if at is None or (at - center).length == 0.0:
@@ -117,22 +147,29 @@ class TACTILE_OT_drag(bpy.types.Operator):
         return math.atan2((at - center).dot(up), (at - center).dot(right))
 
     def _get(self, context):
-        settings = context.object.tactile_probe
+        found = probe.probe_of(context.object)
+        settings = found.tactile_probe
+        if self.what == POINT:
+            return self._matrix
         if self.what == EXTENT:
-            return settings.extent or probe.record_of(context.object)["extent"]
+            return settings.extent or probe.record_of(found)["extent"]
         return (settings.azimuths if self.what == TURN else settings.tilts)[self.plane]
 
     def _set(self, context, value):
-        settings = context.object.tactile_probe
-        self._value = value
-        if self.what == EXTENT:
+        found = probe.probe_of(context.object)
+        settings, self._value = found.tactile_probe, value
+        if self.what == POINT:
+            anchor.put(found, value)
+        elif self.what == EXTENT:
             settings.extent = value
         else:
             (settings.azimuths if self.what == TURN else settings.tilts)[self.plane] = value
         self._say(context)
 
     def _say(self, context):
-        if self.what == EXTENT:
+        if self.what == POINT:
+            words = "Point on " + probe.probe_of(context.object).tactile_probe.target.name
+        elif self.what == EXTENT:
             settings = context.scene.unit_settings
             length = bpy.utils.units.to_string(
                 settings.system, "LENGTH", self._value * settings.scale_length, precision=4
@@ -146,8 +183,17 @@ class TACTILE_OT_drag(bpy.types.Operator):
     def _end(self, context):
         context.area.header_text_set(None)
         context.workspace.status_text_set(None)
-        if context.object.tactile_probe.live:
-            probe.refresh(context.object, context)
+        found = probe.probe_of(context.object)
+        if found.tactile_probe.live:
+            probe.refresh(found, context)
+
+
+def _shown_probe(context):
+    """The probe that the panel shows, active by itself, its patch or its contours; None without handles."""
+    found = probe.probe_of(context.object)
+    if found is None or not found.visible_get() or probe.lock_of(found) is not None:
+        return None
+    return found if probe.record_of(found) is not None else None
 
 
 class TACTILE_GGT_handles(bpy.types.GizmoGroup):
@@ -160,21 +206,20 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        obj = context.object
-        shown = context.mode == "OBJECT" and probe.is_probe(obj) and obj.visible_get()
-        return shown and probe.record_of(obj) is not None and probe.lock_of(obj) is None
+        return context.mode == "OBJECT" and _shown_probe(context) is not None
 
     def setup(self, context):
         self.extent = self._handle("GIZMO_GT_dial_3d", EXTENT, 0, (1.0, 1.0, 1.0))
         self.extent.use_draw_scale = False
         self.extent.line_width = 2.0
+        self.point = self._ball(POINT, 0, (1.0, 1.0, 1.0))
         self.turns = [self._ball(TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
         self.tilts = [self._ball(TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
 
     def _ball(self, what, plane, color):
         ball = self._handle("GIZMO_GT_move_3d", what, plane, color)
         ball.draw_style = "RING_2D"
-        ball.draw_options = {"FILL", "ALIGN_VIEW"} if what == TURN else {"FILL_SELECT", "ALIGN_VIEW"}
+        ball.draw_options = {"FILL", "ALIGN_VIEW"} if what in (TURN, POINT) else {"FILL_SELECT", "ALIGN_VIEW"}
         ball.scale_basis, ball.line_width = 0.12, 3.0
         return ball
 
@@ -188,15 +233,27 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         return handle
 
     def draw_prepare(self, context):
-        obj = context.object
+        obj = _shown_probe(context)
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
         center = np.array(matrix.translation)
         active = min(settings.active_plane, settings.plane_count - 1)
+        self.point.matrix_basis = Matrix.Translation(center)
+        self.point.hide = settings.target is None
+        ahead = _line_of_sight(context.region_data, matrix.translation)
         for i, (turn, tilt) in enumerate(zip(self.turns, self.tilts, strict=True)):
             turn.hide, tilt.hide = i >= settings.plane_count, i != active
             if not turn.hide:
                 t, up, _ = plane_axes(matrix, settings, i).T
+                # Seen edge on, its plane turns by much where the mouse moves by little.
+                tilt.hide = tilt.hide or abs(ahead.dot(Vector(t))) < STEEP
                 turn.matrix_basis = Matrix.Translation(center + REACH * reach * t)
                 tilt.matrix_basis = Matrix.Translation(center + UPRIGHT * reach * up)
         self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)
+
+
+def _line_of_sight(view, point):
+    """The direction, from the eye, in which a point of the world is seen."""
+    if view.is_perspective:
+        return (point - view.view_matrix.inverted_safe().translation).normalized()
+    return -view.view_matrix.inverted_safe().col[2].xyz.normalized()

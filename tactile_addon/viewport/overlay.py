@@ -20,27 +20,31 @@ PLANE_COLORS = [
     (0.94, 0.89, 0.26), (0.80, 0.47, 0.65), (0.84, 0.37, 0.0),
 ]  # fmt: skip
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
-CIRCLE = np.linspace(0.0, 2.0 * np.pi, 97)
+RIM = 96  # points around a patch
 FONT = 0
 STEPS = 65  # of the legend's colors
 # In pixels at the resolution scale 1, width and height: the legend's bar, and Blender's navigation buttons.
 BAR, NAVIGATION = (150, 12), (50, 290)
 
 
+def preview_lines(touched):
+    """(points, color) of what a pick shows: the rim of what was felt, the normal, and the section curves."""
+    r = touched.result
+    edge = r.domain.boundary(RIM)
+    edge = r.frame.to_world(np.column_stack([edge, r.height(*edge.T)]))
+    normal = np.array([r.frame.origin, r.frame.origin + 0.6 * r.radius * r.frame.axes[:, 2]])
+    pairs = zip(r.contours, PLANE_COLORS, strict=False)
+    curves = [(contour.points, (*color, 1.0)) for contour, color in pairs]
+    return [(np.vstack([edge, edge[:1]]), WHITE), (normal, WHITE), *curves]
+
+
 def draw_preview(seen):
-    """A ring in the tangent plane, the normal and the section curves of the touch in `seen`, a dict."""
-    touched = seen["touched"]
-    if touched is None:
+    """The lines of the touch in `seen`, a dict."""
+    if seen["touched"] is None:
         return
-    frame, size = touched.result.frame, touched.report["extent"]
-    e1, n, across = np.transpose(touched.report["axes"])
-    ring = frame.origin + size * (np.outer(np.cos(CIRCLE), e1) + np.outer(np.sin(CIRCLE), across))
-    strips = [(ring, WHITE), (np.array([frame.origin, frame.origin + 0.6 * size * n]), WHITE)]
-    pairs = zip(touched.contours, PLANE_COLORS, strict=False)
-    strips += [(contour.points, (*color, 1.0)) for contour, color in pairs]
     scale = bpy.context.preferences.system.ui_scale
     gpu.state.blend_set("ALPHA")
-    for points, color in strips:
+    for points, color in preview_lines(seen["touched"]):
         _line(points, DARK, 4.5 * scale)
         _line(points, color, 2.0 * scale)
     gpu.state.blend_set("NONE")
@@ -63,8 +67,8 @@ def _active(context):
 def draw_plane():
     """The active sampling plane of the active probe, as far as its contour may reach."""
     context = bpy.context
-    obj = _active(context)
-    if not probe.is_probe(obj) or not obj.visible_get():
+    obj = probe.probe_of(_active(context))
+    if obj is None or not obj.visible_get():
         return
     settings, record = obj.tactile_probe, probe.record_of(obj)
     if record is None:

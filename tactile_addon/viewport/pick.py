@@ -5,7 +5,7 @@
 import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
 
-from ..probes import probe
+from ..probes import anchor, probe
 from ..probes.operators import make_active, report_error, target_object
 from ..touch import units
 from ..touch.settings import NAMES, TouchSettings, draw_all, touch_arguments
@@ -54,6 +54,12 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         name="New Probe",
         description="Make another probe instead of moving the active one",
         options=UNSAVED,
+    )
+
+    parent: BoolProperty(
+        name="Move With Target",
+        description="Make a new probe a child of the object touched, so that it goes where that goes",
+        default=True,
     )
 
     @classmethod
@@ -122,8 +128,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             return report_error(self, error)
         found = moved or probe.make(context, target)
         settings = found.tactile_probe
+        with_target = anchor.is_attached(found) if moved else self.parent
         settings.is_probe = False  # It must not be touched again for each of these.
         settings.target = target
+        if with_target and found.parent != target:
+            anchor.attach(found, target)
         for name in NAMES:
             setattr(settings, name, getattr(self, name))
         probe.adopt(found, touched, depsgraph, complete=True)
@@ -153,6 +162,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         layout.use_property_split = True
         layout.prop(self, "target")
         layout.prop(self, "location")
+        layout.prop(self, "parent")
         draw_all(layout, self)
 
     def _inherit(self, context):

@@ -333,7 +333,7 @@ def test_the_patch_follows_its_target(empty, ball, change, height, radius):
     ball.modifiers.new("Displace", "DISPLACE").mid_level = 0.0
     ball.modifiers["Displace"].strength = 0.0
     ball.modifiers.new("Subdivision", "SUBSURF").levels = 0
-    probe, patch = pick(empty)
+    probe, patch = pick(empty, parent=False)
     blocks, digest = datablocks(empty), probe.tactile_probe.digest
     mark(patch)
     change(ball)
@@ -363,22 +363,23 @@ def test_what_does_not_concern_the_probe_leaves_its_patch_alone(empty, ball):
 
 
 def test_a_probe_that_is_not_live_waits_to_touch_again(empty, ball):
-    probe, patch = pick(empty)
-    before, there, settings = state(patch), in_world(patch), probe.tactile_probe
+    probe, patch = pick(empty, parent=False)
+    before, there, settings = state_but_status(patch), in_world(patch), probe.tactile_probe
     settings.live = False
     settings.extent = 0.5
     probe.location = SIDE
     ball.scale = (1.1, 1.1, 1.1)
     update(empty)
     assert probe.location == SIDE
-    assert state(patch) == before
+    assert report_of(patch)["status"] == "outdated"
+    assert state_but_status(patch) == before
     assert in_world(patch) == pytest.approx(there, abs=1e-5)
     assert empty.ops.tactile.update() == {"FINISHED"}
     assert report_of(patch)["extent"] == 0.5
     assert_touches(probe, patch, radius=1.1 * RADIUS)
-    before = state(patch)
+    before = state_but_status(patch)
     settings.azimuths[0] = 0.2
-    assert state(patch) == before
+    assert state_but_status(patch) == before
     settings.live = True
     assert report_of(patch)["planes"][0][0] == pytest.approx(math.degrees(0.2))
 
@@ -468,7 +469,7 @@ NO_TARGET = "The probe has no target: choose the mesh to touch"
 def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
     empty, extension, ball, capfd, spoil, sentence, left
 ):
-    live = extension.tactile_addon.probes.change_handlers
+    deleted = extension.tactile_addon.probes.deleted
     probe, patch = pick(empty)
     before, there = state_but_status(patch), in_world(patch)
     spoil(empty, ball)
@@ -476,8 +477,8 @@ def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
         update(empty)
         assert sentence in probe.tactile_probe.message
         if left == SET[1:] and "Sphere" in names(empty):  # the handler itself deletes nothing
-            assert not empty.app.timers.is_registered(live._remove_deleted)  # nothing runs one here
-            live._remove_deleted()  # as Blender does once it is idle, in a window
+            assert not empty.app.timers.is_registered(deleted.remove)  # nothing runs one here
+            deleted.remove()  # as Blender does once it is idle, in a window
         assert names(empty) == left
         assert state_but_status(patch) == before
         assert in_world(patch) == pytest.approx(there, abs=1e-5)
@@ -902,7 +903,7 @@ def test_a_change_touches_once_what_depends_on_it_and_nothing_else(empty, ball, 
     ball.data.update()
     update(empty)
     assert calls["touch_at"] == 3
-    assert surfaces["size_of"] == 3 + 1  # a surface for each touch, and one for what all compare
+    assert surfaces["size_of"] == 3  # a surface for each touch
 
 
 def test_children_are_looked_up_once_for_all_probes(empty, extension, ball, monkeypatch):

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a probe and its patch are on their target: a target that moves as a whole is not touched again.
+
+A probe that is a child of its target has the world's coordinates for its own, which Blender's Parent does
+not do: so it stays where it is when the target is deleted, and is not sheared where the target is.
+"""
+
+import math
+
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..scene import patch_object
+
+BASE = "tactile_base"  # a patch's custom property: its target's matrix and its own when it was touched
+SEAT = 20  # numbers: the place in the target, directions there, and the target's own scale and shear
+CLOSE = 1e-5  # is no change of a number, nor of a length as a share of the extent: matrices are float32
+
+
+def attach(probe, target):
+    """Makes the probe a child of its target, where it is; unless the target depends on the probe."""
+    above = target
+    while above is not None:
+        if above == probe:
+            return
+        above = above.parent
+    place = probe.matrix_world.copy()
+    probe.parent, probe.parent_type = target, "OBJECT"
+    patch_object.place(probe, place)
+
+
+def detach(probe):
+    """Leaves the probe where it is, without a parent."""
+    place = probe.matrix_world.copy()
+    probe.parent = None
+    probe.matrix_world = probe.matrix_basis = place
+
+
+def is_attached(probe):
+    """Whether it goes where its target goes, as its child."""
+    target = probe.tactile_probe.target
+    return target is not None and probe.parent == target and probe.parent_type == "OBJECT"
+
+
+def can_have_children(probe):
+    """Whether any can be placed; not under a scale of nothing, nor one beyond all numbers."""
+    return all(0.0 < abs(scale) < math.inf for scale in probe.matrix_world.to_scale())
+
+
+def put(probe, matrix):
+    """Puts the probe there in the world."""
+    if is_attached(probe):
+        patch_object.place(probe, matrix)
+    else:
+        probe.matrix_world = matrix
+
+
+def is_carried(probe):
+    """Whether its target has carried it away from its own coordinates, until a gesture has ended."""
+    if not is_attached(probe) or probe.constraints or probe.animation_data:
+        return False
+    own, there = np.array(probe.matrix_basis), np.array(probe.matrix_world)
+    return not np.allclose(own, there, rtol=1e-6, atol=1e-6 * np.abs(there).max())
+
+
+def settle(probe, extent):
+    """Makes the world's coordinates the probe's own, without the target's scale and shear."""
+    if not is_carried(probe):
+        return
+    to_world = np.array(probe.tactile_probe.target.matrix_world, dtype=float)
+    # From where it is seated: from where it is, it would creep by rounding.
+    at, x, z = (to_world[:3, :3] @ np.reshape(seat(probe, extent)[:9], (3, 3)).T).T
+    if not np.isfinite([at, x, z]).all():
+        return
+    z /= np.linalg.norm(z)
+    x -= (x @ z) * z
+    x /= np.linalg.norm(x)
+    turn = Matrix(np.column_stack([x, np.cross(z, x), z]).tolist())
+    scale = probe.matrix_basis.to_scale()
+    patch_object.place(probe, Matrix.LocRotScale(Vector(at + to_world[:3, 3]), turn, scale))
+
+
+def seat(probe, extent):
+    """Where the probe is on its target, SEAT numbers: the same wherever both are moved or turned together.
+
+    Those that it keeps, unless it is no longer there.
+    """
+    settings, target = probe.tactile_probe, probe.tactile_probe.target
+    to_world = np.eye(4) if target is None else np.array(target.matrix_world, dtype=float)
+    place, kept = np.array(probe.matrix_world, dtype=float), np.array(settings.seat)
+    now = _seat(to_world, place) if can_have_children(probe) else np.full(SEAT, np.nan)
+    rounding = np.finfo(np.float32).eps * np.abs([to_world[:3, 3], place[:3, 3]]).max()
+    off = np.linalg.norm(to_world[:3, :3] @ (now[:3] - kept[:3]))
+    is_there = off <= CLOSE * extent + 8.0 * rounding and np.allclose(now[3:], kept[3:], atol=CLOSE)
+    return kept.tolist() if is_there else now.tolist()
+
+
+def _seat(to_world, place):
+    """Of the world matrices (4, 4) of a target and a probe; NaN where the target is flat."""
+    linear = to_world[:3, :3]
+    shape, size, volume = linear.T @ linear, np.linalg.norm(linear), np.linalg.det(linear)
+    if not abs(volume) > 1e-12 * size**3 > 0.0:
+        return np.full(SEAT, np.nan)
+    offsets = np.column_stack([place[:3, 0], place[:3, 2], place[:3, 3] - to_world[:3, 3]])
+    x, z, at = np.linalg.solve(linear, offsets).T
+    axes = [axis / max(np.linalg.norm(axis), 1e-30) for axis in (x, z)]
+    return np.concatenate([at, *axes, [np.log(size), np.sign(volume)], shape.ravel() / size**2])
+
+
+def keep(probe, patch):
+    """Keeps where the target of the probe is, with a patch that was touched just now."""
+    target = probe.tactile_probe.target
+    axes, origin = patch_object.touched_frame(patch)
+    patch[BASE] = [*_numbers(target.matrix_world), *_numbers(patch_object.matrix_of(axes, origin))]
+
+
+def carry(probe, patch):
+    """Where the target was moved since, the patch's record is that of a patch that was moved with it.
+
+    Not where the probe has been left behind, as one that is not the target's child.
+    """
+    target, report, base = probe.tactile_probe.target, patch_object.report_of(patch), patch.get(BASE)
+    if target is None or report is None or base is None or report["source"] != target.name:
+        return
+    if not is_attached(probe) and seat(probe, report.get("extent", 0.0)) != list(probe.tactile_probe.seat):
+        return
+    before, frame = np.reshape(base, (2, 4, 4))
+    try:
+        motion = np.array(target.matrix_world, dtype=float) @ np.linalg.inv(before)
+    except np.linalg.LinAlgError:
+        return
+    turn = np.array(Matrix(motion.tolist()).to_quaternion().to_matrix())
+    if not np.isfinite(motion).all():
+        return
+    origin = motion[:3, :3] @ frame[:3, 3] + motion[:3, 3]
+    patch_object.move_record(patch, turn @ frame[:3, :3], origin)
+
+
+def _numbers(matrix):
+    return np.array(matrix, dtype=float).ravel().tolist()

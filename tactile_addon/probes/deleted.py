@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What was deleted beneath a probe, and what undo brings back."""
+
+import bpy
+
+from ..scene import patch_object
+from ..touch.settings import silent
+from . import anchor
+from .probe import DIGEST, is_result, record_of
+
+_deleted = set()  # session_uids of targets
+_owners = {}  # those of contours, and of the patches they were seen with last
+
+
+def forget_target(probe):
+    """A target that was deleted lives on as long as the probe points to it: lets go, so that it is gone.
+
+    The step of undo was stored before, and undo takes back only what differs between two steps: so which one
+    it was is kept, for `relink`.
+    """
+    settings, record = probe.tactile_probe, record_of(probe)
+    target = settings.target
+    # One that has never been touched is a script's, which may be about to put it into the scene.
+    # A library's is not deleted by being in no scene of this file.
+    if target is None or target.users_scene or not target.is_editable:
+        return
+    if target.override_library is not None:
+        # One that was made for the probe's sake and is in no scene: the library's own is there to be touched.
+        if target.override_library.reference.users_scene:
+            with silent():
+                settings.target = target.override_library.reference
+        return
+    if record is None or record["source"] != target.name:
+        return
+    settings.lost = f"{target.session_uid} {int(anchor.is_attached(probe))} {target.name}"
+    if anchor.is_attached(probe):  # to an object that is in no scene any more
+        anchor.detach(probe)
+    settings.property_unset("target")
+    if not target.users:
+        _deleted.add(target.session_uid)
+        _remove_soon()
+
+
+def _remove_soon():
+    """Not now: a handler may not delete what is being evaluated."""
+    # Without a window no timer runs, and one that is left keeps Blender's module from ending.
+    if not bpy.app.background and not bpy.app.timers.is_registered(remove):
+        bpy.app.timers.register(remove)
+
+
+def relink(probe):
+    """Has the probe point again to the target that it lost, where undo has brought that back."""
+    settings = probe.tactile_probe
+    if settings.target is not None or not settings.lost:
+        return
+    number, was_attached, name = settings.lost.split(" ", 2)
+    target = bpy.data.objects.get(name)
+    if target is not None and str(target.session_uid) == number and target.users_scene:
+        with silent():
+            settings.target = target
+        if int(was_attached) and probe.parent is None:
+            anchor.attach(probe, target)
+
+
+def has_contours():
+    return bool(_owners)
+
+
+def look_for_contours():
+    """Has the contours go whose patch was deleted: without its coordinates they mean nothing."""
+    there = {obj.session_uid: obj for obj in bpy.data.objects}
+    for number, obj in there.items():
+        if patch_object.CONTOURS in obj and obj.parent is not None:
+            _owners[number] = obj.parent.session_uid
+    if any(number not in there or _is_left(there[number], there) for number in _owners):
+        _remove_soon()
+
+
+def _is_left(lines, there):
+    return lines.parent is None and lines.is_editable and _owners.get(lines.session_uid) not in there
+
+
+def remove():
+    """Takes away what was deleted, and what nothing is left of but a datablock that nobody uses; a timer."""
+    there = {obj.session_uid: obj for obj in bpy.data.objects}
+    gone = [there[number] for number in _deleted if number in there and not there[number].users]
+    left = [there[number] for number in _owners if number in there and _is_left(there[number], there)]
+    for number in [number for number in _owners if number not in there]:
+        del _owners[number]
+    _deleted.clear()
+    patch_object.remove_objects([obj for obj in left if is_result(obj)])
+    for obj in gone:
+        bpy.data.objects.remove(obj)
+    patch_object.remove_meshes([mesh for mesh in bpy.data.meshes if DIGEST in mesh])

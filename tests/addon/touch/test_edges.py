@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts with edges, and planes: what a touch promises there, and what it says of nothing."""
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from mathutils import Vector
+
+OFF = "The principal directions may be"
+
+
+@pytest.fixture
+def cube(empty):
+    empty.ops.mesh.primitive_cube_add()
+    return empty.context.object
+
+
+def report_of(bpy, location, **arguments):
+    assert bpy.ops.tactile.pick(target="Cube", location=location, new=True, **arguments) == {"FINISHED"}
+    (patch,) = bpy.context.object.children
+    return patch["tactile"].to_dict()
+
+
+def test_a_patch_of_a_given_extent_says_where_its_curves_ended_before(empty, cube):
+    message = report_of(empty, (0.9, 0.2, 1.0), extent=0.5)["message"]
+    assert message.endswith(" Of 6 half curves 3 end at a crease, before the extent.")
+    assert "half curves" not in report_of(empty, (0.1, 0.2, 1.0), extent=0.5)["message"]
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+@pytest.mark.parametrize("extent", [0.0, 0.2, 0.5])
+@pytest.mark.parametrize("location", [(0.1, 0.2, 1.0), (0.9, 0.2, 1.0), (0.9, 0.85, 1.0)])
+def test_a_plane_gets_no_advice_about_directions_that_it_does_not_have(empty, cube, location, extent, turn):
+    cube.rotation_euler = (turn, 0.3 * turn, turn)
+    empty.context.view_layer.update()
+    report = report_of(empty, cube.matrix_world @ Vector(location), extent=extent)
+    assert report["status"] == "ok"
+    assert OFF not in report["message"]
+
+
+def test_what_rounding_leaves_of_nothing_is_said_to_be_none(extension):
+    rows = dict(extension.tactile_addon.touch.wording.patch_rows(RECORD, ("mm", 1.0)))
+    assert rows["Curvature κ1"] == "0 ± 0.01 1/mm"
+    assert rows["Curvature κ2"] == "0.02 ± 0.01 1/mm"
+    assert rows["Gaussian K"] == "0 ± 0.01 1/mm²"
+    assert rows["Fit Error"] == "0 mm"
+
+
+RECORD = {
+    "radius": 2.0,
+    "k1": -6.7e-08,
+    "k2": 0.02,
+    "gaussian_curvature": -1.3e-09,
+    "mean_curvature": 0.01,
+    "fit_error": 1.1e-7,
+    "height_std": 0.1,
+    "is_verified": False,
+    **{f"{name}_std": 0.01 for name in ("k1", "k2", "gaussian_curvature", "mean_curvature")},
+}
+
+
+def test_the_preview_promises_no_more_than_was_felt(empty, extension, cube):
+    addon, depsgraph = extension.tactile_addon, empty.context.evaluated_depsgraph_get()
+    planes = [addon.touch.touch_object.core.SamplingPlane(math.radians(azimuth)) for azimuth in (0, 60, 120)]
+    inputs = {"extent": 0.5, "step": 0.0, "noise": 0.0, "seed": 0, "method": "bayes", "degree": "auto"}
+    touched = addon.touch.touch_object.touch(cube, depsgraph, (0.9, 0.2, 1.0), planes, **inputs)
+    (rim, _), (normal, _), *curves = addon.viewport.overlay.preview_lines(touched)
+    assert len(curves) == 3
+    assert np.array_equal(rim[0], rim[-1])
+    ends = np.vstack([points[[0, -1]] for points, _ in curves])
+    assert np.abs(rim[:, 2] - 1.0).max() < 1e-3
+    assert rim[:, 0].max() < 1.02  # the edge is at 1; a disk of that extent would reach to 1.4
+    for end in ends:  # the rim runs through what was felt last
+        assert np.linalg.norm(rim - end, axis=1).min() < 0.03
+    assert normal[1] - normal[0] == pytest.approx([0.0, 0.0, 0.6 * touched.result.radius], abs=1e-6)
