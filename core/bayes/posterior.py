@@ -72,6 +72,10 @@ class Posterior(NamedTuple):
         covariance: Array = (at_p @ self.covariance) @ np.swapaxes(at_q, -1, -2)
         return covariance
 
+    def height_covariances(self, p: Array, q: Array) -> tuple[Array, Array]:
+        """Of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
+        return self.height_covariance(p, q), self.height_covariance(p, p)
+
     def height(self, x: Array, y: Array) -> Array:
         """The mean height at n points, (n,)."""
         return monomials(x, y, TERMS) @ self.mean
