@@ -3,8 +3,8 @@
 """Times the core of any checkout, so that two can be compared in one run; benchmarks.ratios starts it.
 
 `python benchmarks/speed_worker.py ROOT CASES`, CASES pickled: each line of the input names a task and a case,
-`touch 3`, and is answered by seconds of processor time, which what else the machine does changes least. Of
-core it uses what checkouts have in common; what the newer does by itself, it does step by step with the older.
+`touch 3`, and is answered by seconds of processor time, which what else the machine does changes least. It
+uses what checkouts have in common; what the newer core does by itself, it does step by step with the older.
 """
 
 import math

@@ -85,6 +85,10 @@ class Posterior(NamedTuple):
         added: Array = self.level[0] + (at_p + at_q) @ self.level[1:]
         return added
 
+    def height_covariances(self, p: Array, q: Array) -> tuple[Array, Array]:
+        """Of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
+        return self.height_covariance(p, q), self.height_covariance(p, p)
+
     def height(self, x: Array, y: Array) -> Array:
         """The mean height at n points, (n,)."""
         return monomials(x, y, TERMS) @ self.mean

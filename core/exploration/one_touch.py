@@ -187,11 +187,11 @@ def is_enough(r: Reconstruction) -> bool:
         return True
     (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
     some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), PLACES)).astype(np.intp)]
-    both, m = np.vstack([some, points]) / r.radius, len(some)
-    covariance = r.uncertainty.height_covariance(both, both)
-    variance, shared, seen = covariance.diagonal()[m:], covariance[:m, m:], covariance[:m, :m].copy()
+    over, m = points / r.radius, len(some)
+    shared, seen = r.uncertainty.height_covariances(some / r.radius, over)
+    variance = r.uncertainty.height_std(*over.T) ** 2
     seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
     told = solved(cholesky(seen), shared)
     lost = np.einsum("in,in->n", told, told)
     then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
-    return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(np.maximum(variance, 0.0))))
+    return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))

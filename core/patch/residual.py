@@ -77,10 +77,18 @@ class Residual:
 
     def height_covariance(self, p: Array, q: Array) -> Array:
         """Covariances of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
+        return self._covariance(p, self.signed(p), q, self.signed(q))
+
+    def height_covariances(self, p: Array, q: Array) -> tuple[Array, Array]:
+        """Of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
         at_p = self.signed(p)
-        at_q = at_p.copy() if q is p else self.signed(q)
-        at_q[..., : len(self.places)] *= -1.0
-        covariance: Array = kernel(p, q, self.variances) + at_p @ np.swapaxes(at_q, -1, -2)
+        return self._covariance(p, at_p, q, self.signed(q)), self._covariance(p, at_p, p, at_p)
+
+    def _covariance(self, p: Array, at_p: Array, q: Array, at_q: Array) -> Array:
+        """By what `signed` gives of the points."""
+        covariance = kernel(p, q, self.variances)
+        for told, add in ((slice(len(self.places)), np.subtract), (slice(len(self.places), None), np.add)):
+            add(covariance, at_p[..., told] @ np.swapaxes(at_q[..., told], -1, -2), out=covariance)
         return covariance
 
     def signed(self, p: Array) -> Array:

@@ -50,8 +50,7 @@ def _lost(r: Reconstruction, over: Array, azimuths: Array) -> Array:
     count, surface = min(wanted, MOST), r.uncertainty
     directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
     contours = np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None]
-    shared = surface.height_covariance(contours, over)
-    seen = surface.height_covariance(contours, contours)
+    shared, seen = surface.height_covariances(contours, over)
     seen += surface.noise**2 * count / wanted * np.eye(count)
     lost: Array = np.einsum("kin,kin->kn", shared, np.linalg.solve(seen, shared))
     return lost
