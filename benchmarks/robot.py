@@ -36,7 +36,7 @@ BLOCK, SHARE = 60, 5  # contacts that follow each other; of the blocks one in so
 BAND, IN_BAND = 0.35, 50  # mm to either side of a curve's plane; contacts of a curve
 FEWEST = 300  # contacts at a place
 SUBSET, MOST = 200, 600  # random contacts that a process, and a spline, are fitted to
-SMOOTHINGS = (1.0, 10.0, 100.0)  # the best are among them; 0.001 to 0.1 were tried
+SMOOTHINGS = (0.1, 1.0, 10.0)  # in unit radius; of 0.01 to 100 the best are among them
 
 
 class Place(NamedTuple):
@@ -201,12 +201,12 @@ def best(scores, prefix):
     return min(names, key=lambda name: np.mean([of[name].error for of in scores if name in of]))
 
 
-def row(title, scores, name):
+def row(name, scores):
     found = [of[name] for of in scores if name in of]
     errors, ratios, within, seconds = zip(*found, strict=True)
     more = ["", ""] if np.isnan(ratios[0]) else [f"{np.mean(ratios):.2f}", f"{np.mean(within):.2f}"]
     return [
-        title, str(len(found)), f"{np.mean(errors):.3f}", f"{np.median(errors):.3f}", *more,
+        name, str(len(found)), f"{np.mean(errors):.3f}", f"{np.median(errors):.3f}", *more,
         f"{1e3 * median(seconds):.1f}",
     ]  # fmt: skip
 
@@ -226,11 +226,12 @@ def main():
     if not scores:
         sys.exit(f"robot: there is no exploration/*.mat in {options.folder}")
     every = [of for found in scores.values() for of in found]
-    prefixes = [ALL, BOTH, CROSSED, *list(PEERS)[:2]]
+    prefixes = [ALL, *list(PEERS)[:2]]
     prefixes += [f"{name}, {subset}" for name in KERNELS for subset in SUBSETS]
     named = {prefix: best(every, prefix) for prefix in prefixes}
     head = ["method", "places", "mean error, mm", "median", "error / expected", "within 90 %", "ms"]
-    table(head, [row(name, every, name) for name in named.values()])
+    table(head, [row(name, every) for name in named.values()])
+    table(head, [row(name, [of for of in every if CROSSED in of]) for name in (ALL, BOTH, CROSSED)])
     peers = [name for name in named.values() if name in PEERS]
     rows = []
     for name, found in scores.items():

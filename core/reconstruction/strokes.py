@@ -25,6 +25,7 @@ STRIPS = 10
 SOME = 2000  # contacts that the quartic is fitted to
 NEAR = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
 DETERMINED = 0.02  # the least singular value of a quadric's terms in the mean over contacts, in unit radius
+MIX = np.array([1.0, math.pi, math.e])  # makes one number of a contact, which few others share
 QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 FAR = 0.999  # of the greatest distance, that is as far: rounding must not choose
 
@@ -45,14 +46,19 @@ class FirstFrame(NamedTuple):
 
 
 def gathered(strokes: Sequence[ArrayLike | Contour]) -> tuple[Array, float]:
-    """All contacts of strokes, (n, 3), and the largest of the deviations they bring. Raises ValueError."""
+    """All contacts of strokes, (n, 3), each once, and the largest deviation they bring. Raises ValueError.
+
+    A sensor at rest writes one contact many times: it is no more certain for that.
+    """
     given: list[object] = list_of("strokes", strokes, object)
     arrays = [
         stroke.points if isinstance(stroke, Contour) else finite_array("strokes", stroke, (None, 3), LARGEST)  # type: ignore[arg-type]
         for stroke in given
     ]
     noise = max((stroke.noise or 0.0 for stroke in given if isinstance(stroke, Contour)), default=0.0)
-    return np.vstack([np.empty((0, 3)), *arrays]), noise
+    points = np.vstack([np.empty((0, 3)), *arrays])
+    first = np.unique(points @ MIX, return_index=True)[1]
+    return points[np.sort(first)], noise
 
 
 def means(contacts: Array) -> tuple[Array, int]:
@@ -95,10 +101,7 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
         r, distances = r[distances <= radius], distances[distances <= radius]
     reach = float(distances.max(initial=0.0))
     if len(r) < len(QUADRIC) or reach < SMALLEST:
-        return DegenerateCurvesError(
-            f"the strokes have {len(r)} contacts around the point, and {len(QUADRIC)} are needed: measure "
-            "more, or take a larger radius"
-        )
+        return _too_few(len(r))
     tangent = r[np.argmax(distances >= FAR * reach)] / reach
     for share in (NEAR, 1.0):
         near = r[distances <= share * reach] / (share * reach)
@@ -114,10 +117,19 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
     axes, k1, k2, _ = turned(plane, quadric[1:], tangent)
     local = r @ axes
     flat = np.hypot(local[:, 0], local[:, 1])
-    local = local[np.abs(local[:, 2]) <= flat.max()]
+    local = local[np.abs(local[:, 2] - quadric[0] * share * reach) <= flat.max()]
+    if len(local) < len(QUADRIC):
+        return _too_few(len(local))
     radius = float(np.hypot(local[:, 0], local[:, 1]).max())
     scale = radius / (share * reach)
     return FirstFrame(axes, k1 * scale, k2 * scale, radius, local / radius)
+
+
+def _too_few(count: int) -> DegenerateCurvesError:
+    return DegenerateCurvesError(
+        f"the strokes have {count} contacts around the point, and {len(QUADRIC)} are needed: measure more, "
+        "or take a larger radius"
+    )
 
 
 def _plane(near: Array, outward: Array) -> Array:
