@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..patch.monge import TERMS, monomials
 from ..patch.residual import Residual, cholesky, kernels, places_factor, solved
-from .evidence import FREE_PRECISION, USUAL_WAVINESS, prior_variances
+from .evidence import USUAL_WAVINESS, prior_variances
 from .measured_slopes import slope_equations
 from .posterior import FREE, Posterior
 
@@ -24,12 +24,14 @@ from .posterior import FREE, Posterior
 MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
 FACETS = 1e-3  # Share of the radius: misfits of a smooth surface, whose curvatures a polynomial tells best.
 UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
-AMPLITUDES = np.array([0.004, 0.022, 0.12])  # Deviations of the residual, in units of the radius.
+AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
 ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
 NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
 PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
-NEGLIGIBLE = 40.0  # -2 log likelihood beside the best, at which no other noise is tried
-FREE_VARIANCE = 1e2  # Prior variance of slopes and second derivatives, in the evidence.
+ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
+NEGLIGIBLE = 80.0  # -2 log likelihood beside the best, at which no other noise is tried
+FREE_VARIANCE = 0.03  # of slopes and second derivatives: where curves end early, of 100 they run away
+TEMPER = 0.15  # of the log likelihood: contacts side by side tell of waves between the curves no more
 
 
 class Touch(NamedTuple):
@@ -38,7 +40,6 @@ class Touch(NamedTuple):
     contacts : (n, 3)
     weights : (n,), above 0
     least, most : noise of the contacts
-    expected : (27,), the prior's mean
     normals : (n, 3), measured, over their standard deviation; None without
     """
 
@@ -46,7 +47,6 @@ class Touch(NamedTuple):
     weights: Array
     least: float
     most: float
-    expected: Array
     normals: Array | None
 
     def moved(self, turn: Array, scale: float) -> "Touch":
@@ -69,7 +69,7 @@ def asking(contacts: Array, weights: Array, posterior: Posterior, accuracy: Arra
 
 
 class System(NamedTuple):
-    """Basis (n, 27), heights (n,) less the prior's mean, places (m,) among the contacts.
+    """Basis (n, 27), heights (n,), places (m,) among the contacts.
 
     kernels : of unit variance, (n, m) each, of contacts and places
     """
@@ -85,7 +85,7 @@ def system_of(touch: Touch) -> System:
     flat = touch.contacts[:, :2]
     basis = monomials(flat[:, 0], flat[:, 1], TERMS)
     places = _some(len(flat), PLACES)
-    return System(basis, touch.contacts[:, 2] - basis @ touch.expected, places, kernels(flat, flat[places]))
+    return System(basis, touch.contacts[:, 2], places, kernels(flat, flat[places]))
 
 
 def _some(count: int, most: int) -> NDArray[np.intp]:
@@ -122,9 +122,9 @@ def sizes(touch: Touch, system: System) -> Sizes:
     without += 2.0 * len(heights) * math.log(touch.most)
     least = min(with_it.min(), without.min())
     p, p_alone = np.exp(-0.5 * (with_it - least)), np.exp(-0.5 * (without - least))
-    shares = p / p.sum()
+    shares = p**TEMPER / (p**TEMPER).sum()
     noise = float(np.sqrt(shares.sum(axis=(0, 1)) @ noises**2))
-    return Sizes(shares.sum(axis=2) @ AMPLITUDES**2, noise, bool(p.mean() > p_alone.mean()))
+    return Sizes(shares.sum(axis=2) @ AMPLITUDES**2, noise, bool(p.mean() > ODDS * p_alone.mean()))
 
 
 def _weighted(touch: Touch, system: System) -> tuple[Array, Array, list[Array]]:
@@ -183,12 +183,12 @@ def _surprises_alone(basis: Array, heights: Array) -> Array:
 
 
 def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
-    """Of the terms, less the prior's mean, and what k(p, places) is multiplied with, (27 + m,)."""
+    """Means of the terms, and of what k(p, places) is multiplied with, (27 + m,)."""
     from scipy.linalg.lapack import dposv
 
     if touch.normals is not None or len(system.places) < len(touch.weights):
         return fitted(touch, system, sizes.variances, sizes.noise)[0].mean
-    # Of N(0, K), K as in `sizes`: without the posterior's covariance its mean takes one Cholesky factor.
+    # Heights ~ N(0, K), K as in `sizes`: the mean alone takes one Cholesky factor.
     (basis, heights, within), (one, other) = _weighted(touch, system), sizes.variances
     prior = _prior(USUAL_WAVINESS)
     matrix = (basis * prior) @ basis.T
@@ -213,13 +213,8 @@ def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tupl
     weighted = features * (np.sqrt(touch.weights) / noise)[:, None]
     precision = weighted.T @ weighted
     seen = weighted.T @ (system.heights * np.sqrt(touch.weights) / noise)
-    precision.flat[:: len(precision) + 1] += np.concatenate(
-        [
-            np.full(FREE, FREE_PRECISION),
-            1.0 / prior_variances(np.array(USUAL_WAVINESS)),
-            np.ones(len(index)),
-        ]
-    )
+    prior = 1.0 / _prior(USUAL_WAVINESS)
+    precision.flat[:: len(precision) + 1] += np.concatenate([prior, np.ones(len(index))])
     if touch.normals is not None:
         _add_slopes(touch, precision, seen)
     factor = cholesky(precision)
@@ -234,4 +229,4 @@ def _add_slopes(touch: Touch, precision: Array, seen: Array) -> None:
     given = touch.normals, touch.contacts, touch.weights
     slopes, steepness = (part[0] for part in slope_equations(*(each[None] for each in given)))
     precision[: len(TERMS), : len(TERMS)] += slopes.T @ slopes
-    seen[: len(TERMS)] += slopes.T @ (steepness - slopes @ touch.expected)
+    seen[: len(TERMS)] += slopes.T @ steepness

@@ -18,7 +18,6 @@ from ..patch import residual as beside
 from ..patch.monge import TERMS, exponents, monomials
 from ..patch.residual import Residual, kernel, kernels, weighted_kernel, whitened
 from .joint_fit import turned
-from .linear_system import prior_mean
 from .posterior import DISK, FREE, Posterior, nodes
 from .residual_evidence import MISFIT, Sizes, System, Touch, asking, fitted, mean_given, sizes, system_of
 
@@ -70,7 +69,6 @@ def rough_fit(
             np.append(weights[i][there], np.ones(len(point))),
             least,
             max(float(posterior.noise[i]), least),
-            prior_mean(2.0 * posterior.mean[i, 2], 2.0 * posterior.mean[i, 4]),
             None if normals is None else np.vstack([normals[i][there], point]),
         )
         system = system_of(touch)
@@ -84,24 +82,24 @@ def _settle(found: RoughFit, place: int, touch: Touch, system: System, size: Siz
     """Into `found`: the fit of a touch in the frame that its first fit shows."""
     (at, weights), half = _projection(), len(nodes()[2])
     first, places = mean_given(touch, system, size), touch.contacts[system.places, :2]
-    mean = _terms()[:FREE] @ (touch.expected + first[: len(TERMS)])
+    mean = _terms()[:FREE] @ first[: len(TERMS)]
     mean += weights[:FREE, :half] @ weighted_kernel(at[:half], places, size.variances, first[len(TERMS) :])
-    turn, k1, k2, _ = turned(np.eye(3), mean, tangent)
+    turn = turned(np.eye(3), mean, tangent)[0]
     scale = float(np.hypot(*(touch.contacts @ turn)[:, :2].T).max())
-    touch = touch.moved(turn, scale)._replace(expected=prior_mean(k1, k2))
+    touch = touch.moved(turn, scale)
     second = fitted(touch, system_of(touch), size.variances / scale**2, size.noise / scale)
     found.turns[place], found.scales[place] = turn, scale
-    _put(found, place, *second, touch.expected)
+    _put(found, place, *second)
 
 
-def _put(found: RoughFit, place: int, residual: Residual, places: Array, expected: Array) -> None:
+def _put(found: RoughFit, place: int, residual: Residual, places: Array) -> None:
     """One fit: the polynomial nearest to it with its covariance, and the residual beside that."""
     (at, weights), terms = _projection(), _terms()
     told = weights @ kernel(at, residual.places, residual.variances)
-    mean = terms @ (expected + residual.mean[: len(TERMS)]) + told @ residual.mean[len(TERMS) :]
+    mean = np.hstack([terms, told]) @ residual.mean
     _, k1, k2, _ = turned(np.eye(3), mean, np.eye(3)[0])
     mean[:FREE] = 0.0, 0.0, k1 / 2.0, 0.0, k2 / 2.0
-    residual.mean[: len(TERMS)] += expected - mean
+    residual.mean[: len(TERMS)] -= mean
     told, left = whitened(places, residual.factor, terms.T, told.T)
     own = np.tensordot(residual.variances, _own(tuple(beside.LENGTHS)), axes=1)
     found.posterior.mean[place], found.posterior.noise[place] = mean, residual.noise
