@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, finite_array
 from ..contours.local_geometry import Frame
+from .differential_geometry import Derivatives
 from .domain import GRID, Domain
-from .monge import Derivatives, HeightField, MongePatch
+from .monge import HeightField, MongePatch
 from .residual import Residual
 from .triangulation import patch_mesh
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
+from .differential_geometry import Derivatives
 
 
 @cache
@@ -61,70 +62,6 @@ def derived_monomials(
             for k in range(times):
                 values *= (exponent - k)[:, None]
     return derived
-
-
-@dataclass(frozen=True, eq=False)
-class Derivatives:
-    """Height and partial derivatives of a surface z(x, y), all of one shape (...), and its curvatures."""
-
-    z: Array
-    x: Array
-    y: Array
-    xx: Array
-    xy: Array
-    yy: Array
-
-    @property
-    def normal(self) -> Array:
-        """Unit normal on the side of +z, shape (..., 3)."""
-        n = np.stack([-self.x, -self.y, np.ones_like(self.x)], axis=-1)
-        return n / np.linalg.norm(n, axis=-1, keepdims=True)
-
-    @property
-    def first_form(self) -> tuple[Array, Array, Array]:
-        """E, F, G of the first fundamental form."""
-        return 1.0 + self.x**2, self.x * self.y, 1.0 + self.y**2
-
-    @property
-    def second_form(self) -> tuple[Array, Array, Array]:
-        """L, M, N of the second fundamental form, negative where the surface falls away below the normal."""
-        w = np.sqrt(1.0 + self.x**2 + self.y**2)
-        return self.xx / w, self.xy / w, self.yy / w
-
-    @property
-    def gaussian_curvature(self) -> Array:
-        """K = (LN - M^2) / (EG - F^2), in 1/length^2."""
-        return (self.xx * self.yy - self.xy**2) / (1.0 + self.x**2 + self.y**2) ** 2
-
-    @property
-    def mean_curvature(self) -> Array:
-        """H = (EN - 2FM + GL) / 2(EG - F^2), in 1/length."""
-        (e, f, g), (ll, mm, nn) = self.first_form, self.second_form
-        # EG - F^2 is E + G - 1, which does not cancel where it is steep.
-        return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e + g - 1.0))
-
-    @property
-    def principal_curvatures(self) -> tuple[Array, Array]:
-        """kappa1 <= kappa2, in 1/length."""
-        mean = self.mean_curvature
-        # H^2 - K is a square, (kappa1 - kappa2)^2 / 4; at umbilics rounding takes it below 0.
-        half = np.sqrt(np.maximum(mean**2 - self.gaussian_curvature, 0.0))
-        return mean - half, mean + half
-
-    @property
-    def shape_index(self) -> Array:
-        """-2 / pi atan((kappa1 + kappa2) / (kappa2 - kappa1)): 1 on a convex cap, 0 on a saddle, -1 in a cup.
-
-        A planar point has none (Koenderink and van Doorn, 1992); it is given the 0 of the middle.
-        """
-        k1, k2 = self.principal_curvatures
-        return np.arctan2(k1 + k2, k2 - k1) * (-2.0 / np.pi)
-
-    @property
-    def curvedness(self) -> Array:
-        """sqrt((kappa1^2 + kappa2^2) / 2), in 1/length."""
-        k1, k2 = self.principal_curvatures
-        return np.sqrt(0.5 * (k1**2 + k2**2))
 
 
 class HeightField:

@@ -22,7 +22,8 @@ from functools import cached_property
 import numpy as np
 
 from ..arguments import Array
-from .monge import TERMS, Derivatives, derived_monomials, monomials
+from .differential_geometry import Derivatives
+from .monge import TERMS, derived_monomials, monomials
 
 LENGTHS = np.array([0.4, 1.6])  # of the radius; with benchmarks.real
 BLOCK = 6000  # distances at once: they fit into a processor's cache
