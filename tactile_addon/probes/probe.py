@@ -32,7 +32,7 @@ from . import anchor
 
 DIGEST = "tactile_digest"
 NO_SHAPE = " 00000000"  # the checksum of a mesh that cannot be touched, as settings.shape ends
-VERTICES = 3000  # of the mesh around, compared with the patch at most; a quarter or more lies over it
+VERTICES = 2000  # of the mesh around, compared with the patch at most; a quarter or more lies over it
 
 
 class TactileProbe(TouchSettings, bpy.types.PropertyGroup):

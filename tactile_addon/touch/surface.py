@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 FARTHEST = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
+SOME = 8  # times as many vertices as are wanted, that are looked at before all of them are
 WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
 
 
@@ -71,10 +72,13 @@ class MeshSurface:
         """
         # A sphere of the world is an ellipsoid in the object: its longest axis bounds it.
         reach = radius * np.linalg.norm(self._inverse, ord=2)
-        local = self._co - self._to_local(point).astype(np.float32)
-        near = np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
-        if most is not None:
-            near = near[:: math.ceil(len(near) / most) or 1]
+        at, few = self._to_local(point).astype(np.float32), len(self._co) // (SOME * (most or len(self._co)))
+        for stride in dict.fromkeys((max(few, 1), 1)):  # of all only where some of them are not enough
+            local = self._co[::stride] - at
+            near = stride * np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
+            if most is not None and len(near) >= most:
+                near = near[:: math.ceil(len(near) / most)]
+                break
         # All of them: one by one, a few thousand take longer than a million.
         normals = np.empty_like(self._co)
         self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
