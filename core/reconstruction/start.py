@@ -99,10 +99,10 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     local = curves.points @ axes[:, None] / radii[:, None, None, None]
     strokes, stds = [], []
     for row, i in enumerate(good):
-        beside = (given[i].strokes - points[i]) @ axes[row] / radii[row]
+        beside, size = given[i].strokes, 1
         if len(beside):
-            beside = beside[_over(curves.at(row), local[row], beside)]
-        beside, size = means(beside)
+            beside = (beside - points[i]) @ axes[row] / radii[row]
+            beside, size = means(beside[_over(curves.at(row), local[row], beside)])
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]

@@ -51,12 +51,14 @@ def gathered(strokes: Sequence[ArrayLike | Contour]) -> tuple[Array, float]:
     A sensor at rest writes one contact many times: it is no more certain for that.
     """
     given: list[object] = list_of("strokes", strokes, object)
+    if not given:  # as mostly: touches of contours alone are not to pay for them
+        return np.empty((0, 3)), 0.0
     arrays = [
         stroke.points if isinstance(stroke, Contour) else finite_array("strokes", stroke, (None, 3), LARGEST)  # type: ignore[arg-type]
         for stroke in given
     ]
     noise = max((stroke.noise or 0.0 for stroke in given if isinstance(stroke, Contour)), default=0.0)
-    points = np.vstack([np.empty((0, 3)), *arrays])
+    points = np.vstack(arrays)
     first = np.unique(points @ MIX, return_index=True)[1]
     return points[np.sort(first)], noise
 

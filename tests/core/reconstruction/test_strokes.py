@@ -334,7 +334,7 @@ OPEN = "the strokes run along a line, two lines or a ring, which leaves open wha
         ([LINE], OPEN),
         ([noisy(LINE, 0.1, 0)], OPEN),
         ([LINE, LINE + 5.0 * ACROSS], OPEN),
-        ([np.repeat(LINE[[0, -1]], 50, axis=0)], OPEN),
+        ([np.repeat(LINE[[0, -1]], 50, axis=0)], NEEDED),
         ([noisy(np.repeat(LINE[[0, -1]], 50, axis=0), 0.1, 0)], OPEN),
         ([9.0 * np.column_stack([np.cos(TURNS), np.sin(TURNS), 0.0 * TURNS])], OPEN),
         (
