@@ -26,7 +26,12 @@ from .stability_map.map_operator import TACTILE_OT_stability_map
 from .stability_map.map_report import map_rows, median_rows
 from .touch import units
 from .touch.settings import draw_chosen, draw_sensor, draw_solver
-from .touch.wording import patch_rows, verification_rows, verification_table
+from .touch.wording import (
+    patch_rows,
+    registration_summary,
+    verification_rows,
+    verification_table,
+)
 from .viewport.pick import TACTILE_OT_pick
 
 TAB = "Tactile"
@@ -117,9 +122,13 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
                 box.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
             box.label(text="Last Touch")
         _draw_rows(box, patch_rows(record, unit), active=not outdated)
+        if found is None:
+            box.prop_search(patch, "tactile_target", context.scene, "objects")
         box.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
         if found is None:
             box.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
+        if "registration" in record:
+            _draw_sentence(context, box, registration_summary(record["registration"]), "SNAP_ON")
         if "verification" in record:
             _draw_verification(box, record["verification"], unit)
         if found is not None:

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A patch whose place is unknown, put onto a mesh: the operator, and what it does."""
 
+import threading
+from time import perf_counter
+
 import bpy
 import numpy as np
 from bpy.props import IntProperty, StringProperty
@@ -13,9 +16,66 @@ from ..probes.operators import is_unlocked, report_error, target_object
 from ..scene import patch_object
 from ..touch.surface import MeshSurface
 from ..touch.wording import registration_summary
-from .verify_operator import selected_mesh
+from .verify_operator import chosen_mesh
 
 POSES = 5
+HURRY = 0.1  # seconds between two looks at whether it is done
+
+
+class Search:
+    """The search for where on a mesh object a patch belongs, in another thread: it knows nothing of Blender.
+
+    poses : a list, once `wait` says that it is done; raises ValueError, with a sentence, where there are none
+    """
+
+    def __init__(self, patch, target, depsgraph):
+        if probe.probe_of(patch) is not None:
+            raise ValueError(f'The place of "{patch.name}" is that of its probe: it is known already')
+        vertices, faces = MeshSurface(target, depsgraph).triangles()
+        given = patch_object.reconstruction_of(patch), vertices, faces
+        self.patch, self.target, self._matrix = patch.name, target.name, patch.matrix_world.copy()
+        self._found, self._error = None, None
+        self._thread = threading.Thread(target=self._run, args=given, daemon=True)
+        self._thread.start()
+
+    def _run(self, *given):
+        try:
+            self._found = core.register(*given, best=POSES)
+        except MemoryError:
+            self._error = ValueError(
+                f'"{self.target}" is too large to be searched: take away what is far from the patch'
+            )
+        except ValueError as error:
+            self._error = error
+
+    def wait(self, seconds=None):
+        """Waits so long, or to the end; whether it is done."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
+
+    @property
+    def poses(self):
+        if self._error is not None:
+            raise self._error
+        return self._found
+
+    def put(self, pose):
+        """Moves the patch to one of the poses, from where it was; its `registration`, a dict."""
+        if pose > len(self.poses):
+            raise ValueError(f'There are {len(self.poses)} poses on "{self.target}": take one of them')
+        chosen, matrix, patch = self.poses[pose - 1], np.eye(4), bpy.data.objects.get(self.patch)
+        if patch is None:
+            raise ValueError(f'"{self.patch}" was deleted while its place was looked for')
+        matrix[:3, :3], matrix[:3, 3] = chosen.rotation, chosen.translation
+        patch.matrix_world = Matrix(matrix.tolist()) @ self._matrix
+        patch[patch_object.RECORD]["registration"] = {
+            "target": self.target,
+            "pose": pose,
+            "residuals": [found.residual for found in self.poses],
+            "vertices": [found.vertex for found in self.poses],
+            "is_ambiguous": self.poses[0].is_ambiguous,
+        }
+        return patch[patch_object.RECORD]["registration"].to_dict()
 
 
 def register_patch(patch, target, depsgraph, pose=1):
@@ -26,23 +86,9 @@ def register_patch(patch, target, depsgraph, pose=1):
     Its record has what was found as `registration`, which is returned as a dict. Raises ValueError, with
     a sentence and nothing changed, where that cannot be done.
     """
-    if probe.probe_of(patch) is not None:
-        raise ValueError(f'The place of "{patch.name}" is that of its probe: it is known already')
-    vertices, faces = MeshSurface(target, depsgraph).triangles()
-    poses = core.register(patch_object.reconstruction_of(patch), vertices, faces, best=POSES)
-    if pose > len(poses):
-        raise ValueError(f'There are {len(poses)} poses on "{target.name}": take one of them')
-    chosen, matrix = poses[pose - 1], np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = chosen.rotation, chosen.translation
-    patch.matrix_world = Matrix(matrix.tolist()) @ patch.matrix_world
-    patch[patch_object.RECORD]["registration"] = {
-        "target": target.name,
-        "pose": pose,
-        "residuals": [found.residual for found in poses],
-        "vertices": [found.vertex for found in poses],
-        "is_ambiguous": poses[0].is_ambiguous,
-    }
-    return patch[patch_object.RECORD]["registration"].to_dict()
+    search = Search(patch, target, depsgraph)
+    search.wait()
+    return search.put(pose)
 
 
 class TACTILE_OT_register(bpy.types.Operator):
@@ -73,11 +119,52 @@ class TACTILE_OT_register(bpy.types.Operator):
             return False
         return is_unlocked(cls, context)
 
-    def execute(self, context):
-        patch = probe.patch_near(context.view_layer.objects.active)
+    def invoke(self, context, event):
         try:
-            target = target_object(context, self.target or selected_mesh(context))
-            found = register_patch(patch, target, context.evaluated_depsgraph_get(), self.pose)
+            self._begin(context)
+        except ValueError as error:
+            return report_error(self, error)
+        self._timer = context.window_manager.event_timer_add(HURRY, window=context.window)
+        self._begun = perf_counter()
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self.cancel(context)
+            self.report({"INFO"}, "Stopped: the patch stays where it was")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        seconds = perf_counter() - self._begun
+        words = f'Looking for the patch on "{self._search.target}": {seconds:.0f} s     Esc: Stop'
+        context.workspace.status_text_set(words)
+        if not self._search.wait(0.0):
+            return {"RUNNING_MODAL"}
+        self.cancel(context)
+        return self._finish()
+
+    def cancel(self, context):
+        """Takes away all that shows that it is going on."""
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
+
+    def execute(self, context):
+        try:
+            self._begin(context)
+        except ValueError as error:
+            return report_error(self, error)
+        self._search.wait()
+        return self._finish()
+
+    def _begin(self, context):
+        patch = probe.patch_near(context.view_layer.objects.active)
+        target = target_object(context, self.target or chosen_mesh(context, patch))
+        self._search = Search(patch, target, context.evaluated_depsgraph_get())
+
+    def _finish(self):
+        try:
+            found = self._search.put(self.pose)
         except ValueError as error:
             return report_error(self, error)
         self.report({"WARNING"} if found["is_ambiguous"] else {"INFO"}, registration_summary(found))

@@ -75,7 +75,7 @@ class TACTILE_OT_verify(bpy.types.Operator):
         if found is not None and is_pending(found):  # Completing it later would undo the verification.
             probe.refresh(found, context)
         try:
-            target = target_object(context, self.target or selected_mesh(context))
+            target = target_object(context, self.target or chosen_mesh(context, patch))
             verify_patch(patch, target, context.evaluated_depsgraph_get())
         except ValueError as error:
             return report_error(self, error)
@@ -90,12 +90,21 @@ class TACTILE_OT_verify(bpy.types.Operator):
         layout.prop_search(self, "target", context.scene, "objects")
 
 
-def selected_mesh(context):
-    """The name of the selected mesh that is no result of a touch; empty for none."""
+def chosen_mesh(context, patch):
+    """The name of the one selected mesh, or of the patch's own choice, or of what it was touched on, if any.
+
+    Raises ValueError where there is none.
+    """
     selected = context.view_layer.objects.selected
     names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]
     if len(names) > 1:
         raise ValueError(
             f"{len(names)} meshes are selected: select one besides the patch, or none for the one touched"
         )
-    return names[0] if names else ""
+    name = names[0] if names else patch.tactile_target
+    source = probe.record_of(patch)
+    if not name and source is not None and source["source"] not in bpy.data.objects:
+        raise ValueError(
+            f'"{patch.name}" was touched on no mesh of this file: select the mesh, then the patch'
+        )
+    return name

@@ -401,8 +401,13 @@ def register():
         override=OVERRIDABLE,
         update=lambda obj, _: _recolor(obj),
     )
+    bpy.types.Object.tactile_target = StringProperty(  # a pointer would keep a mesh that is deleted
+        name="Target",
+        description="Name of the mesh object to put the patch onto, or to compare it with",
+        override=OVERRIDABLE,
+    )
 
 
 def unregister():
-    del bpy.types.Object.tactile_colors, bpy.types.Object.tactile_probe
+    del bpy.types.Object.tactile_target, bpy.types.Object.tactile_colors, bpy.types.Object.tactile_probe
     bpy.utils.unregister_class(TactileProbe)

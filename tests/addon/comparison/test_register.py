@@ -127,3 +127,59 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     depsgraph = empty.context.evaluated_depsgraph_get()
     with pytest.raises(ValueError, match=r"poses on .* take one of them"):
         registration.register_patch(patch, suzanne, depsgraph, pose=99)
+
+
+def imported(bpy, suzanne, tmp_path):
+    """The patch of contacts in a file, alone and active; it knows no mesh."""
+    patch = touched(bpy, suzanne, forehead(suzanne, bpy))
+    path = tmp_path / "felt.csv"
+    assert bpy.ops.tactile.export_contacts(filepath=str(path)) == {"FINISHED"}
+    lines = patch.children[0]
+    for obj in (lines, patch):
+        bpy.data.objects.remove(obj)
+    assert bpy.ops.tactile.import_contacts(filepath=str(path)) == {"FINISHED"}
+    found = bpy.context.object
+    lost(bpy, found)
+    return found
+
+
+@pytest.mark.parametrize("name", ["register", "verify"])
+def test_a_patch_of_a_file_asks_for_a_mesh_and_takes_the_one_in_its_field(empty, suzanne, tmp_path, name):
+    patch = imported(empty, suzanne, tmp_path)
+    operator = getattr(empty.ops.tactile, name)
+    said = "was touched on no mesh of this file: select the mesh, then the patch"
+    with pytest.raises(RuntimeError, match=said):
+        operator()
+    patch.tactile_target = suzanne.name
+    assert operator() == {"FINISHED"}
+    found = patch["tactile"]["registration" if name == "register" else "verification"].to_dict()
+    assert found["target"] == suzanne.name
+    suzanne.select_set(True)
+    patch.tactile_target = ""
+    assert operator() == {"FINISHED"}
+
+
+def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
+    empty, suzanne, extension, monkeypatch
+):
+    registration = extension.tactile_addon.comparison.register_operator
+    patch = touched(empty, suzanne, forehead(suzanne, empty))
+    lost(empty, patch)
+    before, depsgraph = patch.matrix_world.copy(), empty.context.evaluated_depsgraph_get()
+    search = registration.Search(patch, suzanne, depsgraph)
+    assert not search.wait(0.0)
+    assert search.wait()
+    assert patch.matrix_world == before
+    assert search.put(1)["target"] == suzanne.name
+    assert patch.matrix_world != before
+
+    def full(*given, **named):
+        raise MemoryError
+
+    monkeypatch.setattr(registration.core, "register", full)
+    with pytest.raises(ValueError, match="is too large to be searched: take away what is far"):
+        registration.register_patch(patch, suzanne, depsgraph)
+    monkeypatch.undo()
+    empty.data.objects.remove(patch)
+    with pytest.raises(ValueError, match="was deleted while its place was looked for"):
+        search.put(1)
