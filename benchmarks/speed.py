@@ -25,7 +25,7 @@ from scipy.optimize import minimize
 from core import reconstruct, reconstruct_many
 from core.bayes import joint_fit
 from core.paper import tagc
-from core.reconstruction import from_contours
+from core.reconstruction import stacks, start
 from tools import blender
 
 from . import accuracy, machine, ratios, table, timed
@@ -151,13 +151,13 @@ def _departure(one, other):
 # (c) -------------------------------------------------------------------------------------------------
 
 PARTS = {
-    "curves through the point": (from_contours, "curves_through"),
-    "Darboux frame": (from_contours, "darboux_frames"),
+    "curves through the point": (start, "curves_through"),
+    "Darboux frame": (start, "darboux_frames"),
     "equations of the contacts": (joint_fit, "linear_system"),
     "their QR": (joint_fit, "restricted"),
     "waviness and noise": (joint_fit, "hyperparameters"),
     "posterior": (joint_fit, "posterior"),
-    "patch and domain": (from_contours, "_result"),
+    "patch and domain": (stacks, "_result"),
 }
 
 

@@ -1,0 +1,215 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Touches that are fitted together: the paper's sections III and IV, or the Bayesian fit, in stacks."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from ..bayes.joint_fit import joint_fit
+from ..bayes.posterior import Posterior
+from ..bayes.rough_fit import rough_fit
+from ..contours.contour import Contour
+from ..contours.curves import Curves, misses
+from ..contours.local_geometry import DegenerateCurvesError, Frame
+from ..paper.by_method import coefficients
+from ..patch.domain import Domain, hull_domain
+from ..patch.geometry import Geometry
+from ..patch.monge import DEGREE, MongePatch
+from ..patch.residual import Residual
+from .result import Reconstruction
+from .start import Given, Start, curves_start, domain_of, levels, strokes_start
+
+
+class Options(NamedTuple):
+    """How to fit, checked."""
+
+    method: str
+    degree: int | None  # None for "auto"
+    noise: float | None  # None for the contours' own
+    weight: float
+    solver: str
+    radius: float | None  # of strokes alone
+
+
+class _Touch(NamedTuple):
+    """What a patch follows from: the curves of one touch, in the frame; all but the radius in its unit."""
+
+    frame: Frame
+    radius: float
+    curves: Curves
+    strokes: Array  # (m, 3)
+    misses: Array  # Distances of the curves from the point, and their deviations, (c, 2).
+    k1: float
+    k2: float
+    accuracy: float
+    degree: int
+    posterior: Posterior | None  # What the joint fit has found, where that makes the patch.
+    residual: Residual | None  # beside it, where the contacts ask for one
+
+
+class _Fit(NamedTuple):
+    """b touches in the frames that the method finds; contacts in unit radius."""
+
+    points: Array  # (b, 3), in the world
+    axes: Array  # (b, 3, 3)
+    radii: Array  # (b,)
+    contacts: Array  # (b, n, 3)
+    tangents: Array  # (b, c, 3), of the curves
+    degrees: list[int]
+    posteriors: Posterior | None
+    beside: list[Residual | None]
+
+
+def fitted_stack(
+    points: Array, touches: Sequence[Given], outward: Array, options: Options
+) -> list[Reconstruction | DegenerateCurvesError]:
+    """Results of touches, all of strokes alone or none, whose arguments are in order."""
+    if touches[0].is_of_strokes:
+        start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
+    else:
+        start, contours, errors = curves_start(points, touches, outward, options.noise)
+    found = iter(() if start is None else _fitted(start, options))
+    return [error or _result(next(found), c, options) for error, c in zip(errors, contours, strict=True)]
+
+
+def _fitted(start: Start, options: Options) -> list[_Touch]:
+    """Touches in the Darboux frames that the method finds."""
+    fit, curves, places = _fit(start, options), start.curves, start.curves.present[0].size
+    along = curves.along / fit.radii[:, None, None]
+    curvatures = fit.radii[:, None, None] * (curves.curvatures @ fit.axes)
+    local = fit.contacts[:, :places].reshape(curves.points.shape)
+    curves = Curves(local, curves.present, along, fit.tangents, curvatures)
+    missed = misses(curves)
+    return [
+        _Touch(
+            Frame(fit.points[i], fit.axes[i]),
+            float(fit.radii[i]),
+            curves.at(i),
+            fit.contacts[i, places : places + len(start.strokes[i])],
+            missed[i],
+            float(start.k1[i]),
+            float(start.k2[i]),
+            float(start.stds[i] / fit.radii[i]),
+            fit.degrees[i],
+            fit.posteriors and fit.posteriors.at(i),
+            fit.beside[i],
+        )
+        for i in range(len(fit.points))
+    ]
+
+
+def _fit(start: Start, options: Options) -> _Fit:
+    """The frames of the paper, or those of the joint fit."""
+    contacts, present = start.contacts()
+    tangents, count = start.curves.tangents @ start.axes, len(start.points)
+    degrees = [options.degree or 0] * count
+    plain = _Fit(start.points, start.axes, start.radii, contacts, tangents, degrees, None, [None] * count)
+    if options.method != "bayes" and options.degree is not None:
+        return plain
+    turns, posteriors, weights = _joint(start, contacts, present)
+    turned = contacts @ turns
+    if options.degree is None:
+        degrees = [posteriors.at(i).degree_shown(turned[i][present[i]]) for i in range(count)]
+    if options.method != "bayes":
+        return plain._replace(degrees=degrees)
+    joint = plain._replace(
+        axes=start.axes @ turns, contacts=turned, tangents=tangents @ turns, degrees=degrees
+    )
+    return _with_residuals(start, joint, posteriors, weights)
+
+
+def _with_residuals(start: Start, fit: _Fit, posteriors: Posterior, weights: Array) -> _Fit:
+    """The joint fit in unit radius, with residuals and in their frames where the contacts ask for them."""
+    points, axes, radii, contacts, tangents = fit[:5]
+    if start.alone:
+        level = levels(contacts, weights, posteriors)
+        contacts[..., 2] -= level[:, None]
+        points = points + (radii * level)[:, None] * axes[..., 2]
+    places = 0 if start.alone else start.curves.present[0].size
+    radii, contacts, farthest = _in_unit_radius(radii, contacts, places)
+    turns, farthest, posteriors, beside = rough_fit(
+        contacts,
+        weights,
+        posteriors.scaled(1.0 / farthest),
+        start.stds / radii,
+        (start.tangents[:, None] @ axes)[:, 0],
+        _normals(start.curves, axes, contacts),
+        through=not start.alone,
+    )
+    if any(residual is not None for residual in beside):
+        axes, contacts, tangents = axes @ turns, contacts @ turns, tangents @ turns
+        radii, contacts = radii * farthest, contacts / farthest[:, None, None]
+    return _Fit(points, axes, radii, contacts, tangents, fit.degrees, posteriors, beside)
+
+
+def _in_unit_radius(radii: Array, contacts: Array, places: int) -> tuple[Array, Array, Array]:
+    """The farthest of the first `places` contacts, or of all, put at 1; and where it was."""
+    farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, : places or None].max(axis=1)
+    return radii * farthest, contacts / farthest[:, None, None], farthest
+
+
+def _joint(start: Start, contacts: Array, present: NDArray[np.bool_]) -> tuple[Array, Posterior, Array]:
+    """The joint fit of all the contacts of each touch."""
+    normals = _normals(start.curves, start.axes, contacts)
+    tangent, accuracy = (start.tangents[:, None] @ start.axes)[:, 0], start.stds / start.radii
+    first, through = (start.k1, start.k2, tangent, accuracy), not start.alone
+    most = present.sum(axis=1).max()
+    if most == present.shape[1]:
+        return joint_fit(contacts, present.astype(float), *first, normals, through)
+    # Short curves beside a long one are filled up with what costs time.
+    kept = np.argsort(~present, axis=1, kind="stable")[:, :most]
+    rows = np.arange(len(kept))[:, None]
+    few, some = contacts[rows, kept], present[rows, kept].astype(float)
+    normals = None if normals is None else normals[rows, kept]
+    turns, posteriors, found = joint_fit(few, some, *first, normals, through)
+    weights = np.zeros(present.shape)
+    weights[rows, kept] = found
+    return turns, posteriors, weights
+
+
+def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
+    """The measured normals in these axes, in the shape of the contacts; of strokes there are none."""
+    if curves.normals is None:
+        return None
+    normals = np.zeros_like(contacts)
+    normals[:, : curves.present[0].size] = (curves.normals @ axes[:, None]).reshape(len(contacts), -1, 3)
+    return normals
+
+
+def _result(
+    touch: _Touch, contours: Sequence[Contour], options: Options
+) -> Reconstruction | DegenerateCurvesError:
+    try:
+        domain = domain_of(touch.curves) if contours else hull_domain(touch.strokes[:, :2], 1.0)
+    except ValueError:
+        return DegenerateCurvesError(
+            "the curves end in fewer than three places apart from each other, so they bound no patch: "
+            "turn the sampling planes, or move the point away from the edge"
+            if contours
+            else "the point is beside the strokes or at their rim: give a place among them"
+        )
+    converged = True
+    if touch.posterior is None:
+        paper = options.method, options.weight, options.solver
+        a, converged = coefficients(touch.curves, touch.k1, touch.k2, touch.degree, domain, *paper)
+        patch = MongePatch(touch.k1, touch.k2, a)
+    else:
+        patch = touch.posterior.patch(touch.degree)
+    scale = touch.radius
+    surface = patch if touch.posterior is None else touch.posterior.patch(DEGREE)
+    domain = Domain(domain.ends * scale)
+    return Reconstruction(
+        Geometry(touch.frame, scale, surface.scaled(scale), domain, touch.residual),
+        patch.scaled(scale),
+        tuple(contours),
+        scale * touch.misses[: len(contours)],
+        accuracy=touch.accuracy,
+        method=options.method,
+        converged=converged,
+        strokes=touch.frame.to_world(scale * touch.strokes),
+        joint_posterior=touch.posterior,
+    )
