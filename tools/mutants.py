@@ -147,15 +147,15 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=300.0, help="for a module's tests (%(default)g)")
     options = parser.parse_args()
     every = [place for module in options.modules or TESTS for place in places_of(module)]
-    chosen = random.Random(options.seed).sample(every, min(options.count, len(every)))[options.first :]
+    drawn = random.Random(options.seed).sample(every, min(options.count, len(every)))[options.first :]
+    chosen = [mutant_at(*place) for place in drawn]  # now: the checkout may change meanwhile
     outcomes = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         for name in COPIED:
             copied = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
             copied(ROOT / name, place / name)
-        for number in chosen:
-            mutant = mutant_at(*number)
+        for mutant in chosen:
             outcomes.append(outcome(mutant, place, options.seconds))
             if outcomes[-1] == "survived":
                 print(mutant.said, flush=True)
