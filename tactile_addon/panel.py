@@ -9,6 +9,7 @@ import bpy
 from bpy.props import StringProperty
 
 from .comparison.register_operator import TACTILE_OT_register
+from .comparison.verification_wording import verification_rows, verification_table
 from .comparison.verify_operator import TACTILE_OT_verify
 from .probes import probe
 from .probes.operators import TACTILE_OT_reconstruct
@@ -26,12 +27,7 @@ from .stability_map.map_operator import TACTILE_OT_stability_map
 from .stability_map.map_report import map_rows, median_rows
 from .touch import units
 from .touch.settings import draw_chosen, draw_sensor, draw_solver
-from .touch.wording import (
-    patch_rows,
-    registration_summary,
-    verification_rows,
-    verification_table,
-)
+from .touch.wording import patch_rows, registration_summary
 from .viewport.pick import TACTILE_OT_pick
 
 TAB = "Tactile"

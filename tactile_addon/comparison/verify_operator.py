@@ -14,7 +14,7 @@ from ..scene import mesh_data, patch_object
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import reachable
 from ..touch.touch_report import judgment
-from ..touch.wording import verification_summary
+from .verification_wording import verification_summary
 
 
 def verify_patch(patch, target, depsgraph):

@@ -8,15 +8,12 @@ import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
-
-import numpy as np
 
 from ... import core
 from ...core.arguments import LARGEST
 from ..touch import units
-from . import contact_rows, whole_file
-from .contact_rows import NORMAL, POINT
+from . import contact_rows, ply_contacts, whole_file
+from .contact_rows import NORMAL, POINT, Contacts
 
 VERSION = 2
 TITLE = "# Tactile Patch contacts, version "
@@ -24,28 +21,6 @@ LENGTHS = dict(units.METERS.values())  # meters in each unit
 DIRECTIONS, DEVIATIONS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
 NAMES = ("curve", "time", *POINT, *NORMAL)
 STROKE = "stroke"  # the name of a curve that runs beside the reference point begins with it
-BLOCK = 1000  # rows of a .ply that are read together
-PLY_TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-}
-PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-
-
-class Contacts(NamedTuple):
-    """What a file holds: contours and strokes, its unit or "", the point and outward direction or None."""
-
-    contours: list
-    unit: str
-    point: list | None = None
-    outward: list | None = None
-    strokes: tuple = ()
 
 
 def read(path):
@@ -57,7 +32,7 @@ def read(path):
     path = Path(path)
     if not path.is_file():
         raise OSError(f'there is no file "{path}"')
-    readers = {".csv": _read_csv, ".txt": _read_csv, ".tsv": _read_csv, ".ply": _read_ply}
+    readers = {".csv": _read_csv, ".txt": _read_csv, ".tsv": _read_csv, ".ply": ply_contacts.read}
     if path.suffix.lower() not in readers:
         raise OSError(f'cannot read "{path.name}": wanted a .csv or .ply file of contacts')
     try:
@@ -240,95 +215,3 @@ def _parts(title):
     if mark and rest[-1:] not in ("]", ")"):
         return "", "", ""
     return name.rstrip(), rest[:-1].strip(), ""
-
-
-def _read_ply(name, path):
-    data = path.read_bytes()
-    end = data.find(b"end_header")
-    lines = [line.split() for line in data[: max(end, 0)].decode("latin-1").splitlines()]
-    order = PLY_ORDERS.get(lines[1][1]) if len(lines) > 1 and len(lines[1]) > 1 else None
-    if not data.startswith(b"ply") or end < 0 or order is None:
-        raise ValueError(f"{name}: wanted the header of a .ply file, got another or half of one")
-    below = data.find(b"\n", end) + 1 or len(data)
-    before, count, fields = _ply_vertices(name, lines, order)
-    text = data[below:].splitlines() if lines[1][1] == "ascii" else None
-    sizes = [number * (1 if text is not None else np.dtype(kinds).itemsize) for kinds, number in before]
-    start, size = sum(sizes), 1 if text is not None else np.dtype(fields).itemsize
-    if (len(data) - below if text is None else len(text)) < start + count * size:
-        raise ValueError(f"{name}: wanted {count} contacts, got a file that ends before: is it whole?")
-    if text is None:
-        rows = np.frombuffer(data, fields, count, below + start)
-    else:
-        rows = _ply_rows(name, len(lines) + 2 + start, text[start : start + count], fields)
-    table = {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
-    points = np.column_stack([table[key] for key in POINT])
-    wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN is nowhere
-    if wild.any():
-        at = f"{name}, contact {np.argmax(wild) + 1}"
-        raise ValueError(f"{at}: wanted finite coordinates up to {LARGEST:g}, got others")
-    normals = np.column_stack([table[key] for key in NORMAL]) if set(NORMAL) <= set(table) else None
-    labels, titles = _in_order(table.get("curve", np.ones(count)))
-    contours = contact_rows.contours(name, labels, points, normals, table.get("time"), titles)
-    if not {"curve", "time"} & set(table):  # bare points, in no order
-        return Contacts([], "", strokes=tuple(contours))
-    return Contacts(contours, "")
-
-
-def _in_order(labels):
-    """Numbers from 0 in the order in which the labels first appear, and which label each stands for."""
-    titles, first, places = np.unique(labels, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return rank[places.ravel()], titles[order].tolist()
-
-
-def _ply_vertices(name, lines, order):
-    """(fields, how many) of the rows before the vertices; how many vertices there are, and their fields."""
-    elements = []
-    for line in lines[2:]:
-        try:
-            if line[:1] == ["element"]:
-                elements.append((line[1], int(line[2]), []))
-            elif line[:1] == ["property"]:
-                elements[-1][2].append(
-                    (line[-1].lower(), "list" if line[1] == "list" else PLY_TYPES[line[1]])
-                )
-        except (IndexError, ValueError, KeyError):
-            raise ValueError(f'{name}: wanted an element or a property, got "{" ".join(line)}"') from None
-    before = []
-    for element, count, properties in elements:
-        if count < 0 or any(kind == "list" for _, kind in properties):
-            break
-        fields = [(key, order + kind) for key, kind in properties]
-        if element == "vertex":
-            if not {*POINT} <= {*dict(fields)} or count < 1 or len(dict(fields)) < len(fields):
-                break
-            return before, count, fields
-        before.append((fields, count))
-    raise ValueError(f"{name}: wanted vertices with the properties x, y and z, got none of that kind")
-
-
-def _ply_rows(name, first, lines, fields):
-    """The values of lines of text, the first of them the file's line `first`."""
-    rows = np.empty(len(lines), [(key, "f8") for key, _ in fields])
-    for start in range(0, len(lines), BLOCK):
-        words = [line.decode("latin-1").split() for line in lines[start : start + BLOCK]]
-        some = rows[start : start + BLOCK]
-        try:
-            columns = list(zip(*words, strict=True))
-            for (key, _), column in zip(fields, columns, strict=True):
-                some[key] = contact_rows.numbers_of(column)
-        except ValueError:
-            _refuse_ply_row(name, first + start, words, fields)
-    return rows
-
-
-def _refuse_ply_row(name, first, words, fields):
-    """Raises ValueError for the first row that is none."""
-    for number, row in enumerate(words, first):
-        at = f"{name}, line {number}"
-        if len(row) != len(fields):
-            raise ValueError(f"{at}: wanted {len(fields)} numbers, got {len(row)}")
-        for (key, _), word in zip(fields, row, strict=True):
-            contact_rows.number_of(f'{at}, "{key}"', word)

@@ -4,6 +4,7 @@
 
 import csv
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,16 @@ from ...core.arguments import LARGEST
 POINT, NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
 BLOCK = 1 << 16  # letters that are looked at together
 MIX = np.array([1.0, math.pi, math.e])  # makes one number of a point, which few others share
+
+
+class Contacts(NamedTuple):
+    """What a file holds: contours and strokes, its unit or "", the point and outward direction or None."""
+
+    contours: list
+    unit: str
+    point: list | None = None
+    outward: list | None = None
+    strokes: tuple = ()
 
 
 def blocks(text, start=0, number=1):

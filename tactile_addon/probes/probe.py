@@ -24,8 +24,8 @@ from mathutils import Matrix, Vector
 
 from ..scene import patch_object
 from ..scene.family import children_of
+from ..touch.evaluated_mesh import checksum_of, is_disabled
 from ..touch.settings import OVERRIDABLE, TouchSettings, changed, touch_arguments
-from ..touch.surface import checksum_of, is_disabled
 from ..touch.touch_object import touch, verify
 from ..touch.wording import sentence
 from . import anchor

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import core
 from ..touch.detached_mesh import MeshSnapshot
-from ..touch.surface import coordinates, evaluated_object
+from ..touch.evaluated_mesh import coordinates, evaluated_object
 from ..touch.touch_object import STEPS, require_fine, require_lengths
 
 EXTENT_SHARE = 1.0 / 8.0  # Share of the object's size, where no extent is given.

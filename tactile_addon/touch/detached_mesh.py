@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from .surface import coordinates, disabled, evaluated_object, product, size_of
+from .evaluated_mesh import coordinates, disabled, evaluated_object, product, size_of
 
 
 class MeshSnapshot:

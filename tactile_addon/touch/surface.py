@@ -3,12 +3,12 @@
 """A mesh object of the scene as a surface to touch: as it evaluates, in world coordinates."""
 
 import math
-import zlib
 from functools import cached_property
 
 import numpy as np
 
-FARTHEST = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
+from .evaluated_mesh import coordinates, disabled, evaluated_object, product, size_of
+
 SOME = 8  # times as many vertices as are wanted, that are looked at before all of them are
 WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
 
@@ -178,96 +178,3 @@ class MeshSurface:
         x, y, z = product(self._normal_rows, *normal)
         length = math.hypot(x, y, z)
         return x / length, y / length, z / length
-
-
-def checksum_of(obj, depsgraph):
-    """Another number for another shape of the evaluated mesh in the object's coordinates.
-
-    Raises ValueError, with a sentence, where the object cannot be touched.
-    """
-    evaluated, _, _ = evaluated_object(obj, depsgraph)
-    co = coordinates(obj.name, evaluated)
-    try:  # a ray that leaves from beyond all needs an evaluated mesh, but no tree of its faces
-        evaluated.ray_cast((1e18, 0.0, 0.0), (1.0, 0.0, 0.0), distance=1e-30, depsgraph=depsgraph)
-    except RuntimeError as error:
-        raise disabled(obj) from error
-    return zlib.crc32(co)
-
-
-def is_disabled(obj):
-    """Whether it is disabled in viewports, yet perhaps evaluated, as somebody's parent."""
-    return obj.hide_viewport or (
-        bool(obj.users_collection) and all(found.hide_viewport for found in obj.users_collection)
-    )
-
-
-def disabled(obj):
-    """The error to raise for an object that Blender has not evaluated."""
-    return ValueError(
-        f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
-    )
-
-
-def evaluated_object(obj, depsgraph):
-    """The evaluated object and its transform: linear part and origin.
-
-    Raises ValueError, with a sentence, where it cannot be touched; but for disabled objects.
-    """
-    if obj.type != "MESH":
-        raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
-    if is_disabled(obj):
-        raise disabled(obj)
-    evaluated = obj.evaluated_get(depsgraph)
-    if obj.data.is_editmode:
-        # The evaluated mesh is an empty shell around the edited one until somebody asks for it.
-        evaluated.to_mesh()
-        evaluated.to_mesh_clear()
-    matrix = np.array(evaluated.matrix_world, dtype=float)
-    _require_invertible(obj.name, matrix[:3, :3])
-    if not len(evaluated.data.polygons):
-        raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
-    return evaluated, matrix[:3, :3], matrix[:3, 3]
-
-
-def coordinates(name, evaluated):
-    """Coordinates of all vertices of an evaluated object, in it, (n, 3) float32.
-
-    Raises ValueError, with a sentence, where they are not all at a place that can be touched.
-    """
-    co, matrix = _coordinates(evaluated.data), np.array(evaluated.matrix_world, dtype=float)
-    largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
-    if not math.isfinite(largest):
-        raise ValueError(f'"{name}" has vertices at no finite place: delete them, or mend its modifiers')
-    reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
-    if not reach <= FARTHEST:  # NaN is nowhere
-        raise ValueError(f'"{name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
-    return co
-
-
-def size_of(evaluated, linear):
-    """The longest edge of the bounding box, in the world."""
-    edges = np.ptp(np.array(evaluated.bound_box), axis=0)
-    return float((edges * np.linalg.norm(linear, axis=0)).max())
-
-
-def _coordinates(mesh):
-    """Coordinates of all vertices, (n, 3) float32; the attribute, where there is one, is 30 times faster."""
-    co = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    position = mesh.attributes.get("position")  # none in edit mode
-    if position is None:
-        mesh.vertices.foreach_get("co", co.ravel())
-    else:
-        position.data.foreach_get("vector", co.ravel())
-    return co
-
-
-def _require_invertible(name, linear):
-    lengths = np.linalg.norm(linear, axis=0)
-    if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
-        raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')
-
-
-def product(rows, x, y, z):
-    """A matrix, as rows of Python floats, times a vector."""
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z

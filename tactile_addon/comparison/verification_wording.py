@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A verification as tables and sentences for people, and as the columns of a file."""
+
+from ..touch import units
+from ..touch.wording import SPREAD
+
+# What core.verify finds, in the order of a table.
+VERIFIED = (
+    *("vertices", *(f"vertex_distance_{key}" for key in SPREAD)),
+    *("contacts", *(f"contact_distance_{key}" for key in SPREAD), "fit_error"),
+    *("extra_contours", "extra_points", "extra_fit_error"),
+    *("total_absolute_curvature", "overlap"),
+)
+
+
+def verification_summary(record):
+    """Whether a verification gives reason to doubt, and what it has found, in a sentence."""
+    found = record["verification"]
+    name, vertices, percent = found["target"], found["vertices"], 100.0 * found["overlap"]
+    if not (vertices or percent or found["extra_points"]):
+        return True, f'Nothing of "{name}" is below the patch: move one to the other, or choose another mesh'
+    if not vertices:
+        return True, f'No vertex of "{name}" is over the patch, of which it covers {percent:.0f} %'
+    if record["status"] != "ok":
+        return True, record["message"]
+    mean, most = found["vertex_distance_mean"], found["vertex_distance_max"]
+    return False, (
+        f'{vertices} vertices of "{name}" are {mean:.3g} off the patch in the mean, {most:.3g} at most; it '
+        f"covers {percent:.0f} %"
+    )
+
+
+def verification_columns(report):
+    """(heading, value) of the row of a patch; the value is empty where there is none."""
+    found = report["verification"]
+    lengths = [key for key in VERIFIED if "distance" in key or "error" in key]
+    return [
+        *((key, report[key]) for key in ("patch", "source", "status")),
+        ("target", found["target"]),
+        *((f"{key} [unit of the file]" if key in lengths else key, found.get(key, "")) for key in VERIFIED),
+    ]
+
+
+def verification_table(found, unit):
+    """Rows of a label and what a verification found for the mesh and for the contacts."""
+
+    def lengths(key):
+        return (_length(found, f"{what}_distance_{key}", unit) for what in ("vertex", "contact"))
+
+    names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
+    return [
+        ("Distance", "Mesh", "Contacts"),
+        *((name, *lengths(key)) for name, key in names),
+        ("Points", str(found["vertices"]), str(found["contacts"])),
+    ]
+
+
+def verification_rows(found, unit):
+    """(label, value) of what else a verification found."""
+    return [
+        ("Fit Error on Curves", _length(found, "fit_error", unit)),
+        (f"… on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
+        ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
+        ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
+    ]
+
+
+def _length(found, key, unit):
+    return units.say(found[key], 1, unit) if key in found else "–"
