@@ -6,7 +6,8 @@ Beside the paper. Half curves grow outward from the reference point like the reg
 by surface fitting: fit, go on where the fit explains the contacts, fit again (growth.py).
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,21 +15,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vector
-from ..contours.contour import SamplingPlane
+from ..contours.contour import EXTENT, Contour, SamplingPlane
 from ..contours.tracking import Surface, generator_of, track
 from ..reconstruction.deviations import with_height_stds
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from .one_touch import Answer, Ask, Exploration, Steps, Touch
 
+MOST_EVEN = 24  # At most so many planes are laid out evenly.
+COARSE_STEPS = 8  # Contacts of a half curve that only tell whether it ends.
+LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
+
 
 def explore(
     surface: Surface,
     point: ArrayLike,
     outward: ArrayLike,
-    planes: Sequence[SamplingPlane],
+    planes: int | Sequence[SamplingPlane] = 3,
     *,
-    farthest: float,
+    farthest: float | None = None,
     tolerance: float | None = None,
     most_planes: int = 6,
     extent: float | str = "auto",
@@ -36,27 +41,49 @@ def explore(
     noise: float = 0.0,
     rng: np.random.Generator | int | None = None,
     tangent: ArrayLike | None = None,
-    **fit: Any,
+    method: str = "bayes",
+    degree: int | str = 4,
+    weight: float | None = None,
+    solver: str = "fast",
 ) -> Exploration:
     """Tracks `surface` from `point` and reconstructs the patch, as large and as densely felt as it needs.
 
-    farthest : the longest that a half curve may become
+    planes : as in `track`, or how many, k: then their azimuths are pi i / k
+    farthest : the longest that a half curve may become; None for as long as curves go on before they end
     tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
         added, up to `most_planes`, as long as one takes a tenth off. None for the given planes only
     extent : of each half curve, as in `track`; "auto" has each grow until the default fit no longer
         explains its contacts by their accuracy, or the patch could be trusted no longer
     step : as in `track`; "auto" for so many contacts that twice as many would not lower the deviation of
         the height noticeably
-    fit : what `reconstruct` takes; all else as in `track`
+    noise, rng, tangent : as in `track`; the fit is not told of the noise otherwise
+    method, degree, weight, solver : as in `reconstruct`
 
     Where a contour was not followed any farther, its `stops` say UNEXPLAINED. Raises what `track` and
-    `reconstruct` raise.
+    `reconstruct` raise, and ValueError where curves do not end and `farthest` is None.
+
+    >>> found = explore(surface, (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), tolerance=0.01)  # doctest: +SKIP
+    >>> found.result.patch.k1, found.result.k1_std, found.extent, len(found.planes)  # doctest: +SKIP
     """
-    p = finite_array("point", point, (3,), LARGEST)
-    up = unit_vector("outward", outward)
-    wanted = _wanted(planes, farthest, tolerance, most_planes, extent, step, fit)
-    sensor = {"noise": noise, "rng": generator_of(rng), "tangent": tangent}
-    (found,) = _side_by_side([_touch(surface, p, up, wanted, sensor).steps()], p[None], up[None], fit)
+    p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
+    (found,) = explore_many(
+        surface,
+        p[None],
+        up[None],
+        planes,
+        farthest=farthest,
+        tolerance=tolerance,
+        most_planes=most_planes,
+        extent=extent,
+        step=step,
+        noise=noise,
+        rng=rng,
+        tangent=tangent,
+        method=method,
+        degree=degree,
+        weight=weight,
+        solver=solver,
+    )
     if isinstance(found, ValueError):
         raise found
     return found
@@ -66,9 +93,9 @@ def explore_many(
     surface: Surface,
     points: ArrayLike,
     outward: ArrayLike,
-    planes: Sequence[SamplingPlane],
+    planes: int | Sequence[SamplingPlane] = 3,
     *,
-    farthest: float,
+    farthest: float | None = None,
     tolerance: float | None = None,
     most_planes: int = 6,
     extent: float | str = "auto",
@@ -76,7 +103,10 @@ def explore_many(
     noise: float = 0.0,
     rng: np.random.Generator | int | None = None,
     tangent: ArrayLike | None = None,
-    **fit: Any,
+    method: str = "bayes",
+    degree: int | str = 4,
+    weight: float | None = None,
+    solver: str = "fast",
 ) -> list[Exploration | ValueError]:
     """What `explore` gives at each of m points; side by side, with their fits in stacks, which is faster.
 
@@ -87,45 +117,60 @@ def explore_many(
     p = finite_array("points", points, (None, 3), LARGEST)
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
-    wanted = _wanted(planes, farthest, tolerance, most_planes, extent, step, fit)
-    sensor = {"noise": noise, "rng": generator_of(rng), "tangent": tangent}
-    steps = [_touch(surface, *place, wanted, sensor).steps() for place in zip(p, up, strict=True)]
-    return _side_by_side(steps, p, up, fit)
-
-
-def _wanted(
-    planes: Sequence[SamplingPlane],
-    farthest: float,
-    tolerance: float | None,
-    most_planes: int,
-    extent: float | str,
-    step: float | str,
-    fit: dict[str, Any],
-) -> dict[str, Any]:
-    """Of a Touch, checked."""
-    length, between = _given("extent", extent), _given("step", step)
-    return {
-        "planes": tuple(list_of("planes", planes, SamplingPlane)),
+    length, generator = _given("extent", extent), generator_of(rng)
+    wanted: dict[str, Any] = {
+        "planes": _planes(planes),
         "extent": length,
-        "step": between,
-        "farthest": number("farthest", farthest, above=0.0) if length is None else length,
+        "step": _given("step", step),
+        "farthest": length or (None if farthest is None else number("farthest", farthest, above=0.0)),
         "tolerance": None if tolerance is None else number("tolerance", tolerance, least=0.0),
         "most_planes": number("most_planes", most_planes, least=3.0),
-        "is_grown": fit.get("method", "bayes") == "bayes",
+        "is_grown": method == "bayes",
     }
+
+    def steps(point: Array, direction: Array) -> Steps:
+        """Those of one touch."""
+        reference = SamplingPlane(0.0).axes(direction, tangent)
+        feel = partial(track, surface, point, direction, tangent=tangent)
+        farthest = wanted["farthest"] or _farthest(partial(feel, wanted["planes"]))
+        noisy = partial(feel, noise=noise, rng=generator)
+        return (yield from Touch(noisy, point, reference, **wanted | {"farthest": farthest}).steps())
+
+    fit = {"method": method, "degree": degree, "weight": weight, "solver": solver}
+    return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, fit)
+
+
+def _planes(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
+    if not isinstance(planes, int | np.integer):
+        return tuple(list_of("planes", planes, SamplingPlane))
+    if not 3 <= planes <= MOST_EVEN:
+        raise ValueError(f"planes: wanted 3 to {MOST_EVEN}, or sampling planes, got {planes}")
+    return tuple(SamplingPlane(math.pi * i / planes) for i in range(planes))
+
+
+def _farthest(feel: Callable[..., list[Contour]]) -> float:
+    """A length, within a factor of two, at which all half curves end before it."""
+
+    def ended(length: float) -> bool:
+        """Whether all do, felt coarsely; where nothing can be felt the length is beyond all."""
+        try:
+            contours = feel(extent=length, step=length / COARSE_STEPS)
+        except ValueError:
+            return True
+        return not any(EXTENT in (contour.stops or ()) for contour in contours)
+
+    length, factor = 1.0, 0.5 if ended(1.0) else 2.0
+    while 1.0 / LONGEST < length < LONGEST:
+        length *= factor
+        if ended(length) is (factor > 1.0):
+            return max(length, length / factor)
+    raise ValueError("The curves do not end by themselves: say how far to feel at most, by farthest")
 
 
 def _given(name: str, length: float | str) -> float | None:
     """None for "auto"."""
     automatic = isinstance(length, str) and length == "auto"
     return None if automatic else number(name, length, above=0.0)  # type: ignore[arg-type]
-
-
-def _touch(
-    surface: Surface, point: Array, outward: Array, wanted: dict[str, Any], sensor: dict[str, Any]
-) -> Touch:
-    reference = SamplingPlane(0.0).axes(outward, sensor["tangent"])
-    return Touch(partial(track, surface, point, outward, **sensor), point, reference, **wanted)
 
 
 def _side_by_side(

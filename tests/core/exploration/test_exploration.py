@@ -291,3 +291,41 @@ def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
         share = twice.mean_height_std / once.mean_height_std
         if abs(share - (1.0 - NOTICEABLE)) > 0.1:
             assert is_enough(once) == (share > 1.0 - NOTICEABLE)
+
+
+def test_how_far_to_feel_is_found_where_curves_end_by_themselves():
+    ball = surfaces.sphere(20.0)
+    found = core.explore(ball, ball.point, ball.normal)
+    assert 5.0 < found.extent < 20.0
+    assert found.result.status == "ok"
+
+    class Scaled:
+        """The ball sixteen times as large, which is another power of two."""
+
+        def ray_cast(self, origin, direction, distance):
+            hit = ball.ray_cast([v / 16.0 for v in origin], direction, distance / 16.0)
+            return hit and ([16.0 * v for v in hit[0]], hit[1])
+
+    larger = core.explore(Scaled(), 16.0 * np.array(ball.point), ball.normal)
+    assert larger.extent == pytest.approx(16.0 * found.extent)
+    assert 16.0 * larger.result.patch.k1 == pytest.approx(found.result.patch.k1, rel=1e-6)
+
+
+def test_a_surface_without_an_end_asks_how_far_to_feel():
+    with pytest.raises(ValueError, match="The curves do not end by themselves: say how far to feel at most"):
+        core.explore(surfaces.plane(), (0.0, 0.0, 0.0), UP)
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_planes_may_be_a_number_of_evenly_laid_out_ones(count):
+    ball = surfaces.sphere(20.0)
+    planes = [core.SamplingPlane(np.pi * i / count) for i in range(count)]
+    counted, given = (explore(ball, ball.point, ball.normal, planes=p) for p in (count, planes))
+    assert counted.planes == tuple(planes)
+    assert counted.result.patch.k1 == given.result.patch.k1
+
+
+@pytest.mark.parametrize("planes", [2, 25, 0])
+def test_too_few_or_too_many_planes_are_refused(planes):
+    with pytest.raises(ValueError, match="planes: wanted 3 to 24, or sampling planes, got"):
+        explore(surfaces.plane(), planes=planes)
