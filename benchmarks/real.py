@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How near the fits come to real surfaces, and whether their intervals are true there.
 
-`python -m benchmarks.real [--points N] [--only fixed | automatic | choose]`, from the root of a checkout; bpy
-to read the scans and to cast rays, scikit-learn for the Gaussian process. Prints Markdown tables:
+`python -m benchmarks.real [--points N] [--only fixed | automatic | choose] [--chart]`, from the root of a
+checkout; bpy to read the scans and to cast rays, scikit-learn for the Gaussian process. Prints Markdown
+tables:
 
 (a) scans touched without noise at random points (seeded, by area) with three to six planes, half curves of
 1/32, 1/16 and 1/8 of the object in twelve steps: the mean |dz| over some 90 points of the mesh above the
@@ -14,6 +15,7 @@ score (its width, and twenty times what is beyond it);
 refused, how many doubts are right, and how many of the sure are off.
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
+With `--chart` the same is drawn, build/charts/real_surfaces.png.
 With `choose` the residual's constants are chosen on all scans but one, for each, and judged on that one.
 """
 
@@ -183,14 +185,14 @@ def score(fit, touch, radius):
 
 
 def fixed_scores(scan, count, methods):
-    """{(planes, extent): {method: mean Score}} of a scan, and seconds {method: [...]}."""
+    """{(planes, extent): {method: mean Score}} of a scan, and seconds {(method, planes): [...]}."""
     scores, seconds = defaultdict(lambda: defaultdict(list)), defaultdict(list)
     for cell, touch, radius in touches(scan, count):
         for name, method in methods.items():
             start = perf_counter()
             fit = method(touch)
             fit.height(*np.resize(touch.hold_out @ fit.axes, (300, 3))[:, :2].T)
-            seconds[name].append(perf_counter() - start)
+            seconds[name, cell[0]].append(perf_counter() - start)
             scores[cell][name].append(score(fit, touch, radius))
     means = {c: {m: Score(*np.mean(s, axis=0)) for m, s in of.items()} for c, of in scores.items()}
     return means, seconds
@@ -238,7 +240,8 @@ def time_table(scores, seconds):
     rows = []
     for method in METHODS:
         error = np.mean([cell[method].error for of in scores.values() for cell in of.values()])
-        rows.append([method, f"{error:.2f}", f"{1e3 * median(seconds[method]):.2f}"])
+        times = [time for (name, _), values in seconds.items() if name == method for time in values]
+        rows.append([method, f"{error:.2f}", f"{1e3 * median(times):.2f}"])
     table(["method", "error", "ms"], rows)
 
 
@@ -266,6 +269,7 @@ def automatic_row(scan, count):
         1e3 * sum(r.domain.area for r, _ in sure),
         1e3 * median([r.radius for r, _ in sure] or [0.0]),
         1e3 * median(seconds or [0.0]),
+        1e3 * np.mean([off / r.radius for r, off in sure + doubtful]),
     ]
 
 
@@ -310,8 +314,8 @@ SETTINGS = {
         "LENGTHS": np.array(lengths),
         "AMPLITUDES": np.array(amplitudes),
     }
-    for lengths in ((0.3, 0.6), (0.4, 0.8), (0.4, 1.0))
-    for amplitudes in ((0.002, 0.008, 0.03), (0.004, 0.016, 0.064), (0.004, 0.022, 0.12))
+    for lengths in ((0.3, 1.2), (0.4, 0.8), (0.4, 1.6))
+    for amplitudes in ((0.004, 0.022, 0.12), (0.004, 0.022, 0.12, 0.4), (0.003, 0.01, 0.04, 0.14, 0.5))
 }
 
 
@@ -343,6 +347,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--points", type=int, default=100, help="of each scan (%(default)s)")
     parser.add_argument("--only", choices=("fixed", "automatic", "choose"), help="a part")
+    parser.add_argument("--chart", action="store_true", help="draw as well")
     parser.add_argument("--scan", default="", help="only those with this in their names")
     options = parser.parse_args()
     paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
@@ -361,7 +366,12 @@ def main():
         fixed_tables(scores)
         time_table(scores, seconds)
     if options.only != "fixed":
-        automatic_table({scan.name: automatic_row(scan, options.points) for scan in scans})
+        rows = {scan.name: automatic_row(scan, options.points) for scan in scans}
+        automatic_table(rows)
+    if options.chart and options.only is None:
+        from .real_chart import draw
+
+        draw(scores, seconds, np.mean([[row[10], row[9]] for row in rows.values()], axis=0))
     print(f"{options.points} points of each scan; {machine('bpy', 'numpy', 'scipy')}.")
 
 
