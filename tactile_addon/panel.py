@@ -108,16 +108,16 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             return
         _draw_colors(context, layout, patch, "tactile_colors")
         box, unit = layout.box(), units.unit_of(context.scene, record["radius"])
-        outdated = record["status"] == "outdated"
-        if outdated and found is not None and found.tactile_probe.message:
-            pass  # which stands above already
-        else:
-            _draw_sentence(context, box, record["message"], ICONS.get(record["status"], "ERROR"))
-        if outdated:
+        if record["status"] == "outdated":
+            if found is None or not found.tactile_probe.message:  # which stands above
+                _draw_sentence(context, box, record["message"], "ERROR")
             if found is not None:
                 box.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
             box.label(text="Last Touch")
-        _draw_rows(box, patch_rows(record, unit), active=not outdated)
+            _draw_rows(box, patch_rows(record, unit), active=False)
+        else:
+            _draw_rows(box, patch_rows(record, unit))
+            _draw_sentence(context, box, record["message"], ICONS.get(record["status"], "ERROR"))
         if found is None:
             box.prop_search(patch, "tactile_target", context.scene, "objects")
         box.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")

@@ -10,7 +10,7 @@ from . import anchor
 from .probe import DIGEST, is_result, record_of
 
 _deleted = set()  # session_uids of targets
-_owners = {}  # those of contours, and of the patches they were seen with last
+_owners = {}  # those of contours, and of the patches they were seen with last: undo may bring them back
 
 
 def forget_target(probe):
@@ -73,23 +73,27 @@ def look_for_contours():
     for number, obj in there.items():
         if patch_object.CONTOURS in obj and obj.parent is not None:
             _owners[number] = obj.parent.session_uid
-    if any(number not in there or _is_left(there[number], there) for number in _owners):
+    if any(_is_left(obj, there) for obj in there.values()) or _unused_meshes():
         _remove_soon()
 
 
-def _is_left(lines, there):
-    return lines.parent is None and lines.is_editable and _owners.get(lines.session_uid) not in there
+def _is_left(obj, there):
+    """Whether it is contours whose patch is no longer there, but was."""
+    owner = _owners.get(obj.session_uid)
+    return owner is not None and owner not in there and obj.parent is None and obj.is_editable
+
+
+def _unused_meshes():
+    return [mesh for mesh in bpy.data.meshes if DIGEST in mesh and not mesh.users]
 
 
 def remove():
     """Takes away what was deleted, and what nothing is left of but a datablock that nobody uses; a timer."""
     there = {obj.session_uid: obj for obj in bpy.data.objects}
     gone = [there[number] for number in _deleted if number in there and not there[number].users]
-    left = [there[number] for number in _owners if number in there and _is_left(there[number], there)]
-    for number in [number for number in _owners if number not in there]:
-        del _owners[number]
+    left = [obj for obj in there.values() if _is_left(obj, there) and is_result(obj)]
     _deleted.clear()
-    patch_object.remove_objects([obj for obj in left if is_result(obj)])
+    patch_object.remove_objects(left)
     for obj in gone:
         bpy.data.objects.remove(obj)
-    patch_object.remove_meshes([mesh for mesh in bpy.data.meshes if DIGEST in mesh])
+    patch_object.remove_meshes(_unused_meshes())

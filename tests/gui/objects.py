@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: a probe and its patch as Blender's objects.
 
-What undo, playback, moving, deleting and clicking by mouse and keyboard do to them, with a picture after each.
+What undo, playback, moving, deleting and clicking do to them, with a picture after each.
 """
 
 import math

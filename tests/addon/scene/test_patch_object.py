@@ -94,6 +94,17 @@ def test_contours_go_with_a_patch_that_is_deleted_and_the_probe_says_so(empty, e
         assert there("Probe").tactile_probe.message == NO_PATCH
 
 
+def test_undo_of_what_came_after_leaves_no_contours_of_a_patch_that_was_deleted(empty, extension, there):
+    select(empty, there("Patch"))
+    by_hand(empty, empty.ops.object.delete)
+    tidy(extension)
+    select(empty, empty.data.objects["Sphere"])
+    step(empty, "undo")  # to what was stored before the contours went
+    tidy(extension)
+    assert names(empty) == [SET[0], SET[3]]
+    assert [mesh.name for mesh in empty.data.meshes] == ["Sphere"]
+
+
 @pytest.mark.parametrize("again", ["number", "button"])
 @pytest.mark.parametrize("idle", [True, False])
 def test_another_touch_makes_a_patch_again_with_the_contours_that_are_left(
