@@ -43,7 +43,7 @@ NEAR, TURN = 1.0, math.radians(2.0)  # mm
 AMBIGUOUS = 1.5
 FINE_TURNS = 36
 FIRST, KEPT = 6, 300  # contacts that all poses are judged by first; poses that are refined
-REFINED = 50  # of those, to the nearest scanned_mesh
+REFINED = 50  # of those, to the nearest triangles
 
 
 class Scan:

@@ -7,7 +7,7 @@ import sys
 import bpy
 import numpy as np
 
-from . import contact_file, whole_file
+from . import ply_contacts, whole_file
 
 HEADER = 1 << 16  # bytes in which that of a .ply comes to its end
 INCOMPLETE = "Blender has not written all of it"
@@ -111,5 +111,5 @@ def _size_of_ply(path, mesh):
         elif words[:2] == ["property", "list"]:
             size += count + 4 * len(mesh.loops)
         elif words[0] == "property":
-            size += count * np.dtype(contact_file.PLY_TYPES[words[1]]).itemsize
+            size += count * np.dtype(ply_contacts.PLY_TYPES[words[1]]).itemsize
     return size

@@ -270,7 +270,7 @@ def with_no_faces(bpy, patch):
     ("spoil", "sentence"),
     [
         (lambda bpy, patch: {"target": "Nobody"}, 'There is no object "Nobody"'),
-        (no_source, 'There is no object "Sphere"'),
+        (no_source, '"Sphere Patch" was touched on no mesh of this file: select the mesh'),
         (with_empty, '"Nothing" is no mesh'),
         (with_no_faces, '"Bare" has no faces'),
         (several, "2 meshes are selected: select one besides the patch"),

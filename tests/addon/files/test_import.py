@@ -126,7 +126,7 @@ def wiped(extension, path, marked, noise=0.02, also=()):
 @pytest.mark.parametrize("marked", [True, False])
 def test_strokes_alone_become_a_patch_around_a_place(extension, empty, tmp_path, marked):
     path = wiped(extension, tmp_path / "wiped.csv", marked)
-    options = {"point": list(SURFACE.point + 0.3), **({} if marked else {"strokes": True})}
+    options = {"point": list(SURFACE.point + 0.3), "noise": 0.02, **({} if marked else {"strokes": True})}
     patch, report = imported(empty, path, **options)
     assert report["status"] == "ok"
     assert (report["curves"], report["strokes"]) == (0, 12)

@@ -19,7 +19,7 @@ STEPS, SEED = int(os.environ.get("TACTILE_STEPS", "50")), int(os.environ.get("TA
 def tidy(extension):
     """What Blender does by itself in a window, and not here."""
     bpy.context.view_layer.update()
-    extension.tactile_addon.deleted.remove()
+    extension.tactile_addon.probes.deleted.remove()
     bpy.context.view_layer.update()
 
 

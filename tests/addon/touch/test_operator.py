@@ -220,19 +220,27 @@ def test_without_a_location_the_cursor_is_projected(empty, ball):
 def test_extent_and_step_suit_the_object_where_they_are_not_given(empty, ball):
     _, report = reconstruct(empty, location=TOP)
     assert 1.0 <= report["extent"] <= 2.0  # of a ball of radius 2 as much as a finger can see from the top
-    assert report["step"] == pytest.approx(report["extent"] / 12.0)
+    # Contacts are some of those that were felt, so they may be somewhat nearer to each other.
+    assert report["extent"] / 16.0 < report["step"] < 1.001 * report["extent"] / 12.0
     assert report["vertex_distance_max"] < 0.02 * report["radius"]
     assert report["message"].endswith(("trusted any more.", "extent allowed."))
 
 
 def test_the_chosen_extent_does_not_depend_on_how_the_object_is_turned(empty, ball):
+    """With the planes turned along, which are otherwise laid out by the axes of the world."""
     ball.scale = (1.0, 2.0, 0.5)
-    extents = []
+    extents, along = [], None
     for angle in (0.0, 0.7):
         ball.rotation_euler = (angle, 0.3 * angle, angle)
         empty.context.view_layer.update()
-        place = ball.matrix_world @ Vector(TOP)
-        extents.append(reconstruct(empty, target="Sphere", location=place)[1]["extent"])
+        turn = np.array(ball.rotation_euler.to_matrix())
+        touch = {"target": "Sphere", "location": ball.matrix_world @ Vector(TOP)}
+        axes = np.array(reconstruct(empty, **touch)[1]["axes"])
+        along = axes[:, 0] if along is None else turn @ along
+        first = math.atan2(-along @ axes[:, 2], along @ axes[:, 0])
+        azimuths = [first + i * math.pi / 3.0 for i in range(3)] + [0.0] * 3
+        _, report = reconstruct(empty, **touch, azimuths=azimuths)
+        extents.append(report["extent"])
     assert extents[0] == pytest.approx(extents[1], rel=1e-3)
 
 

@@ -294,7 +294,9 @@ def test_a_contradiction_is_counted_in_deviations_of_the_mean_and_in_radians():
     """Of a plane that contacts know all about, and normals that lean by .03 radians, good to .02 each."""
     rng = np.random.default_rng(9)
     contacts = np.column_stack([rng.uniform(-0.8, 0.8, (40, 2)), np.zeros(40)])
-    known = posterior.Posterior(np.zeros(27), 1e-12 * np.eye(27), np.array(1e-3), np.zeros((22, 22)))
+    known = posterior.Posterior(
+        np.zeros(27), 1e-12 * np.eye(27), np.array(1e-3), np.zeros((22, 22)), np.zeros(28)
+    )
     lean = np.array([np.sin(0.03) * 0.6, np.sin(0.03) * 0.8, np.cos(0.03)])
     deviations, angle = contradiction(contacts, np.tile(lean / 0.02, (40, 1)), known)
     assert deviations == pytest.approx(0.03 / 0.02 * np.sqrt(40.0), rel=1e-3)

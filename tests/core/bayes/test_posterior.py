@@ -317,7 +317,7 @@ def test_a_degree_will_do_whose_patch_departs_by_half_a_deviation(ratio, degree)
     contacts = np.column_stack([rng.uniform(-0.9, 0.9, (50, 2)), np.zeros(50)])
     mean = np.zeros(27)
     mean[14] = 0.1
-    alone = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)))
+    alone = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)), np.zeros(28))
     basis = monomials(contacts[:, 0], contacts[:, 1], posterior.TERMS)
     off = basis @ (mean - posterior.coefficients_of(alone.patch(4)))
     variance = np.sum(off**2) / ratio**2 / np.sum(basis**2)

@@ -19,7 +19,7 @@ WAVES = ((1.0, (0.27, 0.08, -0.14), 0.4), (0.8, (-0.1, 0.3, 0.19), 1.9), (0.9, (
 
 
 def ball(count=10000):
-    """Points all over the unit sphere (n, 3), and counterclockwise scanned_mesh."""
+    """Points all over the unit sphere (n, 3), and counterclockwise triangles."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
     across = np.sqrt(1.0 - z**2)
@@ -217,7 +217,7 @@ SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
         ({"vertices": np.zeros((4, 2))}, "vertices: wanted shape"),
         ({"vertices": [[0.0, 0.0, np.nan]]}, "vertices: wanted finite numbers"),
         ({"vertices": "mesh"}, "vertices: wanted numbers"),
-        ({"faces": []}, "faces: wanted scanned_mesh, got none"),
+        ({"faces": []}, "faces: wanted triangles, got none"),
         ({"faces": [[0, 1, 2, 0]]}, "faces: wanted shape"),
         ({"faces": [[0, 1, 3]]}, "faces: wanted whole numbers from 0 to 2"),
         ({"faces": [[0, 1, -1]]}, "faces: wanted whole numbers"),
