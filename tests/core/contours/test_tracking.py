@@ -255,7 +255,7 @@ def test_a_plane_leans_by_less_than_a_right_angle():
 @pytest.mark.parametrize(("spacings", "good"), [(90.0, False), (110.0, True)])
 def test_single_precision_may_round_by_a_hundredth_of_a_curves_size(spacings, good):
     spacing = float(np.spacing(np.float32(1e5)))
-    points = np.outer([0.0, 0.5, 1.0], [spacings * spacing, 0.0, 0.0]) + [1e5, 0.0, 0.0]
+    points = np.linspace([1e5, 0.0, 0.0], [1e5 + spacings * spacing, 0.0, 0.0], 3)
     assert len(Contour(points).points) == 3
     if good:
         assert len(Contour(points.astype(np.float32)).points) == 3
