@@ -250,3 +250,15 @@ def test_a_plane_leans_by_less_than_a_right_angle():
     for degrees in (-90.0, 90.0, 100.0):
         with pytest.raises(ValueError, match="tilt: wanted less than 90 degrees, got"):
             SamplingPlane(0.3, np.radians(degrees)).axes((0, 0, 1))
+
+
+@pytest.mark.parametrize(("spacings", "good"), [(90.0, False), (110.0, True)])
+def test_single_precision_may_round_by_a_hundredth_of_a_curves_size(spacings, good):
+    spacing = float(np.spacing(np.float32(1e5)))
+    points = np.linspace([1e5, 0.0, 0.0], [1e5 + spacings * spacing, 0.0, 0.0], 3)
+    assert len(Contour(points).points) == 3
+    if good:
+        assert len(Contour(points.astype(np.float32)).points) == 3
+    else:
+        with pytest.raises(ValueError, match="numbers of single precision are"):
+            Contour(points.astype(np.float32))
