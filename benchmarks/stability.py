@@ -536,7 +536,7 @@ def panel(axes, sweep, of, first):
     for part in (errors, conditions):
         part.set_xlim(-0.5, len(places) - 0.5)
         part.set_xticks([])
-        part.tick_params(labelsize=6, labeleft=first)
+        part.tick_params(labelsize=6, labelleft=first)
         part.minorticks_off()
     if first:
         errors.set_ylabel("error / L", fontsize=7)
