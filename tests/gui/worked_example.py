@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender with the extension installed: docs/worked_example.md as it is written.
 
-Needs pear.ply in the folder of the pictures. Contacts are simulated, their pose is forgotten, and they are read,
-registered and verified by the buttons' operators. The pictures for docs are lost.jpg and found.jpg.
+Needs pear.ply in the folder of the pictures. Contacts are simulated, their pose is forgotten, and they are
+read, registered and verified by the buttons' operators. The pictures for docs are lost.jpg and found.jpg.
 """
 
 import re
