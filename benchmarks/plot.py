@@ -32,7 +32,8 @@ def save(figure, name, caption, header, rows):
     """Writes build/charts/NAME.png, with the caption below, and NAME.csv, the table behind it."""
     OUTPUT.mkdir(parents=True, exist_ok=True)
     # Wrapped here, by an average character: matplotlib's own wrapping forgets what a tight box cuts off.
-    caption = textwrap.fill(caption, int(72.0 * figure.get_figwidth() / (0.55 * CAPTION_SIZE)))
+    width = int(72.0 * figure.get_figwidth() / (0.55 * CAPTION_SIZE))
+    caption = textwrap.fill(caption, width, break_on_hyphens=False)
     figure.text(0.01, 0.0, caption, ha="left", va="top", fontsize=CAPTION_SIZE, color="#555555")
     figure.savefig(OUTPUT / f"{name}.png", bbox_inches="tight", pad_inches=0.15)
     with open(OUTPUT / f"{name}.csv", "w", newline="") as file:
