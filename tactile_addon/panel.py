@@ -118,10 +118,9 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         else:
             _draw_rows(box, patch_rows(record, unit))
             _draw_sentence(context, box, record["message"], ICONS.get(record["status"], "ERROR"))
-        if found is None:
-            box.prop_search(patch, "tactile_target", context.scene, "objects")
         box.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
         if found is None:
+            box.prop_search(patch, "tactile_target", context.scene, "objects")
             box.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
         if "registration" in record:
             _draw_sentence(context, box, registration_summary(record["registration"]), "SNAP_ON")

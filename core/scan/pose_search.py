@@ -88,7 +88,7 @@ def _coarse(felt: Array, mesh: Mesh) -> Array:
     """The most promising places, moved to where the contacts are nearest to the planes of triangles."""
     from scipy.spatial.transform import Rotation
 
-    touch = felt[:, :: math.ceil(felt.shape[1] / CONTACTS)]
+    felt = felt[:, :: math.ceil(felt.shape[1] / CONTACTS)]
     places, fields = _fields(mesh, 1.05 * np.linalg.norm(felt[0], axis=1).max())
     turns = Rotation.from_rotvec(
         2.0 * np.pi / TURNS * np.arange(TURNS)[:, None] * [0.0, 0.0, 1.0]

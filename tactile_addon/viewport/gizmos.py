@@ -20,10 +20,8 @@ from .overlay import PLANE_COLORS
 TURN, TILT, EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 REACH = 1.15  # Place of the handles, in extents.
 UPRIGHT = 0.75
-EDGE_ON, STEEP = (
-    0.03,
-    0.25,
-)  # sines of the view against a plane: below, nothing can be dragged in it, or not well
+# Sines of the view and a plane, below which nothing can be dragged in it, or not well.
+EDGE_ON, STEEP = 0.03, 0.15
 SNAP = math.radians(5.0)
 PRECISE = 0.1
 HINTS = (
