@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import core
 from ..touch.single_precision import require_single
-from ..touch.touch_object import Touch, reference_axes
+from ..touch.touch_object import Touched, reference_axes
 from ..touch.touch_report import measures, reconstruction_report, suggestion_report
 from . import contact_file
 
@@ -63,7 +63,7 @@ def fit(
     radius=0.0,
     **options,
 ):
-    """The patch that contact_file.Contacts show, as a Touch without a surface.
+    """The patch that contact_file.Contacts show, as a Touched without a surface.
 
     point : where the curves meet, exact; None for that of the file, or core.common_point. From strokes alone
         a place among them; None for that of the file, or their mean
@@ -123,7 +123,7 @@ def _fit(source, contacts, point, outward, flip, normal_std, options):
     }
     if distances is not None:
         report["misses"] = distances.tolist()
-    return Touch(None, result, report)
+    return Touched(None, result, report)
 
 
 def _mean_normal(contours):

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ..scene import colors, patch_object
+from ..scene import colors, patch_object, patch_record
 from ..scene.mesh_data import emission
 from .stability import KEYS, NOTHING, QUANTITIES, REASONS
 
@@ -49,7 +49,7 @@ def insert(context, obj, touched):
     _paint(mesh, touched)
     mesh.materials.clear()
     mesh.materials.append(emission("Tactile Stability", attribute=COLOR))
-    painted[patch_object.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
+    painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
     recolor(painted)
     return painted
@@ -70,7 +70,7 @@ def _paint(mesh, touched):
 
 def recolor(painted):
     """Colors the map by what it is set to show, and keeps the range in its record."""
-    shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_object.MAP_RECORD]
+    shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
     values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == "reason" else np.float32)
     mesh.attributes[shown].data.foreach_get("value", values)
     if shown == "reason":
@@ -98,7 +98,7 @@ def _limit(shown, values, extent):
 
 def swatches(painted):
     """(name, sRGB color) of what is not on the scale: the reasons that occur, or that there is no patch."""
-    record = painted[patch_object.MAP_RECORD]
+    record = painted[patch_record.MAP_RECORD]
     counts = {"patch": record["patches"] - record["in_doubt"], "doubt": record["in_doubt"]}
     counts |= record["refused"].to_dict()
     if painted.tactile_map_colors != "reason":
@@ -113,7 +113,7 @@ def register():
         name="Colors",
         description="What the colors of the map show",
         items=[item[:3] for item in SHOWN],
-        update=lambda obj, _: recolor(obj) if patch_object.MAP_RECORD in obj else None,
+        update=lambda obj, _: recolor(obj) if patch_record.MAP_RECORD in obj else None,
     )
 
 

@@ -30,7 +30,7 @@ COARSE = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say no
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class Touched:
     """What a touch gave; `report` is a dict of plain values.
 
     surface : None where the contours were measured elsewhere
@@ -112,10 +112,10 @@ def touch(
         "stops": [list(contour.stops) for contour in result.contours],
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
-    return Touch(surface, result, report)
+    return Touched(surface, result, report)
 
 
-def verify(touched, most=None):
+def completed(touched, most=None):
     """The touch with what is dear in its report too: where to touch next, and distances to the mesh.
 
     most : of the vertices around, where not all are to be compared
