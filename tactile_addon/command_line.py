@@ -63,7 +63,7 @@ def _add_reconstruct(command):
 def _add_fit(command):
     add = command.add_argument
     add("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply, curves of one patch")
-    add("--unit", choices=list(contact_file.LENGTHS), help="of the numbers (what the file says)")
+    add("--unit", choices=list(contact_file.UNIT_METERS), help="of the numbers (what the file says)")
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
     help = "a place among strokes, which all curves are then (default, of strokes alone: their mean)"
     add("--location", **VECTOR, help=help)

@@ -108,7 +108,7 @@ def _open_contacts(options):
         settings = bpy.context.scene.unit_settings
         name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
         settings.system = "METRIC" if unit else "NONE"
-        settings.scale_length = contact_file.LENGTHS.get(unit, 1.0)
+        settings.scale_length = contact_file.UNIT_METERS.get(unit, 1.0)
         if name in ADAPTIVE["METRIC"]:
             settings.length_unit = name
     paths = [path.absolute() for path in options.files]

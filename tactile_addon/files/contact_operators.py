@@ -29,7 +29,7 @@ UNITS = [
         "The unit that the columns name; where they name none, numbers are taken as they are",
     ),
     ("NONE", "As They Are", "Numbers are lengths of the scene, whatever the file says"),
-    *((unit, unit, f"Numbers are lengths in {unit}") for unit in contact_file.LENGTHS),
+    *((unit, unit, f"Numbers are lengths in {unit}") for unit in contact_file.UNIT_METERS),
 ]
 
 

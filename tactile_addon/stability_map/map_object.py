@@ -8,7 +8,7 @@ from bpy.props import EnumProperty
 
 from ..scene import colors, patch_object, patch_record
 from ..scene.mesh_data import emission
-from .stability import KEYS, NOTHING, QUANTITIES, REASONS
+from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
 
 COLOR = "stability_color"
 SHADES = 256
@@ -57,9 +57,9 @@ def insert(context, obj, touched):
 
 def _paint(mesh, touched):
     """Every vertex gets the values of the touch that is nearest."""
-    attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in QUANTITIES]
+    attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in MEASURES]
     attributes.append(("reason", "INT", touched.reason))
-    for name in (*QUANTITIES, "reason", COLOR):
+    for name in (*MEASURES, "reason", COLOR):
         if name in mesh.attributes:  # The source may have one of that name, of whatever type.
             mesh.attributes.remove(mesh.attributes[name])
     for name, kind, values in attributes:
@@ -74,7 +74,7 @@ def recolor(painted):
     values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == "reason" else np.float32)
     mesh.attributes[shown].data.foreach_get("value", values)
     if shown == "reason":
-        rgba, limit = colors.linear(REASON_COLORS)[values], len(KEYS) - 1.0
+        rgba, limit = colors.linear(REASON_COLORS)[values], len(REASON_KEYS) - 1.0
     else:
         limit = _limit(shown, values[values != NOTHING], record["extent"])
         table = colors.diverging(np.arange(SHADES), SHADES - 1)
@@ -102,7 +102,7 @@ def swatches(painted):
     counts = {"patch": record["patches"] - record["in_doubt"], "doubt": record["in_doubt"]}
     counts |= record["refused"].to_dict()
     if painted.tactile_map_colors != "reason":
-        refused = sum(counts[key] for key in KEYS[2:])
+        refused = sum(counts[key] for key in REASON_KEYS[2:])
         return [(f"No Patch: {refused}", REFUSED)] if refused else []
     names = zip(REASONS, REASON_COLORS, strict=True)
     return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]

@@ -15,7 +15,7 @@ from ..touch.surface import MeshSurface
 from ..touch.touch_object import plane_axes
 from .mouse import draw_hints, mouse_ray
 
-TURN, TILT, EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
+DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 # Sines of the view and a plane, below which nothing can be dragged in it, or not well.
 EDGE_ON, STEEP = 0.03, 0.15
 SNAP = math.radians(5.0)
@@ -38,9 +38,9 @@ class TACTILE_OT_drag(bpy.types.Operator):
     what: EnumProperty(
         name="What",
         items=[
-            (TURN, "Turn", "Turn a sampling plane about the normal"),
-            (TILT, "Tilt", "Lean a sampling plane to the side"),
-            (EXTENT, "Extent", "Feel farther or less far"),
+            (DRAG_TURN, "Turn", "Turn a sampling plane about the normal"),
+            (DRAG_TILT, "Tilt", "Lean a sampling plane to the side"),
+            (DRAG_EXTENT, "Extent", "Feel farther or less far"),
             (POINT, "Point", "Slide over the surface"),
         ],
     )
@@ -52,7 +52,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
     def invoke(self, context, event):
         found = shown_probe(context)
-        if self.what in (TURN, TILT):
+        if self.what in (DRAG_TURN, DRAG_TILT):
             found.tactile_probe.active_plane = self.plane
         self._matrix = found.matrix_world.copy()
         # The handle comes to the mouse; where the button went down is not known, for a busy Blender hears
@@ -90,14 +90,14 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if now is None:
             return
         pace = PRECISE if event.shift else 1.0
-        if self.what == EXTENT:
+        if self.what == DRAG_EXTENT:
             self._free *= (now / self._last) ** pace
             value = self._free
         else:
             self._free += pace * math.remainder(now - self._last, 2.0 * math.pi)
             value = SNAP * round(self._free / SNAP) if event.ctrl else self._free
         self._last = now
-        if self.what == TILT:
+        if self.what == DRAG_TILT:
             value = min(max(value, -STEEPEST), STEEPEST)
         self._set(context, value)
 
@@ -126,7 +126,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         center, normal = self._matrix.translation, self._matrix.col[2].xyz.normalized()
         e1 = self._matrix.col[0].xyz.normalized()
         right, up = e1, normal.cross(e1)
-        if self.what == TILT:
+        if self.what == DRAG_TILT:
             t = Vector(
                 plane_axes(self._matrix, probe.probe_of(context.object).tactile_probe, self.plane)[:, 0]
             )
@@ -136,7 +136,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         at = intersect_line_plane(origin, origin + direction, center, normal)
         if at is None or (at - center).length == 0.0:
             return None
-        if self.what == EXTENT:
+        if self.what == DRAG_EXTENT:
             return (at - center).length
         return math.atan2((at - center).dot(up), (at - center).dot(right))
 
@@ -145,32 +145,32 @@ class TACTILE_OT_drag(bpy.types.Operator):
         settings = found.tactile_probe
         if self.what == POINT:
             return self._matrix
-        if self.what == EXTENT:
+        if self.what == DRAG_EXTENT:
             return settings.extent or probe.record_of(found)["extent"]
-        return (settings.azimuths if self.what == TURN else settings.tilts)[self.plane]
+        return (settings.azimuths if self.what == DRAG_TURN else settings.tilts)[self.plane]
 
     def _set(self, context, value):
         found = probe.probe_of(context.object)
         settings, self._value = found.tactile_probe, value
         if self.what == POINT:
             anchor.put(found, value)
-        elif self.what == EXTENT:
+        elif self.what == DRAG_EXTENT:
             settings.extent = value
         else:
-            (settings.azimuths if self.what == TURN else settings.tilts)[self.plane] = value
+            (settings.azimuths if self.what == DRAG_TURN else settings.tilts)[self.plane] = value
         self._say(context)
 
     def _say(self, context):
         if self.what == POINT:
             words = "Point on " + probe.probe_of(context.object).tactile_probe.target.name
-        elif self.what == EXTENT:
+        elif self.what == DRAG_EXTENT:
             settings = context.scene.unit_settings
             length = bpy.utils.units.to_string(
                 settings.system, "LENGTH", self._value * settings.scale_length, precision=4
             )
             words = f"Extent {length}"
         else:
-            angle = "Azimuth" if self.what == TURN else "Tilt"
+            angle = "Azimuth" if self.what == DRAG_TURN else "Tilt"
             words = f"{angle} {self.plane + 1}: {math.degrees(self._value):.1f}°"
         context.area.header_text_set(words)
 

@@ -8,7 +8,7 @@ from mathutils import Matrix, Vector
 
 from ..probes import probe
 from ..touch.touch_object import plane_axes
-from .drag import EXTENT, POINT, STEEP, TILT, TURN, shown_probe
+from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .overlay import PLANE_COLORS
 
 REACH = 1.15  # Place of the handles, in extents.
@@ -28,17 +28,19 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         return context.mode == "OBJECT" and shown_probe(context) is not None
 
     def setup(self, context):
-        self.extent = self._handle("GIZMO_GT_dial_3d", EXTENT, 0, (1.0, 1.0, 1.0))
+        self.extent = self._handle("GIZMO_GT_dial_3d", DRAG_EXTENT, 0, (1.0, 1.0, 1.0))
         self.extent.use_draw_scale = False
         self.extent.line_width = 2.0
         self.point = self._ball(POINT, 0, (1.0, 1.0, 1.0))
-        self.turns = [self._ball(TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
-        self.tilts = [self._ball(TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
+        self.turns = [self._ball(DRAG_TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
+        self.tilts = [self._ball(DRAG_TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
 
     def _ball(self, what, plane, color):
         ball = self._handle("GIZMO_GT_move_3d", what, plane, color)
         ball.draw_style = "RING_2D"
-        ball.draw_options = {"FILL", "ALIGN_VIEW"} if what in (TURN, POINT) else {"FILL_SELECT", "ALIGN_VIEW"}
+        ball.draw_options = (
+            {"FILL", "ALIGN_VIEW"} if what in (DRAG_TURN, POINT) else {"FILL_SELECT", "ALIGN_VIEW"}
+        )
         ball.scale_basis, ball.line_width = 0.12, 3.0
         return ball
 
