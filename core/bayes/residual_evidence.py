@@ -22,6 +22,7 @@ from .posterior import FREE, Posterior
 
 # Chosen with benchmarks.real.
 MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
+FACETS = 1e-3  # Share of the radius: misfits of a smooth surface, whose curvatures a polynomial tells best.
 UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
 ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
@@ -64,7 +65,7 @@ def asking(contacts: Array, weights: Array, posterior: Posterior, accuracy: Arra
     basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
     off = contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0]
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
-    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, MISFIT))
+    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, FACETS))
 
 
 class System(NamedTuple):
