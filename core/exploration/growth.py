@@ -119,8 +119,8 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     felt = Felt(feel(min(first, farthest)), point, step, partial=first < farthest)
     known: dict[bytes, Grown] = {}
     found = yield from _seed(felt, known)
-    # Where a shorter one is in more doubt, that is noise, which is the smaller the longer the curves are.
-    noisy = found is not list(known.values())[-1]
+    # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
+    noisy = found.result.accuracy > MISFIT and found is not list(known.values())[-1]
     most = np.inf if noisy else NEAR if len(known) > 1 else 1.0
     growing = np.full(found.counts.shape, noisy or found.doubt <= 1.0)
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
