@@ -198,7 +198,7 @@ def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
     from scipy.linalg.lapack import dposv
 
     if touch.normals is not None or len(system.places) < len(touch.weights):
-        return fitted(touch, system, sizes.variances, sizes.noise)[0].mean
+        return fitted(touch, system, sizes.variances, sizes.noise).mean
     # Heights ~ N(0, K), K as in `sizes`: the mean alone takes one Cholesky factor.
     (basis, heights, within), (one, other) = _weighted(touch, system), sizes.variances
     prior = _prior(USUAL_WAVINESS)
@@ -209,8 +209,8 @@ def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
     return np.concatenate([prior * (solution @ basis), np.sqrt(touch.weights) * solution])
 
 
-def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tuple[Residual, Array]:
-    """What the contacts say, given these; and the factor L of k(u, u).
+def fitted(touch: Touch, system: System, variances: Array, noise: float) -> Residual:
+    """What the contacts say, given these.
 
     The unknowns are the terms and what L^-1 k(u, p) is multiplied with: that makes the prior's precision 1
     and the system well-conditioned.
@@ -231,7 +231,9 @@ def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tupl
     factor = cholesky(precision)
     mean = solved(factor, solved(factor, seen), transposed=True)
     mean[terms:] = solved(places, mean[terms:], transposed=True)
-    return Residual(touch.contacts[index, :2], variances, mean, factor, np.array(noise)), places
+    residual = Residual(touch.contacts[index, :2], variances, mean, factor, np.array(noise))
+    vars(residual)["places_factor"] = places  # It need not be found again.
+    return residual
 
 
 def _add_slopes(touch: Touch, precision: Array, seen: Array) -> None:
