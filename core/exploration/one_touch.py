@@ -14,7 +14,7 @@ from ..bayes.residual_evidence import PLACES
 from ..contours.contour import Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.residual import cholesky, solved
-from ..reconstruction.next_plane import azimuth_of, suggest_plane
+from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from .growth import (
     CONTACTS,
@@ -87,14 +87,11 @@ class Touch:
         while (
             self.tolerance is not None and stds[-1] > self.tolerance and len(found.planes) < self.most_planes
         ):
-            plane, expected = suggest_plane(found.result)
+            plane, expected = suggest_plane(found.result, self.reference[:, 1], self.reference[:, 0])
             if expected > (1.0 - HELPS) * stds[-1]:
                 break
-            d1, _, n = found.result.frame.axes.T
-            along = plane.axes(n, d1)[:, 0]
-            azimuth = azimuth_of(along, self.reference[:, 1], self.reference[:, 0])
             try:
-                found = yield from self._with_plane(found, SamplingPlane(azimuth))
+                found = yield from self._with_plane(found, plane)
             except ValueError:  # nothing can be felt along that one: what was felt so far stays
                 break
             stds.append(found.result.mean_height_std)
@@ -189,7 +186,9 @@ def is_enough(r: Reconstruction) -> bool:
     some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), PLACES)).astype(np.intp)]
     over, m = points / r.radius, len(some)
     shared, seen = r.uncertainty.height_covariances(some / r.radius, over)
-    variance = r.uncertainty.height_std(*over.T) ** 2
+    # A patch by another method departs from the posterior's mean, of which no contact takes anything off.
+    own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
+    variance = own**2
     seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
     told = solved(cholesky(seen), shared)
     lost = np.einsum("in,in->n", told, told)

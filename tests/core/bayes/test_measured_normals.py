@@ -52,7 +52,8 @@ def same(one, other, rel=1e-9):
 @pytest.mark.parametrize(("noise", "std"), [(0.0, 0.0), (0.02, 0.01), (0.05, 0.05)])
 def test_a_monkey_saddle_hidden_from_its_planes_shows_in_normals(noise, std):
     contours = touched(HIDDEN, noise)
-    without, with_normals = HIDDEN.fit(contours), HIDDEN.fit(measured(contours, std))
+    fits = (HIDDEN.fit(c, degree=4) for c in (contours, measured(contours, std)))
+    without, with_normals = fits
     assert (without.blind, with_normals.blind) == (3, 0)
     assert "invisible" not in with_normals.message
     assert surfaces.off_data(HIDDEN, with_normals) < 0.1 * surfaces.off_data(HIDDEN, without)
@@ -180,7 +181,7 @@ def test_without_slopes_both_likelihoods_are_one():
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
     alone = linear_system.linear_system(local, weights, nothing, local[:, :0])
-    data = evidence.restricted(alone.basis, alone.heights, weights)
+    data = evidence.restricted(linear_system.of_heights(alone, weights))
     empty = alone._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
     one, other = (linear_system.hyperparameters(s, data, weights, np.array([2e-3])) for s in (alone, empty))
     for a, b in zip(one, other, strict=True):
