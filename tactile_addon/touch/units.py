@@ -17,7 +17,7 @@ ADAPTIVE = {
     "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
 }
-POWERS = {1: "", 2: "²"}
+SUPERSCRIPTS = {1: "", 2: "²"}
 
 
 def unit_of(scene, size):
@@ -45,4 +45,4 @@ def say(value, power, unit, std=None):
 def symbol(power, unit):
     """The unit of length^power, as in "mm" or "1/mm²"; empty for a number, and where lengths have none."""
     name = unit[0] if power else ""
-    return f"1/{name}{POWERS[-power]}" if name and power < 0 else name
+    return f"1/{name}{SUPERSCRIPTS[-power]}" if name and power < 0 else name
