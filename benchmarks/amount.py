@@ -246,8 +246,9 @@ def draw_lines(axes, found, touches, at):
 
 def draw(found):
     figure, (left, right) = plt.subplots(
-        1, 2, figsize=(8.2, 4.4), sharey=True, width_ratios=(3, 2), layout="constrained"
+        1, 2, figsize=(8.2, 4.7), sharey=True, width_ratios=(3, 2), layout="constrained"
     )
+    figure.suptitle("How much data is enough", fontsize=12, weight="bold")
     contacts = [touch.contacts for touch in BY_CONTACTS]
     draw_lines(left, found, BY_CONTACTS, contacts)
     draw_lines(right, found, SAME_TOTAL, PLANES)
@@ -256,7 +257,7 @@ def draw(found):
     for noise, (color, mark, _) in LOOKS.items():
         each = medians(found, SAME_EACH, noise, BAYES)
         right.plot(PLANES, each, "-.", color=color, marker=mark, mfc="white", markersize=5, linewidth=1)
-    left.set(title="Three planes, more contacts", xlabel="contacts", ylabel="mean |dz|, µm")
+    left.set(title="Three planes, more contacts", xlabel="contacts", ylabel="error of the height, µm")
     left.set(xscale="log", yscale="log", xlim=(11, 400), ylim=(0.4, 400))
     left.set_xticks(contacts, contacts)
     left.xaxis.set_minor_locator(NullLocator())

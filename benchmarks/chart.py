@@ -377,8 +377,8 @@ def draw_frame(table, methods, bounds, caption):
             kappa.set_yticklabels([])
             normal.set_yticklabels([])
             kappa.axhline(bounds[noise], color="#777777", ls=":", lw=1.2)
-            look = {"ha": "center", "va": "bottom", "fontsize": 7, "color": "#555555"}
-            kappa.text(8.0, 1.08 * bounds[noise], "Cramér-Rao", **look)
+            look = {"ha": "center", "va": "top", "fontsize": 7, "color": "#555555"}
+            kappa.text(6.5, 0.92 * bounds[noise], "Cramér-Rao", **look)
         else:
             kappa.set_ylabel("larger of the errors of kappa, 1/mm")
             normal.set_ylabel("error of the normal, degrees")

@@ -178,7 +178,7 @@ class Fit(NamedTuple):
 def fitted(place, method, seed, lean=0.0, **options):
     curves = place.contours(AZIMUTHS, seed, lean)
     weight = {TAGC: place.weight, QV: QV_WEIGHT}.get(method)
-    options = {"outward": place.outward, "method": method, "weight": weight} | options
+    options = {"outward": place.outward, "method": method, "weight": weight, "degree": 4} | options
     seconds, r = timed(core.reconstruct, place.point, curves, **options)
     return Fit(r, _in_frame(r, curves), 1e3 * seconds)
 

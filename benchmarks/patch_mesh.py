@@ -40,7 +40,7 @@ def between(r: Reconstruction, points, triangles):
     """x, y of points all over the triangles, and the deviation there, each (k, m)."""
     shares = [(i, j, STEPS - i - j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]
     x, y, z = np.einsum("wk,tkd->dwt", np.array(shares) / STEPS, points[triangles])
-    return x, y, np.abs(r.patch.height(x, y) - z)
+    return x, y, np.abs(r.height(x, y) - z)
 
 
 def grid(r, spacing):
@@ -52,7 +52,7 @@ def grid(r, spacing):
     a, b, c, d = (part.ravel() for part in (at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]))
     triangles = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     triangles = triangles[r.domain.contains(x, y)[triangles].any(axis=1)]
-    u, v, off = between(r, np.column_stack([x, y, r.patch.height(x, y)]), triangles)
+    u, v, off = between(r, np.column_stack([x, y, r.height(x, y)]), triangles)
     return off[r.domain.contains(u, v)].max(), len(np.unique(triangles))
 
 

@@ -3,6 +3,7 @@
 """What the charts have in common: a look that fits a README column, colors for all eyes, labels, files."""
 
 import csv
+import textwrap
 
 import matplotlib
 
@@ -15,7 +16,7 @@ from matplotlib.patheffects import withStroke
 from . import ROOT
 
 OUTPUT = ROOT / "build" / "charts"
-LABEL_SIZE = 7.5
+LABEL_SIZE, CAPTION_SIZE = 7.5, 7.0
 # Okabe and Ito's colors, told apart by color-blind readers; marks and labels tell the same again.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
     "#000000", "#e69f00", "#56b4e9", "#009e73", "#0072b2", "#d55e00", "#cc79a7",
@@ -30,7 +31,10 @@ plt.rcParams.update({
 def save(figure, name, caption, header, rows):
     """Writes build/charts/NAME.png, with the caption below, and NAME.csv, the table behind it."""
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    figure.text(0.01, 0.0, caption, ha="left", va="top", fontsize=7, color="#555555", wrap=True)
+    # Wrapped here, by an average character: matplotlib's own wrapping forgets what a tight box cuts off.
+    width = int(72.0 * figure.get_figwidth() / (0.55 * CAPTION_SIZE))
+    caption = textwrap.fill(caption, width, break_on_hyphens=False)
+    figure.text(0.01, 0.0, caption, ha="left", va="top", fontsize=CAPTION_SIZE, color="#555555")
     figure.savefig(OUTPUT / f"{name}.png", bbox_inches="tight", pad_inches=0.15)
     with open(OUTPUT / f"{name}.csv", "w", newline="") as file:
         csv.writer(file).writerows([header, *rows])

@@ -24,7 +24,7 @@ def draw(scores, seconds, automatic):
     """
     methods = list(next(iter(next(iter(scores.values())).values())))
     counts = sorted({cell[0] for of in scores.values() for cell in of})
-    figure, axes = plot.plt.subplots(1, 3, figsize=(9.5, 3.4), layout="constrained")
+    figure, axes = plot.plt.subplots(1, 3, figsize=(9.5, 3.8), layout="constrained")
     rows = []
     for method, (name, color, mark) in zip(methods, STYLES, strict=True):
         means = [_mean(scores, method, planes) for planes in counts]
@@ -38,21 +38,26 @@ def draw(scores, seconds, automatic):
         rows += [[name, *row] for row in zip(counts, errors, covered, times, strict=True)]
     axes[2].plot(automatic[1], automatic[0], "*", color=plot.BLUE, ms=11, label="automatic touch")
     axes[1].axhline(0.9, color=plot.BLACK, lw=0.8, ls=":")
-    titles = "Error, permille of the radius", "Share within the 90 % interval", "The same error"
+    titles = "Error by planes", "Points within the 90 % interval", "Error by time"
     for ax, title in zip(axes, titles, strict=True):
-        ax.set(title=title, xlabel="sampling planes")
+        ax.set(title=title, xlabel="sampling planes", ylabel="error, permille of the radius")
+    axes[1].set_ylabel("share of the points")
     for ax in axes[:2]:
         ax.set_xticks(counts)
     axes[1].set_ylim(0.4, 1.0)
-    axes[2].set(xlabel="ms", xscale="log")
+    axes[2].set(xlabel="time, ms", xscale="log")
+    axes[2].xaxis.set_major_formatter("{x:g}")
     for ax in axes[::2]:
         ax.set_ylim(bottom=0.0)
     handles, labels = axes[2].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=6, fontsize=plot.LABEL_SIZE)
+    title = "Real surfaces: how near, and how true the intervals"
+    look = {"ncols": 6, "fontsize": plot.LABEL_SIZE, "title_fontproperties": {"size": 12, "weight": "bold"}}
+    figure.legend(handles, labels, loc="outside upper center", title=title, **look)
     caption = (
         f"{len(scores)} scans, half curves of 1/32, 1/16 and 1/8 of the object, without noise. On the right "
         "medians of a fit and 300 heights with three to six planes; the star is a touch with three planes "
-        f"that chooses its extent and step, ray casts and all its fits included. {machine('numpy', 'scipy')}."
+        "that chooses its extent and step, ray casts and all its fits included. "
+        f"On {machine('numpy', 'scipy')}."
     )
     rows.append(["automatic touch", 3, automatic[0], "", automatic[1]])
     plot.save(figure, "real_surfaces", caption, ["method", "planes", "error", "within", "ms"], rows)

@@ -145,7 +145,7 @@ def many(cases):
 
 def _departure(one, other):
     x, y = one.contacts[:, :2].T
-    return np.abs(one.patch.height(x, y) - other.patch.height(x, y)).max() / one.radius
+    return np.abs(one.height(x, y) - other.height(x, y)).max() / one.radius
 
 
 # (c) -------------------------------------------------------------------------------------------------

@@ -137,7 +137,7 @@ def outcome(surface, setting, point, outward, contours, method):
     there = above(
         surface, r.frame.axes, np.array([r.patch.k1, r.patch.k2]) * setting.scale, grid / setting.scale
     )
-    misses = np.abs(r.patch.height(*grid.T) - setting.scale * (there @ r.frame.axes[:, 2])) / r.radius
+    misses = np.abs(r.height(*grid.T) - setting.scale * (there @ r.frame.axes[:, 2])) / r.radius
     error = np.mean(np.where(np.isfinite(misses), misses, 1.0))  # a patch over nothing is off by its radius
     rotation = true_axes.T @ r.frame.axes
     half = max(np.trace(rotation), np.trace(rotation * [-1, -1, 1]))
@@ -250,8 +250,8 @@ SWEEPS = (
     Sweep("degrees of tilt", (0, 10, 20, 30, 40, 50, 60, 70, 75, 80), (0, 10, 20),
           lambda v: Setting(tilts=(v, -v, v))),
     Sweep("degrees of azimuth against d1", TURNS, TURNS, lambda v: Setting(turn=v)),
-    Sweep("the same, no noise", TURNS, TURNS, lambda v: Setting(turn=v, noise=0.0)),
-    Sweep("the same, monkey saddle", TURNS, (),
+    Sweep("degrees of azimuth, no noise", TURNS, TURNS, lambda v: Setting(turn=v, noise=0.0)),
+    Sweep("degrees of azimuth, monkey saddle", TURNS, (),
           lambda v: Setting(turn=v), lambda v: {SADDLE: SURFACES[SADDLE]}),
     Sweep("near an umbilic: (k2 - k1) L", DIFFERENCES, DIFFERENCES,
           lambda v: Setting(), lambda v: graphs(-0.03 - v / 13.0, -0.03)),
@@ -536,7 +536,7 @@ def panel(axes, sweep, of, first):
     for part in (errors, conditions):
         part.set_xlim(-0.5, len(places) - 0.5)
         part.set_xticks([])
-        part.tick_params(labelsize=6, labeleft=first)
+        part.tick_params(labelsize=6, labelleft=first)
         part.minorticks_off()
     if first:
         errors.set_ylabel("error / L", fontsize=7)

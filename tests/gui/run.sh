@@ -53,6 +53,8 @@ GUI_TIMEOUT=400 GUI_ARGS="$out/scene.blend" step "the random steps" \
   $gui shot tests/gui/random_steps.py "$out/random_steps.png"
 GUI_ARGS="$out/scene.blend" step "the pictures of the docs" \
   $gui shot tests/gui/pictures.py "$out/pictures.png"
+[ ! -e "$out/pear.ply" ] || GUI_ARGS="$out/scene.blend" step "the pictures of the worked example" \
+  $gui shot tests/gui/worked_example.py "$out/worked_example.png"
 GUI_ARGS="$out/scene.blend" step "the verification's checks" \
   $gui shot tests/gui/verify.py "$out/verify.png"
 GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the stability map's checks" \
