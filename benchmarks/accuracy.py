@@ -206,7 +206,7 @@ def _random_shape(rng, waves=40):
 
 
 def ours(case, **options):
-    r = reconstruct(case.point, case.contours, outward=case.axes[:, 2], **options)
+    r = reconstruct(case.point, case.contours, outward=case.axes[:, 2], **{"degree": 4} | options)
     return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
 
@@ -222,9 +222,9 @@ def settings(options):
 
 
 METHODS = {
-    "Bayes, degree 4 (default)": ours,
+    "Bayes, degree 4": ours,
     "Bayes, degree 6": partial(ours, degree=6),
-    "Bayes, degree auto": partial(ours, degree="auto"),
+    "Bayes, degree auto (default)": partial(ours, degree="auto"),
     "Matérn 5/2 Gaussian process": gaussian_process,
     **{f"{name}, {settings(options)}": partial(radial_basis, **options) for name, options in SPLINES.items()},
     "quadratic variation, weight 1e5": partial(ours, method="quadratic-variation"),

@@ -93,7 +93,7 @@ def _touched(extension, obj, depsgraph, place, extent):
         )
     except ValueError:
         return None
-    touched = add_on.touch.touch_object.verify(touched)
+    touched = add_on.touch.touch_object.completed(touched)
     off = extension.core.height_error(touched.result, touched.surface)
     return touched.report | {"fit": touched.result.status}, off
 

@@ -134,7 +134,7 @@ class Exhaustive:
         touch = np.array([r.contacts / r.radius, r.patch.normal(*r.contacts[:, :2].T)])
         mesh = scanned_mesh.mesh_of(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
         places = np.concatenate([axes, origins[..., None] / r.radius], axis=2)
-        for neighbors in (1, pose_search.NEAREST):
+        for neighbors in (1, pose_search.NEAREST_TRIANGLES):
             places, residuals, _ = pose_search._descended(places, touch, mesh, neighbors, 10)
             kept = pose_search._distinct(places, residuals)[:REFINED]
             places, residuals = places[kept], residuals[kept]

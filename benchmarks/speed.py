@@ -52,7 +52,7 @@ def touches():
 
 
 def fit(case, **options):
-    return reconstruct(case.point, case.contours, outward=case.axes[:, 2], **options)
+    return reconstruct(case.point, case.contours, outward=case.axes[:, 2], **{"degree": 4} | options)
 
 
 # (a) -------------------------------------------------------------------------------------------------

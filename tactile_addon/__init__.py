@@ -10,7 +10,7 @@ from .files import contact_operators
 from .probes import change_handlers, operators, probe, probe_operators
 from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
-from .viewport import gizmos, overlay, pick
+from .viewport import drag, gizmos, overlay, pick
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
@@ -18,7 +18,7 @@ CLASSES = (
     register_operator.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,
     pick.TACTILE_OT_pick,
-    gizmos.TACTILE_OT_drag,
+    drag.TACTILE_OT_drag,
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,

@@ -10,7 +10,7 @@ import bpy
 
 from .command_run import run, write
 from .files import contact_file
-from .scene import patch_object
+from .scene import patch_record
 from .stability_map.map_report import map_readable
 from .touch.settings import METHODS, SOLVERS
 from .touch.wording import readable
@@ -43,7 +43,7 @@ def _parser():
         ("map", _add_map, "touch a mesh all over and paint a copy by how well it goes"),
     ):
         add_arguments(commands.add_parser(name, help=help))
-    parser.set_defaults(fail=parser.error, record=patch_object.RECORD, words=readable, more={})
+    parser.set_defaults(fail=parser.error, record=patch_record.RECORD, words=readable, more={})
     parser.set_defaults(**dict.fromkeys(("file", "contacts", "onto", "verify", "normal_std")))
     return parser
 
@@ -63,7 +63,7 @@ def _add_reconstruct(command):
 def _add_fit(command):
     add = command.add_argument
     add("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply, curves of one patch")
-    add("--unit", choices=list(contact_file.LENGTHS), help="of the numbers (what the file says)")
+    add("--unit", choices=list(contact_file.UNIT_METERS), help="of the numbers (what the file says)")
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
     help = "a place among strokes, which all curves are then (default, of strokes alone: their mean)"
     add("--location", **VECTOR, help=help)
@@ -85,7 +85,7 @@ def _add_map(command):
     add("--spacing", type=float, help=help)
     _add_inputs(add)
     command.set_defaults(operator=bpy.ops.tactile.stability_map, more={"progress": True})
-    command.set_defaults(record=patch_object.MAP_RECORD, words=map_readable)
+    command.set_defaults(record=patch_record.MAP_RECORD, words=map_readable)
 
 
 def _add_verify(add):

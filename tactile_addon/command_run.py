@@ -14,7 +14,7 @@ from .comparison.register_operator import register_patch
 from .comparison.verification_wording import verification_columns
 from .comparison.verify_operator import verify_patch
 from .files import contact_file, measured, mesh_file, whole_file
-from .scene import patch_object
+from .scene import patch_record
 from .touch.units import ADAPTIVE, METERS
 
 # What the operators take as it is given.
@@ -59,11 +59,11 @@ def run(options):
     options.operator(**arguments, **options.more)
     # Its name may be another's, and it is not active where the scene was saved in edit mode.
     (made,) = (obj for obj in set(bpy.data.objects) - before if options.record in obj)
-    if options.record == patch_object.RECORD:
+    if options.record == patch_record.RECORD:
         _compare(made, options)
     report = made[options.record].to_dict()
     if options.contacts is not None:
-        r = patch_object.reconstruction_of(made)
+        r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
     if options.output is not None:
         _save(options.output, made)
@@ -85,14 +85,14 @@ def _require_outputs(options):
         taken[path.resolve()] = "writes"
         if not path.absolute().parent.is_dir():
             raise OSError(f'there is no folder "{path.parent}" to write "{path.name}" to')
-    kinds = [".blend", ".ply", *([".json"] if options.record == patch_object.RECORD else [])]
+    kinds = [".blend", ".ply", *([".json"] if options.record == patch_record.RECORD else [])]
     if "output" in outputs and options.output.suffix.lower() not in kinds:
         options.fail(f"--output: wanted a file {' or '.join(kinds)}, got {options.output}")
 
 
 def _compare(patch, options):
     """The patch with the mesh that was touched, or with the one that it is put onto."""
-    target = None if "files" in options else bpy.data.objects[patch[patch_object.RECORD]["source"]]
+    target = None if "files" in options else bpy.data.objects[patch[patch_record.RECORD]["source"]]
     if options.onto is not None:
         target = mesh_file.add(options.onto)
         register_patch(patch, target, bpy.context.evaluated_depsgraph_get())
@@ -108,7 +108,7 @@ def _open_contacts(options):
         settings = bpy.context.scene.unit_settings
         name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
         settings.system = "METRIC" if unit else "NONE"
-        settings.scale_length = contact_file.LENGTHS.get(unit, 1.0)
+        settings.scale_length = contact_file.UNIT_METERS.get(unit, 1.0)
         if name in ADAPTIVE["METRIC"]:
             settings.length_unit = name
     paths = [path.absolute() for path in options.files]
@@ -125,7 +125,7 @@ def _save(path, made):
     """The scene; where the path says so, the map or patch alone: .ply with its attributes, or .json."""
     kind = path.suffix.lower()
     if kind == ".json":
-        contact_file.write_patch(path, patch_object.reconstruction_of(made))
+        contact_file.write_patch(path, patch_record.reconstruction_of(made))
     elif kind == ".ply":
         mesh_file.write(path, made)
     else:

@@ -36,7 +36,7 @@ def main():
             render(patch, blender.BUILD / "demo.png")
     except (RuntimeError, OSError) as error:
         sys.exit(f"demo: {str(error).strip()}")
-    report = patch[extension.tactile_addon.scene.patch_object.RECORD].to_dict()
+    report = patch[extension.tactile_addon.scene.patch_record.RECORD].to_dict()
     print(extension.tactile_addon.touch.wording.readable(report))
     print(f"saved {blender.BUILD / 'demo.blend'} and {blender.BUILD / 'demo.png'}")
 
@@ -71,7 +71,7 @@ def compose(extension, patch, unit):
     import bpy
     from mathutils import Matrix, Vector
 
-    report = patch[extension.tactile_addon.scene.patch_object.RECORD].to_dict()
+    report = patch[extension.tactile_addon.scene.patch_record.RECORD].to_dict()
     radius, scene = report["radius"], bpy.context.scene
     point, normal = Vector(report["frame"]["origin"]), Vector(report["frame"]["normal"])
     upright = Vector((0, 0, 1)) if abs(normal.z) < 0.9 else Vector((0, 1, 0))
@@ -143,7 +143,7 @@ def _color_bar(extension, put, limit, unit):
     corners = 2 * np.arange(BAR_STEPS)[:, None]
     triangles = np.vstack([corners + corner for corner in ((0, 1, 3), (0, 3, 2))])
     colors = module.scene.colors.diverging(np.repeat(at, 2), 1.0)
-    attributes = [(module.scene.patch_object.COLOR, "FLOAT_COLOR", colors)]
+    attributes = [(module.scene.patch_record.COLOR, "FLOAT_COLOR", colors)]
     strip = bpy.data.meshes.new("Color Bar")
     module.scene.mesh_data.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])

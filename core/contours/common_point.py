@@ -20,13 +20,13 @@ from .curves import (
 )
 from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 
-APART = 0.1  # Share of a curve's size that it may miss the point by.
+MOST_APART = 0.1  # Share of a curve's size that it may miss the point by.
 GAP = 0.25  # Share of a curve's size, around the point, in which it may have no contacts.
-STEPS = 50  # of Gauss-Newton; five are the rule
+NEWTON_STEPS = 50  # of Gauss-Newton; five are the rule
 STARTS = 3  # curves may come near each other in several places
-MOST = 1000  # contacts of a curve, and
+MOST_CONTACTS = 1000  # contacts of a curve, and
 QUERIES = 10**6  # distances of a contact to a curve, that a start is looked for among
-NEAREST = 4 * WINDOW  # contacts of a curve that are looked at around a point
+CONTACTS_AROUND = 4 * WINDOW  # contacts of a curve that are looked at around a point
 
 
 def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
@@ -83,13 +83,13 @@ def _starts(contours: Sequence[Contour]) -> Array:
     """
     from scipy.spatial import cKDTree
 
-    thinned = [contour.points[:: -(-len(contour.points) // MOST)] for contour in contours]
+    thinned = [contour.points[:: -(-len(contour.points) // MOST_CONTACTS)] for contour in contours]
     contacts = np.vstack(thinned)
     contacts = contacts[:: -(-len(contacts) * len(thinned) // QUERIES)]
     squares = np.zeros(len(contacts))
     for points in thinned:
         squares += cKDTree(points).query(contacts)[0] ** 2
-    apart, starts = APART * min(map(_size, contours)), np.empty((0, 3))
+    apart, starts = MOST_APART * min(map(_size, contours)), np.empty((0, 3))
     left = squares <= 4.0 * squares.min() + len(contours) * apart**2
     while len(starts) < STARTS and left.any():
         best = contacts[np.argmin(np.where(left, squares, np.inf))]
@@ -105,7 +105,7 @@ def _size(contour: Contour) -> float:
 def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, Array]:
     """Gauss-Newton from a start: the point, and the feet and tangents (c, 3) of the curves next to it."""
     reach = min(map(_size, contours))
-    for _ in range(STEPS):
+    for _ in range(NEWTON_STEPS):
         near = [Contour(_near(point, contour.points)) for contour in contours]
         local = local_curves(curves_through(*stacked(point[None], [near])))[0][0]
         speeds = np.linalg.norm(local[:, 1], axis=1, keepdims=True)
@@ -122,16 +122,18 @@ def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, A
 
 def _near(point: Array, points: Array) -> Array:
     """Contacts of a curve that say how it passes the point, and some more, in their order."""
-    if len(points) <= NEAREST:
+    if len(points) <= CONTACTS_AROUND:
         return points
-    return points[np.sort(np.argpartition(np.sum((points - point) ** 2, axis=1), NEAREST)[:NEAREST])]
+    return points[
+        np.sort(np.argpartition(np.sum((points - point) ** 2, axis=1), CONTACTS_AROUND)[:CONTACTS_AROUND])
+    ]
 
 
 def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> None:
     for number, (contour, miss) in enumerate(zip(contours, misses, strict=True), 1):
         size = _size(contour)
         gap = float(np.linalg.norm(contour.points - point, axis=1).min())
-        if not (miss <= APART * size and gap <= GAP * size):
+        if not (miss <= MOST_APART * size and gap <= GAP * size):
             raise DegenerateCurvesError(
                 f"the curves do not come near each other: curve {number}, {size:.3g} long, is "
                 f"{max(miss, gap):.3g} away from the point nearest to all: give the reference point, or "

@@ -19,7 +19,8 @@ from ..arguments import (
     unit_vector,
 )
 
-COARSE = 0.01  # Share of a curve's size: coordinates that are rounded by more say nothing about curvature.
+# Share of a curve's size: coordinates that are rounded by more say nothing about curvature.
+MOST_ROUNDING = 0.01
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 UNEXPLAINED = "not explained"
 
@@ -81,7 +82,7 @@ class Contour:
         single = getattr(self.points, "dtype", None) == np.float32
         if single and len(points):
             spacing = float(np.spacing(np.abs(points).max().astype(np.float32)))
-            if spacing > COARSE * np.ptp(points, axis=0).max() > 0.0:
+            if spacing > MOST_ROUNDING * np.ptp(points, axis=0).max() > 0.0:
                 raise ValueError(
                     f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
                     "of this size: wanted coordinates relative to a point near by, or double precision"

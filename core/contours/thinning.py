@@ -17,17 +17,17 @@ from ..arguments import Array
 from .contour import Contour
 from .curves import WINDOW, besides_point
 
-MOST = 100  # contacts of a contour, of which no fit is worse with noise in all directions
+MOST_CONTACTS = 100  # contacts of a contour, of which no fit is worse with noise in all directions
 
 
 def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
-    """The contour of MOST contacts at most besides the reference point, and of how many each is the mean.
+    """The contour of MOST_CONTACTS at most besides the reference point, and of how many each is the mean.
 
     Runs as the contour does; noise and normal_std are those of the means.
     """
     r = contour.points - point
-    beside = np.flatnonzero(besides_point(r)[1]) if len(r) > MOST else np.arange(len(r))
-    size = math.ceil(len(beside) / MOST)
+    beside = np.flatnonzero(besides_point(r)[1]) if len(r) > MOST_CONTACTS else np.arange(len(r))
+    size = math.ceil(len(beside) / MOST_CONTACTS)
     if size <= 1:
         return contour, 1
     r = r[beside]

@@ -42,7 +42,7 @@ def explore(
     rng: np.random.Generator | int | None = None,
     tangent: ArrayLike | None = None,
     method: str = "bayes",
-    degree: int | str = 4,
+    degree: int | str = "auto",
     weight: float | None = None,
     solver: str = "fast",
 ) -> Exploration:
@@ -104,7 +104,7 @@ def explore_many(
     rng: np.random.Generator | int | None = None,
     tangent: ArrayLike | None = None,
     method: str = "bayes",
-    degree: int | str = 4,
+    degree: int | str = "auto",
     weight: float | None = None,
     solver: str = "fast",
 ) -> list[Exploration | ValueError]:

@@ -16,7 +16,7 @@ from .least_squares import Problem, on_grid
 
 # Of |D|, in shares of its mean at the start. At the last the minimum is within a millionth of the true one.
 ROUNDINGS = np.geomspace(1.0, 1e-5, 14)
-SETTLED = 1e-3  # Share of the objective that a step wins: it is time to round less.
+SETTLED_OBJECTIVE = 1e-3  # Share of the objective that a step wins: it is time to round less.
 CONVERGED = 1e-8
 NEWTON_CAP, DESCENT_CAP = 200, 20_000  # steps
 
@@ -104,7 +104,7 @@ def newton_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
     for share in ROUNDINGS:
         rounding, damping = scale * share, 1e-3
         value = objective.value(at, rounding)
-        enough = SETTLED if share > ROUNDINGS[-1] else CONVERGED
+        enough = SETTLED_OBJECTIVE if share > ROUNDINGS[-1] else CONVERGED
         while steps < NEWTON_CAP:
             before, steps = value, steps + 1
             a, at, value, damping = _newton_step(objective, unit, a, at, value, rounding, damping)

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..arguments import Array
 
 GRID = 600  # Points of the grid (8) over a domain.
-SAMPLES = 1024  # Samples of the boundary, whose radius is then good to 1e-5.
+BOUNDARY_SAMPLES = 1024  # Samples of the boundary, whose radius is then good to 1e-5.
 AROUND = 32  # places on the hull of contacts that bound a domain
 INSIDE = 0.05  # of the radius, that the origin is inside such a hull at least
-ALONG, ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
+GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Domain:
     def _polar(self) -> tuple[Array, Array]:
         """Azimuths, ascending, and radii of the boundary."""
         chords, (start, slope, bend, third) = self._boundary
-        each = math.ceil(SAMPLES / len(self.ends))  # Samples of one piece: as symmetric as the ends.
+        each = math.ceil(BOUNDARY_SAMPLES / len(self.ends))  # Samples of one piece: as symmetric as the ends.
         t = (chords[:, None] / each * np.arange(each))[..., None]
         start, slope, bend, third = (part[:, None] for part in (start, slope, bend, third))
         x, y = (start + t * (slope + t * (bend + t * third))).reshape(-1, 2).T
@@ -73,7 +73,7 @@ class Domain:
         reach = np.zeros(len(turns))
         np.maximum.at(reach, place, np.hypot(*self.ends.T))
         at = np.concatenate([turns + whole for whole in (-2.0, -1.0, 0.0, 1.0)])
-        azimuths = np.arange(SAMPLES, dtype=np.float64) / SAMPLES - 0.5
+        azimuths = np.arange(BOUNDARY_SAMPLES, dtype=np.float64) / BOUNDARY_SAMPLES - 0.5
         radii: Array = PchipInterpolator(at, np.tile(reach, 4))(azimuths)
         return 2.0 * np.pi * azimuths, radii
 
@@ -122,7 +122,7 @@ class Domain:
     def grid(self, count: int) -> tuple[Array, float]:
         """The grid of (8): about `count` points (m, 2) inside with uniform spacing h, and h."""
         h = float(np.sqrt(self.area / count))
-        reach = self.boundary(SAMPLES)
+        reach = self.boundary(BOUNDARY_SAMPLES)
         low, high = np.floor(reach.min(axis=0) / h), np.ceil(reach.max(axis=0) / h)
         axes = (h * (np.arange(a, b) + 0.5) for a, b in zip(low, high, strict=True))
         x, y = (axis.ravel() for axis in np.meshgrid(*axes))
@@ -133,10 +133,10 @@ class Domain:
 @lru_cache(maxsize=16)
 def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
     """For Domain.nodes: piece, place on it and weight of each ray; places and weights along a ray."""
-    along, along_weights = np.polynomial.legendre.leggauss(ALONG)  # type: ignore[no-untyped-call]
-    square, outward = np.polynomial.legendre.leggauss(ACROSS)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
+    along, along_weights = np.polynomial.legendre.leggauss(GAUSS_ALONG)  # type: ignore[no-untyped-call]
+    square, outward = np.polynomial.legendre.leggauss(GAUSS_ACROSS)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
     return (
-        np.repeat(np.arange(ends), ALONG),
+        np.repeat(np.arange(ends), GAUSS_ALONG),
         np.tile(0.5 * (along + 1.0), ends),
         np.tile(along_weights, ends),
         np.sqrt(0.5 * (square + 1.0))[:, None, None],

@@ -19,13 +19,16 @@ from .domain import Domain
 from .monge import HeightField
 
 CHORD = 4.6  # over the curvature, tolerance in a square of sides as wanted: 8, were all equilateral
-COARSEST, FINEST = 0.25, 0.02  # Distances of neighbors, in mean radii: colors are drawn by them too.
+COARSEST_EDGE, FINEST_EDGE = (
+    0.25,
+    0.02,
+)  # Distances of neighbors, in mean radii: colors are drawn by them too.
 VISIBLE = 1e-3  # Share of the mean radius: a rim that is farther off shows its corners.
-AROUND, MOST = 128, 256  # samples of the boundary; edges of the rim, at most
-ALONG = 0.65  # Share of the distance wanted inside, along the rim, where the lattice does not fit.
-GROWTH = 0.5  # Growth of the distance of neighbors with the distance from the rim.
+AROUND, MOST_RIM_EDGES = 128, 256  # samples of the boundary; edges of the rim, at most
+RIM_SPACING = 0.65  # Share of the distance wanted inside, along the rim, where the lattice does not fit.
+EDGE_GROWTH = 0.5  # Growth of the distance of neighbors with the distance from the rim.
 CLEAR = 0.6  # Distance of the lattice from the rim, in edges of the rim.
-PASSES = 3  # Passes of smoothing.
+SMOOTHING_PASSES = 3  # Passes of smoothing.
 UNEQUAL = 1e-6  # With this no four points lie on a circle, where any diagonal would do.
 
 Size = Callable[[Array], Array]
@@ -35,15 +38,15 @@ def patch_mesh(surface: HeightField, domain: Domain, tolerance: float) -> tuple[
     """Points (n, 3) on the patch over its domain, and counterclockwise triangles (m, 3).
 
     As many as it takes to be off the patch by the tolerance at most, as long as that asks for no less
-    than FINEST between neighbors; the rim is off the boundary by VISIBLE at most.
+    than FINEST_EDGE between neighbors; the rim is off the boundary by VISIBLE at most.
     """
     mean_radius = math.sqrt(domain.area / math.pi)
 
     def size(points: Array) -> Array:
         """The distance of neighbors that the second derivatives allow, (n,)."""
-        flattest = CHORD * tolerance / (COARSEST * mean_radius) ** 2
+        flattest = CHORD * tolerance / (COARSEST_EDGE * mean_radius) ** 2
         wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(surface, points), flattest))
-        return np.maximum(wanted, FINEST * mean_radius)
+        return np.maximum(wanted, FINEST_EDGE * mean_radius)
 
     plane, triangles = triangulate(domain, size, VISIBLE * mean_radius)
     return np.column_stack([plane, surface.height(*plane.T)]), triangles
@@ -83,8 +86,8 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
     bow = 0.5 * np.hypot(*(np.roll(samples, 1, 0) - 2.0 * samples + np.roll(samples, -1, 0)).T).max()
     rings = np.arange(5)[:, None, None] / 4.0 * samples
     sizes = size(rings.reshape(-1, 2)).reshape(5, AROUND)
-    bound = max(AROUND / 2.0 * math.sqrt(bow / off), lengths[-1] / (ALONG * sizes[-1].min()))
-    return around(4 * math.ceil(min(bound, MOST) / 4.0)), float(sizes.min())
+    bound = max(AROUND / 2.0 * math.sqrt(bow / off), lengths[-1] / (RIM_SPACING * sizes[-1].min()))
+    return around(4 * math.ceil(min(bound, MOST_RIM_EDGES) / 4.0)), float(sizes.min())
 
 
 def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
@@ -101,10 +104,10 @@ def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
     i, j, points = i[there], j[there], points[there]
     # How many times wider the coarsest lattice is that has the point: the powers of two in its place.
     place = np.gcd((i - j) // 2, j)
-    wide = np.where(place == 0, MOST, place & -place) * side
+    wide = np.where(place == 0, MOST_RIM_EDGES, place & -place) * side
     wide[i == 0] *= 2.0  # No trapezoid may lie across the axis, for its diagonal would lean.
     distance = cKDTree(rim).query(points)[0]
-    wanted = np.minimum(size(points), edge + GROWTH * distance)
+    wanted = np.minimum(size(points), edge + EDGE_GROWTH * distance)
     kept = np.flatnonzero((wanted < 1.999 * wide) & (distance > CLEAR * edge))
     outward = np.argsort((i**2 + 3 * j**2)[kept], kind="stable")  # whole numbers: the same in any unit
     return points[kept[outward]]
@@ -134,7 +137,7 @@ def _smoothed(points: Array, triangles: NDArray[np.intp], inner: int) -> Array:
     """The points with those inside, but for the first, between their neighbors."""
     start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()  # each edge inside twice
     smoothed, counts = points.copy(), np.maximum(np.bincount(start, minlength=len(points)), 1)
-    for _ in range(PASSES):
+    for _ in range(SMOOTHING_PASSES):
         sums = [np.bincount(start, smoothed[end, axis], len(points)) for axis in (0, 1)]
         smoothed[1:inner] = np.column_stack(sums)[1:inner] / counts[1:inner, None]
     return smoothed if _doubled_areas(smoothed, triangles).min() > 0.0 else points

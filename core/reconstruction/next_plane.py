@@ -12,8 +12,8 @@ from ..contours.contour import SamplingPlane
 from .result import Reconstruction
 
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))
-COARSE = 4  # So many azimuths lie between those that are tried first.
-MOST = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
+COARSE_STRIDE = 4  # So many azimuths lie between those that are tried first.
+MOST_CONTACTS = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
 
 
 def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
@@ -28,11 +28,11 @@ def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
     """
     points, weights = r.domain.nodes
     over = points / r.radius
-    tried = np.arange(0, len(AZIMUTHS), COARSE)
+    tried = np.arange(0, len(AZIMUTHS), COARSE_STRIDE)
     lost = _lost(r, over, AZIMUTHS[tried])
     # Beside the best of them.
-    near = tried[np.argmax(lost @ weights)] + np.arange(1 - COARSE, COARSE)
-    near = near[near % COARSE > 0] % len(AZIMUTHS)
+    near = tried[np.argmax(lost @ weights)] + np.arange(1 - COARSE_STRIDE, COARSE_STRIDE)
+    near = near[near % COARSE_STRIDE > 0] % len(AZIMUTHS)
     tried, lost = np.concatenate([tried, near]), np.vstack([lost, _lost(r, over, AZIMUTHS[near])])
     best = int(np.argmax(lost @ weights))
     variance = np.maximum((r.height_std(*points.T) / r.radius) ** 2 - lost[best], 0.0)
@@ -47,7 +47,7 @@ def _lost(r: Reconstruction, over: Array, azimuths: Array) -> Array:
     it takes the diagonal of shared' seen^-1 shared.
     """
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
-    count, surface = min(wanted, MOST), r.uncertainty
+    count, surface = min(wanted, MOST_CONTACTS), r.uncertainty
     directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
     contours = np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None]
     shared, seen = surface.height_covariances(contours, over)

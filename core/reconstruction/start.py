@@ -25,7 +25,7 @@ from ..patch.domain import Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
 from .strokes import STRIPS, FirstFrame, first_frame, means
 
-COARSE = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
+MOST_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
 
 
 class Given(NamedTuple):
@@ -88,7 +88,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     each = zip(touches, curves.present, curves.tangents, normals, strict=True)
     apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
     errors = [
-        degeneracy(*touch) or (_coarse(gap, size) if gap > COARSE * size else None)
+        degeneracy(*touch) or (_coarse(gap, size) if gap > MOST_ROUNDING * size else None)
         for touch, gap, size in zip(each, apart, reach, strict=True)
     ]
     good = [i for i, error in enumerate(errors) if error is None]
@@ -135,7 +135,7 @@ def strokes_start(
     ]
     for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
         first = found[i]
-        if isinstance(first, FirstFrame) and gap > COARSE * first.radius:
+        if isinstance(first, FirstFrame) and gap > MOST_ROUNDING * first.radius:
             found[i] = _coarse(gap, first.radius)
     errors = [None if isinstance(first, FirstFrame) else first for first in found]
     firsts = {i: first for i, first in enumerate(found) if isinstance(first, FirstFrame)}

@@ -9,15 +9,15 @@ import numpy as np
 from ..contours.tracking import Surface
 from ..reconstruction.result import Reconstruction
 
-SAMPLES = 15  # So many samples of a patch are compared with the mesh.
-LAYERS = 4  # A sample is compared with no more layers of the mesh.
+PATCH_SAMPLES = 15  # So many samples of a patch are compared with the mesh.
+MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh.
 BEYOND = 3.0  # A mesh that is off by more than so many deviations contradicts the patch.
 
 
 def height_error(r: Reconstruction, surface: Surface) -> float | None:
     """The mean distance in height of patch and surface over the domain; None where there is no surface."""
     points, weights = r.domain.nodes
-    some = slice(None, None, len(points) // SAMPLES | 1)
+    some = slice(None, None, len(points) // PATCH_SAMPLES | 1)
     points, weights = points[some], weights[some]
     heights = r.height(points[:, 0], points[:, 1])
     up = r.frame.axes[:, 2].tolist()
@@ -50,7 +50,7 @@ def _height_off(surface: Surface, start: list[float], up: list[float], reach: fl
     nearest = None
     for sign in (1.0, -1.0):
         gone = 0.0
-        for _ in range(LAYERS):
+        for _ in range(MESH_LAYERS):
             at = _along(start, up, sign * gone)
             hit = surface.ray_cast(at, _along([0.0, 0.0, 0.0], up, sign), reach - gone)
             if hit is None:

@@ -20,19 +20,19 @@ from ..reconstruction.result import Reconstruction
 from .sampling import spaced
 from .scanned_mesh import Mesh, corners_of, mesh_distances, mesh_of
 
-# A touch is an array (2, n, 3): contacts, and the patch's unit normals there, in the frame.
+# What was felt is an array (2, n, 3): contacts, and the patch's unit normals there, in the frame.
 # Lengths are in units of the patch's radius.
 SPACING = 0.1  # Spacing of the points that a polynomial is fitted to.
 MOST_POINTS = 400
-PLACES = 0.2  # between the places that are tried
+PLACE_SPACING = 0.2  # between the places that are tried
 TURNS = 36
 TERMS = exponents(0, 4)
-RIDGE = 1e-3  # where a polynomial has few points
-CONTACTS = 60  # The coarse search takes no more contacts.
-COARSE, COARSE_STEPS = 400, 8  # places that move to the planes of the nearest triangles
+POLYNOMIAL_RIDGE = 1e-3  # where a polynomial has few points
+COARSE_CONTACTS = 60  # The coarse search takes no more contacts.
+COARSE_PLACES, COARSE_STEPS = 400, 8  # places that move to the planes of the nearest triangles
 FINE, FINE_STEPS = 24, 20  # and of them to the triangles themselves
-NEAREST = 16  # triangles that are measured
-APART, TURN = 0.05, math.radians(2.0)  # poses that differ by less are one
+NEAREST_TRIANGLES = 16  # triangles that are measured
+SAME_PLACE, SAME_TURN = 0.05, math.radians(2.0)  # poses that differ by less are one
 AMBIGUOUS = 1.5  # times the residual is about as good
 SIGNIFICANT = 3.0  # standard deviations
 LEAST_RESIDUAL = 1e-3  # less is none: the mesh's own facets
@@ -67,10 +67,10 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
         raise ValueError(f"best: wanted a whole number of 1 or more, got {shown(best)}")
     co = finite_array("vertices", vertices, (None, 3), LARGEST)
     corners = corners_of(faces, len(co))
-    touch = np.array([r.contacts / r.radius, r.geometry.normal(*r.contacts[:, :2].T)])
+    felt = np.array([r.contacts / r.radius, r.geometry.normal(*r.contacts[:, :2].T)])
     center = 0.5 * (co[corners].min(axis=(0, 1)) + co[corners].max(axis=(0, 1)))
-    mesh = mesh_of((co - center) / r.radius, corners, math.dist(touch[0].min(axis=0), touch[0].max(axis=0)))
-    places, residuals, slides = _descended(_coarse(touch, mesh), touch, mesh, NEAREST, FINE_STEPS)
+    mesh = mesh_of((co - center) / r.radius, corners, math.dist(felt[0].min(axis=0), felt[0].max(axis=0)))
+    places, residuals, slides = _descended(_coarse(felt, mesh), felt, mesh, NEAREST_TRIANGLES, FINE_STEPS)
     distinct = _distinct(places, residuals)
     poses = []
     for i in distinct[:best]:
@@ -84,21 +84,23 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     return poses
 
 
-def _coarse(touch: Array, mesh: Mesh) -> Array:
+def _coarse(felt: Array, mesh: Mesh) -> Array:
     """The most promising places, moved to where the contacts are nearest to the planes of triangles."""
     from scipy.spatial.transform import Rotation
 
-    touch = touch[:, :: math.ceil(touch.shape[1] / CONTACTS)]
-    places, fields = _fields(mesh, 1.05 * np.linalg.norm(touch[0], axis=1).max())
+    felt = felt[:, :: math.ceil(felt.shape[1] / COARSE_CONTACTS)]
+    places, fields = _fields(mesh, 1.05 * np.linalg.norm(felt[0], axis=1).max())
     turns = Rotation.from_rotvec(
         2.0 * np.pi / TURNS * np.arange(TURNS)[:, None] * [0.0, 0.0, 1.0]
     ).as_matrix()
-    scores = np.column_stack([_scores(touch @ turn.T, fields) for turn in turns])
+    scores = np.column_stack([_scores(felt @ turn.T, fields) for turn in turns])
     least = (scores <= np.roll(scores, 1, axis=1)) & (scores <= np.roll(scores, -1, axis=1))
-    order = np.argsort(np.where(least, scores, np.inf), axis=None)[: min(COARSE, np.count_nonzero(least))]
+    order = np.argsort(np.where(least, scores, np.inf), axis=None)[
+        : min(COARSE_PLACES, np.count_nonzero(least))
+    ]
     places = places[order // TURNS]
     places[..., :3] = places[..., :3] @ turns[order % TURNS]
-    places, residuals, _ = _descended(places, touch, mesh, 1, COARSE_STEPS)
+    places, residuals, _ = _descended(places, felt, mesh, 1, COARSE_STEPS)
     return places[_distinct(places, residuals)[:FINE]]
 
 
@@ -108,7 +110,7 @@ def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
 
     rng = np.random.default_rng(0)
     points = [i for i in spaced(mesh.centers, SPACING, rng) if i is not None]
-    chosen = [points[i] for i in spaced(mesh.centers[points], PLACES, rng) if i is not None]
+    chosen = [points[i] for i in spaced(mesh.centers[points], PLACE_SPACING, rng) if i is not None]
     places = np.concatenate([_axes(mesh.smooth[chosen]), mesh.centers[chosen, :, None]], axis=2)
     # The last one is what a query finds where there is nothing.
     co, normals = (np.vstack([a[points], np.zeros(3)]) for a in (mesh.centers, mesh.smooth))
@@ -120,19 +122,19 @@ def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
         weights = np.maximum(normals[found] @ axes[..., 2:], 0.0)
         x, y = local.reshape(-1, 3)[:, :2].T
         basis = weights * monomials(x, y, TERMS).reshape(*found.shape, -1)
-        system = basis.swapaxes(1, 2) @ basis + RIDGE * np.eye(len(TERMS))
+        system = basis.swapaxes(1, 2) @ basis + POLYNOMIAL_RIDGE * np.eye(len(TERMS))
         fields.append(np.linalg.solve(system, basis.swapaxes(1, 2) @ (weights * local)[..., 2:])[..., 0])
     return places, np.concatenate(fields).T
 
 
-def _scores(touch: Array, fields: Array) -> Array:
+def _scores(felt: Array, fields: Array) -> Array:
     """Sums of squared distances of the contacts to polynomials (k, m).
 
     What a small tilt and a shift along the normal make good does not count: so neither does, on a quadric,
     a small shift along the surface.
     """
-    x, y, z = touch[0].T
-    weights = touch[1, :, 2:]  # a height on a slope is less of a distance
+    x, y, z = felt[0].T
+    weights = felt[1, :, 2:]  # a height on a slope is less of a distance
     off = weights * (z[:, None] - monomials(x, y, TERMS) @ fields)
     free = np.linalg.qr(weights * monomials(x, y, exponents(0, 1)))[0]
     return np.sum(off**2, axis=0) - np.sum((free.T @ off) ** 2, axis=0)
@@ -146,13 +148,13 @@ def _axes(normals: Array) -> Array:
 
 
 def _descended(
-    places: Array, touch: Array, mesh: Mesh, neighbors: int, steps: int
+    places: Array, felt: Array, mesh: Mesh, neighbors: int, steps: int
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Places where the contacts are nearest to the mesh (Levenberg-Marquardt), their residuals, and whether
     noise alone may shift them to another."""
     from scipy.spatial.transform import Rotation
 
-    distances, slopes = mesh_distances(places, touch, mesh, neighbors)
+    distances, slopes = mesh_distances(places, felt, mesh, neighbors)
     damping = np.full((len(places), 1, 1), 1e-3)
     for _ in range(steps):
         square = slopes.swapaxes(1, 2) @ slopes
@@ -161,12 +163,12 @@ def _descended(
         moved = places.copy()
         moved[..., :3] = Rotation.from_rotvec(step[:, :3]).as_matrix() @ places[..., :3]
         moved[..., 3] += step[:, 3:]
-        found = mesh_distances(moved, touch, mesh, neighbors)
+        found = mesh_distances(moved, felt, mesh, neighbors)
         better = np.sum(found[0] ** 2 - distances**2, axis=1, keepdims=True) < 0.0
         places, distances = np.where(better, moved, places), np.where(better, found[0], distances)
         slopes = np.where(better, found[1], slopes)
         damping *= np.where(better, 0.2, 5.0)
-    slopes = slopes * np.repeat([TURN, APART], 3)
+    slopes = slopes * np.repeat([SAME_TURN, SAME_PLACE], 3)
     growth = np.linalg.eigvalsh(slopes.swapaxes(1, 2) @ slopes)[:, 0]
     residuals = np.sqrt(np.mean(distances[..., 0] ** 2, axis=1))
     return places, residuals, growth < (SIGNIFICANT * np.maximum(residuals, LEAST_RESIDUAL)) ** 2
@@ -176,8 +178,8 @@ def _distinct(places: Array, residuals: Array) -> list[int]:
     """Indices of places that differ, the best first."""
     found: list[int] = []
     for i in np.argsort(residuals).tolist():
-        far = np.linalg.norm(places[found, :, 3] - places[i, :, 3], axis=1) > APART
+        far = np.linalg.norm(places[found, :, 3] - places[i, :, 3], axis=1) > SAME_PLACE
         trace = np.einsum("mij,ij->m", places[found, :, :3], places[i, :, :3])
-        if (far | (trace < 1.0 + 2.0 * math.cos(TURN))).all():
+        if (far | (trace < 1.0 + 2.0 * math.cos(SAME_TURN))).all():
             found.append(i)
     return found

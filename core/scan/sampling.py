@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 
-CROWD = 100_000  # points that are sorted at once
+SORTED_AT_ONCE = 100_000  # points that are sorted at once
 CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
 
 
@@ -22,8 +22,8 @@ def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[
     from scipy.spatial import cKDTree
 
     left = []
-    for start in range(0, len(points), CROWD):
-        left.append(start + _one_a_cell(points[start : start + CROWD], CELL * spacing))
+    for start in range(0, len(points), SORTED_AT_ONCE):
+        left.append(start + _one_a_cell(points[start : start + SORTED_AT_ONCE], CELL * spacing))
         yield None
     chosen = np.concatenate(left)
     chosen = rng.permutation(chosen[_one_a_cell(points[chosen], CELL * spacing)])

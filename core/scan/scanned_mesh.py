@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scanned mesh as triangles of like size, and how far contacts are from it.
 
-Lengths are in units of the patch's radius; places and touches are those of registration.py.
+Lengths are in units of the patch's radius; places and what was felt are those of pose_search.py.
 """
 
 from typing import Any, NamedTuple
@@ -82,13 +82,13 @@ def _halved(pieces: Array) -> Array:
     return np.concatenate(done)
 
 
-def mesh_distances(places: Array, touch: Array, mesh: Mesh, neighbors: int) -> tuple[Array, Array]:
+def mesh_distances(places: Array, felt: Array, mesh: Mesh, neighbors: int) -> tuple[Array, Array]:
     """Distances of the contacts to the mesh, (m, n, 1), and their derivatives (m, n, 6) by the motion.
 
     To the plane of the nearest triangle, or of some that are near to the nearest point.
     """
     turned = places[..., :3].swapaxes(1, 2)
-    arms, normals = touch[0] @ turned, (touch[1] @ turned).reshape(-1, 3)
+    arms, normals = felt[0] @ turned, (felt[1] @ turned).reshape(-1, 3)
     points = (arms + places[:, None, :, 3]).reshape(-1, 3)
     near = mesh.tree.query(np.hstack([points, FACING * normals]), range(1, neighbors + 1))[1]
     nearest = near[:, 0]

@@ -16,7 +16,7 @@ from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 
 EXTRA = 9  # contours, as in the paper's Fig. 3
-STEPS = 12  # Steps of such a contour in a radius.
+STEPS_A_RADIUS = 12  # Steps of such a contour in a radius.
 REACHES = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
 HAIR = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.
 
@@ -84,7 +84,7 @@ def _extra_contours(r: Reconstruction, surface: Surface, count: int) -> list[Arr
         return []
     planes = [SamplingPlane(azimuth) for azimuth in _azimuths_between(r.domain, count)]
     normal, tangent = r.frame.axes[:, 2], r.frame.axes[:, 0]
-    extent, step = 2.0 * r.radius, r.radius / STEPS  # Steep patches are followed to the rim too.
+    extent, step = 2.0 * r.radius, r.radius / STEPS_A_RADIUS  # Steep patches are followed to the rim too.
     contours = []
     for contour in track(surface, start, normal, planes, extent=extent, step=step, tangent=tangent):
         local = r.frame.to_local(contour.points[(contour.points != start).any(axis=1)])

@@ -13,7 +13,7 @@ from mathutils import Matrix
 from ... import core
 from ..probes import probe
 from ..probes.operators import is_unlocked, report_error, target_object
-from ..scene import patch_object
+from ..scene import patch_record
 from ..touch.surface import MeshSurface
 from ..touch.wording import registration_summary
 from .verify_operator import chosen_mesh
@@ -32,7 +32,7 @@ class Search:
         if probe.probe_of(patch) is not None:
             raise ValueError(f'The place of "{patch.name}" is that of its probe: it is known already')
         vertices, faces = MeshSurface(target, depsgraph).triangles()
-        given = patch_object.reconstruction_of(patch), vertices, faces
+        given = patch_record.reconstruction_of(patch), vertices, faces
         self.patch, self.target, self._matrix = patch.name, target.name, patch.matrix_world.copy()
         self._found, self._error = None, None
         self._thread = threading.Thread(target=self._run, args=given, daemon=True)
@@ -68,14 +68,14 @@ class Search:
             raise ValueError(f'"{self.patch}" was deleted while its place was looked for')
         matrix[:3, :3], matrix[:3, 3] = chosen.rotation, chosen.translation
         patch.matrix_world = Matrix(matrix.tolist()) @ self._matrix
-        patch[patch_object.RECORD]["registration"] = {
+        patch[patch_record.RECORD]["registration"] = {
             "target": self.target,
             "pose": pose,
             "residuals": [found.residual for found in self.poses],
             "vertices": [found.vertex for found in self.poses],
             "is_ambiguous": self.poses[0].is_ambiguous,
         }
-        return patch[patch_object.RECORD]["registration"].to_dict()
+        return patch[patch_record.RECORD]["registration"].to_dict()
 
 
 def register_patch(patch, target, depsgraph, pose=1):

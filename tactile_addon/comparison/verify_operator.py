@@ -7,10 +7,10 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ... import core
-from ..probes import probe
+from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.operators import is_unlocked, report_error, target_object
-from ..scene import mesh_data, patch_object
+from ..scene import mesh_data, patch_object, patch_record
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import reachable
 from ..touch.touch_report import judgment
@@ -23,11 +23,11 @@ def verify_patch(patch, target, depsgraph):
     Raises ValueError, with a sentence and nothing changed, where that cannot be done.
     """
     probe.require_unlocked(patch)
-    patch_object.require_whole(patch)
-    r, surface = patch_object.reconstruction_of(patch), MeshSurface(target, depsgraph)
+    patch_record.require_whole(patch)
+    r, surface = patch_record.reconstruction_of(patch), MeshSurface(target, depsgraph)
     _, vertices = reachable(surface, r)
     found = core.verify(r, surface, vertices)
-    record = patch[patch_object.RECORD]
+    record = patch[patch_record.RECORD]
     points, normals = _vertices(patch.data, r, r.radius / record["radius"])
     deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
     mesh_data.own_mesh(patch)
@@ -73,13 +73,13 @@ class TACTILE_OT_verify(bpy.types.Operator):
         obj = context.view_layer.objects.active
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         if found is not None and is_pending(found):  # Completing it later would undo the verification.
-            probe.refresh(found, context)
+            touch_again.refresh(found, context)
         try:
             target = target_object(context, self.target or chosen_mesh(context, patch))
             verify_patch(patch, target, context.evaluated_depsgraph_get())
         except ValueError as error:
             return report_error(self, error)
-        record = patch[patch_object.RECORD].to_dict()
+        record = patch[patch_record.RECORD].to_dict()
         doubt, summary = verification_summary(record)
         self.report({"WARNING"} if doubt else {"INFO"}, summary)
         return {"FINISHED"}

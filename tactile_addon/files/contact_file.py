@@ -13,13 +13,13 @@ from ... import core
 from ...core.arguments import LARGEST
 from ..touch import units
 from . import contact_rows, ply_contacts, whole_file
-from .contact_rows import NORMAL, POINT, Contacts
+from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
 VERSION = 2
 TITLE = "# Tactile Patch contacts, version "
-LENGTHS = dict(units.METERS.values())  # meters in each unit
+UNIT_METERS = dict(units.METERS.values())  # meters in each unit
 DIRECTIONS, DEVIATIONS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
-NAMES = ("curve", "time", *POINT, *NORMAL)
+COLUMNS = ("curve", "time", *POINT_COLUMNS, *NORMAL_COLUMNS)
 STROKE = "stroke"  # the name of a curve that runs beside the reference point begins with it
 
 
@@ -60,7 +60,7 @@ def write(path, contacts):
     labels = [str(number) for number in range(1, len(contours) + 1)]
     labels += [f"{STROKE} {number}" for number in range(1, len(strokes) + 1)]
     contours = [*contours, *strokes]
-    names = POINT + (NORMAL if any(c.normals is not None for c in contours) else ())
+    names = POINT_COLUMNS + (NORMAL_COLUMNS if any(c.normals is not None for c in contours) else ())
     told = {"point": point, "outward": outward}
     for key in DEVIATIONS:
         stds = [getattr(c, key) for c in contours]
@@ -72,7 +72,9 @@ def write(path, contacts):
         if values is not None:
             print("#", key, *("-" if value is None else repr(value) for value in values), file=text)
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(["curve", *(f"{name} [{unit}]" if unit and name in POINT else name for name in names)])
+    table.writerow(
+        ["curve", *(f"{name} [{unit}]" if unit and name in POINT_COLUMNS else name for name in names)]
+    )
     for label, contour in zip(labels, contours, strict=True):
         rows = contour.points.tolist()
         if len(names) == 6:
@@ -180,22 +182,24 @@ def _columns(at, header):
     columns, found = {}, {}
     for i, title in enumerate(header):
         key, bracketed, suffix = _parts(title.lower())
-        if key not in NAMES:
+        if key not in COLUMNS:
             continue
         unit = (bracketed or suffix).replace("μ", "µ")
         unit = "µm" if unit == "um" else unit
-        if key in POINT and unit and unit not in LENGTHS:
+        if key in POINT_COLUMNS and unit and unit not in UNIT_METERS:
             if suffix:  # Columns such as x_offset are not coordinates.
                 continue
-            raise ValueError(f'{at}: wanted a unit out of {", ".join(LENGTHS)}, got "{unit}"')
+            raise ValueError(f'{at}: wanted a unit out of {", ".join(UNIT_METERS)}, got "{unit}"')
         if key in columns:
             raise ValueError(f'{at}: wanted one column "{key}", got two')
         columns[key], found[key] = i, unit
-    missing = [key for key in POINT if key not in columns]
-    missing += [key for key in NORMAL if key not in columns and any(k in columns for k in NORMAL)]
+    missing = [key for key in POINT_COLUMNS if key not in columns]
+    missing += [
+        key for key in NORMAL_COLUMNS if key not in columns and any(k in columns for k in NORMAL_COLUMNS)
+    ]
     if missing:
         raise ValueError(f'{at}: wanted the column "{missing[0]}", got "{_shown(header)}"')
-    used = {found[key] for key in POINT}
+    used = {found[key] for key in POINT_COLUMNS}
     if len(used) > 1:
         raise ValueError(f"{at}: wanted x, y and z in one unit, got {' and '.join(sorted(used))}")
     return len(header), columns, used.pop()

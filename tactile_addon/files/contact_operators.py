@@ -17,7 +17,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..probes import probe
 from ..probes.operators import make_active, report_error
-from ..scene import patch_object
+from ..scene import patch_object, patch_record
 from ..touch.settings import FitSettings, draw_solver
 from ..touch.wording import fit_summary
 from . import contact_file, measured
@@ -29,7 +29,7 @@ UNITS = [
         "The unit that the columns name; where they name none, numbers are taken as they are",
     ),
     ("NONE", "As They Are", "Numbers are lengths of the scene, whatever the file says"),
-    *((unit, unit, f"Numbers are lengths in {unit}") for unit in contact_file.LENGTHS),
+    *((unit, unit, f"Numbers are lengths in {unit}") for unit in contact_file.UNIT_METERS),
 ]
 
 
@@ -188,7 +188,7 @@ class TACTILE_OT_export_contacts(_PatchExport, bpy.types.Operator):
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
     def write(self, patch):
-        r = patch_object.reconstruction_of(patch)
+        r = patch_record.reconstruction_of(patch)
         contact_file.write(self.filepath, contact_file.contacts_of(r))
 
 
@@ -201,7 +201,7 @@ class TACTILE_OT_export_patch(_PatchExport, bpy.types.Operator):
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def write(self, patch):
-        contact_file.write_patch(self.filepath, patch_object.reconstruction_of(patch))
+        contact_file.write_patch(self.filepath, patch_record.reconstruction_of(patch))
 
 
 class TACTILE_FH_contacts(bpy.types.FileHandler):

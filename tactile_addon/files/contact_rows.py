@@ -11,8 +11,8 @@ import numpy as np
 from ... import core
 from ...core.arguments import LARGEST
 
-POINT, NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
-BLOCK = 1 << 16  # letters that are looked at together
+POINT_COLUMNS, NORMAL_COLUMNS = ("x", "y", "z"), ("nx", "ny", "nz")
+LETTERS_AT_ONCE = 1 << 16  # letters that are looked at together
 MIX = np.array([1.0, math.pi, math.e])  # makes one number of a point, which few others share
 
 
@@ -29,7 +29,7 @@ class Contacts(NamedTuple):
 def blocks(text, start=0, number=1):
     """(place, line number, some lines in one string) from that place on, but for what is empty."""
     while start < len(text):
-        end = text.find("\n", start + BLOCK) + 1 or len(text)
+        end = text.find("\n", start + LETTERS_AT_ONCE) + 1 or len(text)
         block = text[start:end]
         if not block.isspace():
             yield start, number, block
@@ -61,7 +61,7 @@ class Rows:
 
     def __init__(self, name, separator, width, columns):
         self._name, self._separator, self._width, self._columns = name, separator, width, columns
-        self._keys = [key for key in (*POINT, *NORMAL, "time") if key in columns]
+        self._keys = [key for key in (*POINT_COLUMNS, *NORMAL_COLUMNS, "time") if key in columns]
         self._curves, self._measured = {}, {}  # curves by their labels, and whether they have normals
         self._numbers, self._labels = [np.empty((0, len(self._keys)))], [np.empty(0, dtype=np.intp)]
 
@@ -137,16 +137,16 @@ class Rows:
         label = row.get("curve", "1")
         if not label:
             raise ValueError(f'{at}: wanted a number or a name in the column "curve", got none')
-        values = [self._value(at, row, key) for key in POINT]
-        measured = "nx" in row and any(row[key] for key in NORMAL)
+        values = [self._value(at, row, key) for key in POINT_COLUMNS]
+        measured = "nx" in row and any(row[key] for key in NORMAL_COLUMNS)
         if measured is not self._measured.setdefault(label, measured):
             raise ValueError(f"{at}: wanted normals all along a curve or nowhere, got some")
         if "nx" in row:
-            values += [self._value(at, row, key) if measured else math.nan for key in NORMAL]
+            values += [self._value(at, row, key) if measured else math.nan for key in NORMAL_COLUMNS]
         return label, [*values, *([self._value(at, row, "time")] if "time" in row else [])]
 
     def _value(self, at, row, key):
-        return number_of(f'{at}, column "{key}"', row[key], LARGEST if key in POINT else math.inf)
+        return number_of(f'{at}, column "{key}"', row[key], LARGEST if key in POINT_COLUMNS else math.inf)
 
 
 def contours(name, labels, points, normals, times, titles):

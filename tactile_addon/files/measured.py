@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import core
 from ..touch.single_precision import require_single
-from ..touch.touch_object import Touch, reference_axes
+from ..touch.touch_object import Touched, reference_axes
 from ..touch.touch_report import measures, reconstruction_report, suggestion_report
 from . import contact_file
 
@@ -21,7 +21,7 @@ FLAT = 0.02  # Least |k1 + k2| in unit radius: a surface with less bulges to no 
 def read(paths, unit, meters):
     """The contact_file.Contacts of files whose curves belong together, in a world of so many meters a unit.
 
-    unit : of the numbers, as in contact_file.LENGTHS; "FILE" for what each file names; "NONE" to take
+    unit : of the numbers, as in contact_file.UNIT_METERS; "FILE" for what each file names; "NONE" to take
         them as they are, as those of a file that names none are taken.
 
     Raises ValueError where files name different reference points, and what contact_file.read raises.
@@ -31,7 +31,7 @@ def read(paths, unit, meters):
     for path in paths:
         curves, named, point, outward, beside = contact_file.read(path)
         named = {"FILE": named, "NONE": ""}.get(unit, unit)
-        factor = contact_file.LENGTHS[named] / meters if named else 1.0
+        factor = contact_file.UNIT_METERS[named] / meters if named else 1.0
         # 1 / 0.1 and the like are not exact: a file in the world's unit stays as it is.
         factor = 1.0 if math.isclose(factor, 1.0, rel_tol=1e-6) else factor
         contours += [_scaled(curve, factor) for curve in curves]
@@ -63,7 +63,7 @@ def fit(
     radius=0.0,
     **options,
 ):
-    """The patch that contact_file.Contacts show, as a Touch without a surface.
+    """The patch that contact_file.Contacts show, as a Touched without a surface.
 
     point : where the curves meet, exact; None for that of the file, or core.common_point. From strokes alone
         a place among them; None for that of the file, or their mean
@@ -123,7 +123,7 @@ def _fit(source, contacts, point, outward, flip, normal_std, options):
     }
     if distances is not None:
         report["misses"] = distances.tolist()
-    return Touch(None, result, report)
+    return Touched(None, result, report)
 
 
 def _mean_normal(contours):

@@ -6,9 +6,9 @@ import numpy as np
 
 from ...core.arguments import LARGEST
 from . import contact_rows
-from .contact_rows import NORMAL, POINT, Contacts
+from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
-BLOCK = 1000  # rows of a .ply that are read together
+PLY_ROWS = 1000  # rows of a .ply that are read together
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
@@ -42,12 +42,14 @@ def read(name, path):
     else:
         rows = _ply_rows(name, len(lines) + 2 + start, text[start : start + count], fields)
     table = {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
-    points = np.column_stack([table[key] for key in POINT])
+    points = np.column_stack([table[key] for key in POINT_COLUMNS])
     wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN is nowhere
     if wild.any():
         at = f"{name}, contact {np.argmax(wild) + 1}"
         raise ValueError(f"{at}: wanted finite coordinates up to {LARGEST:g}, got others")
-    normals = np.column_stack([table[key] for key in NORMAL]) if set(NORMAL) <= set(table) else None
+    normals = (
+        np.column_stack([table[key] for key in NORMAL_COLUMNS]) if set(NORMAL_COLUMNS) <= set(table) else None
+    )
     labels, titles = _in_order(table.get("curve", np.ones(count)))
     contours = contact_rows.contours(name, labels, points, normals, table.get("time"), titles)
     if not {"curve", "time"} & set(table):  # bare points, in no order
@@ -83,7 +85,7 @@ def _ply_vertices(name, lines, order):
             break
         fields = [(key, order + kind) for key, kind in properties]
         if element == "vertex":
-            if not {*POINT} <= {*dict(fields)} or count < 1 or len(dict(fields)) < len(fields):
+            if not {*POINT_COLUMNS} <= {*dict(fields)} or count < 1 or len(dict(fields)) < len(fields):
                 break
             return before, count, fields
         before.append((fields, count))
@@ -93,9 +95,9 @@ def _ply_vertices(name, lines, order):
 def _ply_rows(name, first, lines, fields):
     """The values of lines of text, the first of them the file's line `first`."""
     rows = np.empty(len(lines), [(key, "f8") for key, _ in fields])
-    for start in range(0, len(lines), BLOCK):
-        words = [line.decode("latin-1").split() for line in lines[start : start + BLOCK]]
-        some = rows[start : start + BLOCK]
+    for start in range(0, len(lines), PLY_ROWS):
+        words = [line.decode("latin-1").split() for line in lines[start : start + PLY_ROWS]]
+        some = rows[start : start + PLY_ROWS]
         try:
             columns = list(zip(*words, strict=True))
             for (key, _), column in zip(fields, columns, strict=True):

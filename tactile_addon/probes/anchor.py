@@ -11,7 +11,7 @@ import math
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..scene import patch_object
+from ..scene import patch_record
 
 BASE = "tactile_base"  # a patch's custom property: its target's matrix and its own when it was touched
 SEAT = 20  # numbers: the place in the target, directions there, and the target's own scale and shear
@@ -27,7 +27,7 @@ def attach(probe, target):
         above = above.parent
     place = probe.matrix_world.copy()
     probe.parent, probe.parent_type = target, "OBJECT"
-    patch_object.place(probe, place)
+    patch_record.place(probe, place)
 
 
 def detach(probe):
@@ -51,7 +51,7 @@ def can_have_children(probe):
 def put(probe, matrix):
     """Puts the probe there in the world."""
     if is_attached(probe):
-        patch_object.place(probe, matrix)
+        patch_record.place(probe, matrix)
     else:
         probe.matrix_world = matrix
 
@@ -78,7 +78,7 @@ def settle(probe, extent):
     x /= np.linalg.norm(x)
     turn = Matrix(np.column_stack([x, np.cross(z, x), z]).tolist())
     scale = probe.matrix_basis.to_scale()
-    patch_object.place(probe, Matrix.LocRotScale(Vector(at + to_world[:3, 3]), turn, scale))
+    patch_record.place(probe, Matrix.LocRotScale(Vector(at + to_world[:3, 3]), turn, scale))
 
 
 def seat(probe, extent):
@@ -111,8 +111,8 @@ def _seat(to_world, place):
 def keep(probe, patch):
     """Keeps where the target of the probe is, with a patch that was touched just now."""
     target = probe.tactile_probe.target
-    axes, origin = patch_object.touched_frame(patch)
-    patch[BASE] = [*_numbers(target.matrix_world), *_numbers(patch_object.matrix_of(axes, origin))]
+    axes, origin = patch_record.touched_frame(patch)
+    patch[BASE] = [*_numbers(target.matrix_world), *_numbers(patch_record.matrix_of(axes, origin))]
 
 
 def carry(probe, patch):
@@ -120,7 +120,7 @@ def carry(probe, patch):
 
     Not where the probe has been left behind, as one that is not the target's child.
     """
-    target, report, base = probe.tactile_probe.target, patch_object.report_of(patch), patch.get(BASE)
+    target, report, base = probe.tactile_probe.target, patch_record.report_of(patch), patch.get(BASE)
     if target is None or report is None or base is None or report["source"] != target.name:
         return
     if not is_attached(probe) and seat(probe, report.get("extent", 0.0)) != list(probe.tactile_probe.seat):
@@ -134,7 +134,7 @@ def carry(probe, patch):
     if not np.isfinite(motion).all():
         return
     origin = motion[:3, :3] @ frame[:3, 3] + motion[:3, 3]
-    patch_object.move_record(patch, turn @ frame[:3, :3], origin)
+    patch_record.move_record(patch, turn @ frame[:3, :3], origin)
 
 
 def _numbers(matrix):

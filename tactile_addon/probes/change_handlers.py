@@ -15,19 +15,8 @@ from bpy.app.handlers import persistent
 
 from ..scene.family import remembered
 from . import anchor, deleted
-from .probe import (
-    forget_targets,
-    is_free,
-    is_outdated,
-    is_probe,
-    may_be_outdated,
-    measure_shape,
-    probe_of,
-    record_of,
-    stand_by,
-    targets,
-    update,
-)
+from .probe import forget_targets, is_free, is_probe, probe_of, record_of, targets
+from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
 
 SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
 SLICE = 0.2  # seconds of work between two events, in a window

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ..scene import patch_object
+from ..scene import patch_object, patch_record
 from ..touch.settings import silent
 from . import anchor
 from .probe import DIGEST, is_result, record_of
@@ -71,7 +71,7 @@ def look_for_contours():
     """Has the contours go whose patch was deleted: without its coordinates they mean nothing."""
     there = {obj.session_uid: obj for obj in bpy.data.objects}
     for number, obj in there.items():
-        if patch_object.CONTOURS in obj and obj.parent is not None:
+        if patch_record.CONTOURS in obj and obj.parent is not None:
             _owners[number] = obj.parent.session_uid
     if any(_is_left(obj, there) for obj in there.values()) or _unused_meshes():
         _remove_soon()

@@ -5,9 +5,9 @@
 import bpy
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 
-from ..scene import patch_object
+from ..scene import patch_object, patch_record
 from ..touch.settings import TouchSettings, draw_all, touch_arguments
-from ..touch.touch_object import touch, verify
+from ..touch.touch_object import completed, touch
 from ..touch.wording import fit_summary, sentence
 from .probe import lock_of, probe_of, record_of
 
@@ -64,7 +64,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
             )
         except ValueError as error:
             return report_error(self, error)
-        touched = verify(touched)
+        touched = completed(touched)
         patch = patch_object.insert(context.scene, touched)
         make_active(context, patch)
         report = touched.report
@@ -91,7 +91,7 @@ def report_error(operator, error):
 def target_object(context, name):
     """The object to touch: by name, or the active one, or what the active patch or map was touched on."""
     obj = context.view_layer.objects.active
-    record, found = record_of(obj) or (obj and obj.get(patch_object.MAP_RECORD)), probe_of(obj)
+    record, found = record_of(obj) or (obj and obj.get(patch_record.MAP_RECORD)), probe_of(obj)
     if not name and found is not None and found.tactile_probe.target is not None:
         return found.tactile_probe.target
     if not name and record is not None:

@@ -7,11 +7,11 @@ import math
 import bpy
 from bpy.props import FloatProperty, IntProperty
 
-from ..scene import patch_object
+from ..scene import patch_object, patch_record
 from ..touch import units
 from ..touch.settings import MOST_PLANES
 from ..touch.wording import added_planes
-from . import probe
+from . import probe, touch_again
 from .operators import is_unlocked, report_error
 
 
@@ -54,7 +54,7 @@ class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         record = probe.record_of(found)
         _add(found.tactile_probe, None if record is None else record.get("suggested_plane"))
-        probe.refresh(found, context)
+        touch_again.refresh(found, context)
         return {"FINISHED"}
 
 
@@ -75,14 +75,14 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         depsgraph = context.evaluated_depsgraph_get()
         try:
-            touched = probe.touch_at(found, depsgraph, complete=True, tolerance=self.tolerance)
+            touched = touch_again.touch_at(found, depsgraph, complete=True, tolerance=self.tolerance)
         except ValueError as error:
             return report_error(self, error)
         settings = found.tactile_probe
         settings.is_probe = False  # It must not be touched again for each of these.
         for plane in touched.report["added_planes"]:
             _add(settings, plane)
-        probe.adopt(found, touched, depsgraph, complete=True)
+        touch_again.adopt(found, touched, depsgraph, complete=True)
         settings.is_probe = True
         unit = units.unit_of(context.scene, touched.result.radius)
         self.report({"INFO"}, added_planes(touched.report, unit))
@@ -124,7 +124,7 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
             values.append(values.pop(self.plane))
             setattr(settings, name, values)
         settings.plane_count -= 1
-        probe.refresh(found, context)
+        touch_again.refresh(found, context)
         return {"FINISHED"}
 
 
@@ -136,7 +136,7 @@ class TACTILE_OT_update(_ProbeOperator, bpy.types.Operator):
 
     def execute(self, context):
         found = probe.probe_of(context.view_layer.objects.active)
-        probe.refresh(found, context)
+        touch_again.refresh(found, context)
         if found.tactile_probe.message:
             self.report({"WARNING"}, found.tactile_probe.message)
         return {"FINISHED"}
@@ -151,7 +151,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
     def execute(self, context):
         found = probe.probe_of(context.view_layer.objects.active)
         patch = probe.patch_of(found)
-        lines = None if patch is None else patch_object.contours_of(patch)
+        lines = None if patch is None else patch_record.contours_of(patch)
         patch_object.remove_objects(list(filter(None, (lines, patch, found))))
         return {"FINISHED"}
 

@@ -5,7 +5,7 @@
 import numpy as np
 
 # ColorBrewer's RdBu in nine steps (sRGB), which color-blind readers can tell apart.
-STOPS = np.array([
+COLOR_STOPS = np.array([
     (33, 102, 172), (67, 147, 195), (146, 197, 222), (209, 229, 240), (247, 247, 247),
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
@@ -19,7 +19,9 @@ def symmetric_range(values, floor):
 def shades(values, limit):
     """RGBA (n, 4), as screens have it (sRGB), of values (n,) on a scale from -limit to limit."""
     at = np.clip(np.asarray(values) / limit, -1.0, 1.0)
-    srgb = np.column_stack([np.interp(at, np.linspace(-1.0, 1.0, len(STOPS)), stop) for stop in STOPS.T])
+    srgb = np.column_stack(
+        [np.interp(at, np.linspace(-1.0, 1.0, len(COLOR_STOPS)), stop) for stop in COLOR_STOPS.T]
+    )
     return np.column_stack([srgb, np.ones(len(srgb))])
 
 

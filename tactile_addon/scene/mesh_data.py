@@ -5,7 +5,7 @@
 import bpy
 import numpy as np
 
-KEYS = {
+ATTRIBUTE_KEYS = {
     "FLOAT": "value",
     "INT": "value",
     "BOOLEAN": "value",
@@ -40,13 +40,13 @@ def write(mesh, name, kind, values):
         mesh.attributes.remove(attribute)
         attribute = None
     attribute = attribute or mesh.attributes.new(name, kind, "POINT")
-    attribute.data.foreach_set(KEYS[kind], values.ravel())
+    attribute.data.foreach_set(ATTRIBUTE_KEYS[kind], values.ravel())
 
 
 def values(mesh, name):
     """Values of a point attribute, (n,) or (n, 3)."""
     attribute = mesh.attributes[name]
-    key = KEYS[attribute.data_type]
+    key = ATTRIBUTE_KEYS[attribute.data_type]
     values = np.empty((len(attribute.data), 3) if key == "vector" else len(attribute.data))
     attribute.data.foreach_get(key, values.ravel())
     return values

@@ -11,36 +11,25 @@ from mathutils import Matrix
 from ... import core
 from . import colors
 from .contour_mesh import fill_contours
-from .family import add, children_of
+from .family import add
 from .mesh_data import emission, fill, own_mesh, values, write
+from .patch_record import (
+    COLOR,
+    CONTOURS,
+    POWERS,
+    QUANTITIES_OF_A_FIT,
+    RECONSTRUCTION,
+    RECORD,
+    VERDICT,
+    _place_contours,
+    contours_of,
+    matrix_of,
+    place,
+)
 
 COLLECTION = "Tactile Patches"
-RECORD = "tactile"  # the patch object's custom property that holds the report,
-RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
-VERDICT = "tactile_verdict"  # and the one with its status and message while these say that it is outdated
-COLOR = "curvature_color"
-MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
-CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
-# What the colors can show: attribute, name, description, and the power of length it is measured in.
-QUANTITIES = [
-    ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
-    ("mean_curvature", "Mean Curvature", "H: blue where the surface bulges outward, red where inward", -1),
-    (
-        "shape_index",
-        "Shape Index",
-        "1 on caps, 0.5 on ridges, 0 on saddles, -0.5 in ruts, -1 in cups",
-        0,
-    ),
-    ("curvedness", "Curvedness", "How strongly it bends, whatever the shape", -1),
-    ("deviation", "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
-    ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
-]
-POWERS = {name: power for name, _, _, power in QUANTITIES}
-# These need no mesh.
-QUANTITIES_OF_A_FIT = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness", "height_std")
 NORMAL, PLACE = "custom_normal", "domain_place"  # attributes: as shaded; on the unit disk, see core.Domain
-POSITIVE = ("curvedness", "height_std")  # never below zero: half a scale says it all
 FLOOR = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
 
 
@@ -106,155 +95,10 @@ def rewrite(patch, touched):
     recolor(patch)
 
 
-def report_of(patch):
-    """The report of a patch object; None where somebody has made something else of it."""
-    report = patch.get(RECORD)
-    try:
-        frame = np.array([report["frame"][name] for name in ("origin", "d1", "d2", "normal")], dtype=float)
-        numbers = [float(report[name]) for name in ("radius", "height_std", "k1", "k2")]
-        words = [report[name] for name in ("source", "status", "message", "ended")]
-        report["is_verified"]
-    except (KeyError, TypeError, ValueError, AttributeError):
-        return None
-    good = frame.shape == (4, 3) and np.isfinite(frame).all() and np.isfinite(numbers).all()
-    return report if good and numbers[0] > 0.0 and all(isinstance(word, str) for word in words) else None
-
-
-def require_whole(patch):
-    """Raises ValueError where the patch object has been edited into what is none."""
-    if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
-        raise ValueError(f'"{patch.name}" was edited, and is no whole patch any more: touch again')
-
-
-def _is_whole(mesh):
-    kinds = {name: "FLOAT" for name in POWERS} | {COLOR: "FLOAT_COLOR"}
-    found = {name: mesh.attributes.get(name) for name in kinds}
-    return len(mesh.vertices) > 0 and all(
-        attribute is not None and (attribute.data_type, attribute.domain) == (kinds[name], "POINT")
-        for name, attribute in found.items()
-    )
-
-
-def mark_failed(patch, why):
-    """The patch is that of an earlier touch, for the last one failed."""
-    _outdate(patch, {"message": f"This is the patch of an earlier touch, for the last one failed. {why}"})
-
-
-def mark_stale(patch):
-    """The patch is that of an earlier touch, and nothing has been felt since."""
-    _outdate(
-        patch,
-        {
-            "message": "This is the patch of an earlier touch, for the probe or its target has changed "
-            "since: touch again."
-        },
-    )
-
-
-def _outdate(patch, verdict):
-    report = report_of(patch)
-    if report is None:
-        return
-    if VERDICT not in patch:
-        patch[VERDICT] = {key: report[key] for key in ("status", "message")}
-    report.update({"status": "outdated", **verdict})
-
-
-def mark_current(patch):
-    """The patch is again what its probe asks for."""
-    verdict = patch.pop(VERDICT, None)
-    if verdict is not None and report_of(patch) is not None:
-        patch[RECORD].update(verdict)
-
-
-def reconstruction_of(patch):
-    """The core.Reconstruction of a patch object, in the world, where the object is now.
-
-    Unmoved it is what was fitted, to the last bit. Raises ValueError while a gesture goes on, where what the
-    object keeps was edited, and where it is no longer of its shape.
-    """
-    require_whole(patch)
-    if RECONSTRUCTION not in patch:
-        raise ValueError(f'"{patch.name}" is not complete: end the gesture, or touch again')
-    try:
-        r = core.from_dict(json.loads(patch[RECONSTRUCTION]))
-    except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f'"{patch.name}" cannot be read any more: touch again ({error})') from error
-    if is_at(patch, r.frame.axes, r.frame.origin):  # where it is, that is in double precision
-        return r
-    placed = np.array(patch.matrix_world, dtype=float)
-    try:
-        return r.moved(placed @ np.linalg.inv(matrix_of(r.frame.axes, r.frame.origin)))
-    except ValueError as error:
-        raise ValueError(
-            f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
-        ) from error
-
-
-def place(obj, matrix):
-    """Puts an object there in the world, so that it stays there where its parent is deleted."""
-    if obj.parent is not None:
-        obj.matrix_parent_inverse = obj.parent.matrix_world.inverted_safe()
-    obj.matrix_world = matrix  # known before the next evaluation
-    obj.matrix_basis = matrix
-
-
-def hold(patch):
-    """Keeps the patch where it was touched, while its probe moves on without it or by whom it is moved.
-
-    One that constraints or an animation would take back stays as it is.
-    """
-    if report_of(patch) is None or patch.constraints or patch.animation_data:
-        return
-    axes, origin = touched_frame(patch)
-    if not is_at(patch, axes, origin):
-        place(patch, Matrix(matrix_of(axes, origin).tolist()))
-    _place_contours(contours_of(patch))
-
-
-def _place_contours(lines):
-    """Puts contours where their patch is, in whose coordinates they are."""
-    if lines is None or lines.constraints or lines.animation_data:
-        return
-    if lines.matrix_basis != Matrix() or lines.matrix_parent_inverse != Matrix():
-        lines.matrix_parent_inverse = lines.matrix_basis = Matrix()
-
-
-def touched_frame(patch):
-    """Where it was touched: axes as columns, and origin."""
-    frame = patch[RECORD]["frame"]
-    return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
-
-
-def move_record(patch, axes, origin):
-    """Has the record say that the patch was touched at another place, where it is no longer at that one."""
-    report, (before, at) = patch[RECORD], touched_frame(patch)
-    if np.array_equal(axes, before) and np.array_equal(origin, at):
-        return
-    turn = axes @ before.T
-    if np.shape(report.get("axes")) == (3, 3):
-        report["axes"] = (turn @ np.array(report["axes"])).tolist()
-    plane = report.get("suggested_plane")
-    if plane is not None and np.shape(plane.get("tangent")) == (3,):
-        plane["tangent"] = (turn @ np.array(plane["tangent"])).tolist()
-    d1, d2, normal = axes.T.tolist()
-    report["frame"].update({"origin": origin.tolist(), "d1": d1, "d2": d2, "normal": normal})
-
-
-def is_at(patch, axes, origin):
-    near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
-    return np.allclose(patch.matrix_world, matrix_of(axes, origin), **near)
-
-
 def meshes(patch):
     """Meshes of a patch object and of its contours; none for no patch."""
     objects = [] if patch is None else [patch, contours_of(patch)]
     return [obj.data for obj in objects if obj is not None]
-
-
-def contours_of(patch):
-    """The contours of a patch object, or None."""
-    return next((child for child in children_of(patch) if CONTOURS in child), None)
 
 
 def recolor(patch):
@@ -267,12 +111,6 @@ def recolor(patch):
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
-
-
-def matrix_of(axes, origin):
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = axes, origin
-    return matrix
 
 
 def collection(scene):

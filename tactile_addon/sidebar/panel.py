@@ -17,7 +17,7 @@ from ..probes.probe_operators import (
     TACTILE_OT_update,
     shows_colors,
 )
-from ..scene import patch_object
+from ..scene import patch_record
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
@@ -114,10 +114,9 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         _draw_colors(context, layout, patch, "tactile_colors")
         draw_rows(layout, main_rows(record, unit), active=not is_outdated)
         _draw_details(context, layout, record, unit)
-        if found is None:
-            layout.prop_search(patch, "tactile_target", context.scene, "objects")
         layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
         if found is None:
+            layout.prop_search(patch, "tactile_target", context.scene, "objects")
             layout.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
         if "registration" in record:
             draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
@@ -135,10 +134,10 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
 
     def draw_active(self, context, layout, obj):
         layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
-        if obj is None or patch_object.MAP_RECORD not in obj:
+        if obj is None or patch_record.MAP_RECORD not in obj:
             return
         _draw_colors(context, layout, obj, "tactile_map_colors")
-        record = obj[patch_object.MAP_RECORD]
+        record = obj[patch_record.MAP_RECORD]
         box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
         draw_rows(box, map_rows(record, unit))
         medians = median_rows(record, unit)

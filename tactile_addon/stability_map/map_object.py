@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ..scene import colors, patch_object
+from ..scene import colors, patch_object, patch_record
 from ..scene.mesh_data import emission
-from .stability import KEYS, NOTHING, QUANTITIES, REASONS
+from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
 
 COLOR = "stability_color"
 SHADES = 256
@@ -49,7 +49,7 @@ def insert(context, obj, touched):
     _paint(mesh, touched)
     mesh.materials.clear()
     mesh.materials.append(emission("Tactile Stability", attribute=COLOR))
-    painted[patch_object.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
+    painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
     recolor(painted)
     return painted
@@ -57,9 +57,9 @@ def insert(context, obj, touched):
 
 def _paint(mesh, touched):
     """Every vertex gets the values of the touch that is nearest."""
-    attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in QUANTITIES]
+    attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in MEASURES]
     attributes.append(("reason", "INT", touched.reason))
-    for name in (*QUANTITIES, "reason", COLOR):
+    for name in (*MEASURES, "reason", COLOR):
         if name in mesh.attributes:  # The source may have one of that name, of whatever type.
             mesh.attributes.remove(mesh.attributes[name])
     for name, kind, values in attributes:
@@ -70,11 +70,11 @@ def _paint(mesh, touched):
 
 def recolor(painted):
     """Colors the map by what it is set to show, and keeps the range in its record."""
-    shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_object.MAP_RECORD]
+    shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
     values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == "reason" else np.float32)
     mesh.attributes[shown].data.foreach_get("value", values)
     if shown == "reason":
-        rgba, limit = colors.linear(REASON_COLORS)[values], len(KEYS) - 1.0
+        rgba, limit = colors.linear(REASON_COLORS)[values], len(REASON_KEYS) - 1.0
     else:
         limit = _limit(shown, values[values != NOTHING], record["extent"])
         table = colors.diverging(np.arange(SHADES), SHADES - 1)
@@ -98,11 +98,11 @@ def _limit(shown, values, extent):
 
 def swatches(painted):
     """(name, sRGB color) of what is not on the scale: the reasons that occur, or that there is no patch."""
-    record = painted[patch_object.MAP_RECORD]
+    record = painted[patch_record.MAP_RECORD]
     counts = {"patch": record["patches"] - record["in_doubt"], "doubt": record["in_doubt"]}
     counts |= record["refused"].to_dict()
     if painted.tactile_map_colors != "reason":
-        refused = sum(counts[key] for key in KEYS[2:])
+        refused = sum(counts[key] for key in REASON_KEYS[2:])
         return [(f"No Patch: {refused}", REFUSED)] if refused else []
     names = zip(REASONS, REASON_COLORS, strict=True)
     return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
@@ -113,7 +113,7 @@ def register():
         name="Colors",
         description="What the colors of the map show",
         items=[item[:3] for item in SHOWN],
-        update=lambda obj, _: recolor(obj) if patch_object.MAP_RECORD in obj else None,
+        update=lambda obj, _: recolor(obj) if patch_record.MAP_RECORD in obj else None,
     )
 
 

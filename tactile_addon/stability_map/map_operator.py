@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..probes import probe
 from ..probes.operators import make_active, report_error, target_object
-from ..scene import patch_object
+from ..scene import patch_record
 from ..touch.settings import NAMES, TouchSettings, draw_all, draw_chosen, touch_arguments
 from . import map_object
 from .map_report import map_summary
@@ -149,7 +149,7 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
             return report_error(self, error)
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
-        record = painted[patch_object.MAP_RECORD].to_dict()
+        record = painted[patch_record.MAP_RECORD].to_dict()
         self.report({"INFO"} if record["patches"] else {"WARNING"}, map_summary(record))
         return {"FINISHED"}
 

@@ -11,12 +11,12 @@ import numpy as np
 from ... import core
 from ..touch.detached_mesh import MeshSnapshot
 from ..touch.evaluated_mesh import coordinates, evaluated_object
-from ..touch.touch_object import STEPS, require_fine, require_lengths
+from ..touch.touch_object import LEAST_STEPS, require_fine, require_lengths
 
 EXTENT_SHARE = 1.0 / 8.0  # Share of the object's size, where no extent is given.
 SPACING_SHARE = 1.0 / 4.0  # Share of the extent, where no spacing is given.
 BATCH = 20  # touches that are fitted at once: in a hundredth of a second
-CROWD = 10_000  # vertices that are given their nearest touch at once
+NEAREST_AT_ONCE = 10_000  # vertices that are given their nearest touch at once
 NOTHING = -1.0  # where there is no patch, in the place of each quantity
 # What the attribute `reason` counts: key, name, and the stop of a curve that it follows from.
 REASONS = [
@@ -27,9 +27,9 @@ REASONS = [
     ("steep", "Too Steep", core.NOT_MONGE),
     ("nothing", "No Area", None),
 ]
-KEYS = [key for key, _, _ in REASONS]
-STOPS = {stop: code for code, (_, _, stop) in enumerate(REASONS) if stop}
-QUANTITIES = ("error", "height_std", "condition_number", "blind_share")
+REASON_KEYS = [key for key, _, _ in REASONS]
+STOP_CODES = {stop: code for code, (_, _, stop) in enumerate(REASONS) if stop}
+MEASURES = ("error", "height_std", "condition_number", "blind_share")
 
 
 class StabilityMap:
@@ -51,7 +51,7 @@ class StabilityMap:
         if not spacing >= 0.0:  # NaN is none
             raise ValueError(f"The spacing is a length of 0 or more, got {spacing:g}")
         self.extent = extent or EXTENT_SHARE * self.surface.size
-        self.step = step or self.extent / STEPS
+        self.step = step or self.extent / LEAST_STEPS
         require_lengths(obj.name, self.surface.size, self.extent, self.step, noise)
         self.spacing = spacing or SPACING_SHARE * self.extent
         require_fine(self.surface.spacing, self.step)
@@ -69,9 +69,9 @@ class StabilityMap:
                 self.chosen.append(int(candidates[index]))
             yield
         count = len(self.chosen)
-        for name in QUANTITIES:
+        for name in MEASURES:
             setattr(self, name, np.full(count, NOTHING))
-        self.reason = np.full(count, KEYS.index("nothing"), dtype=np.int32)
+        self.reason = np.full(count, REASON_KEYS.index("nothing"), dtype=np.int32)
         size = BATCH if self.fit["method"] == "bayes" else 1
         for start in range(0, count, size):
             end = min(start + size, count)
@@ -86,8 +86,10 @@ class StabilityMap:
         points = self.surface.points
         tree = cKDTree(points[self.chosen[: self.done]])
         self.nearest = np.empty(len(points), dtype=np.intp)
-        for start in range(0, len(points), CROWD):
-            self.nearest[start : start + CROWD] = tree.query(points[start : start + CROWD])[1]
+        for start in range(0, len(points), NEAREST_AT_ONCE):
+            self.nearest[start : start + NEAREST_AT_ONCE] = tree.query(
+                points[start : start + NEAREST_AT_ONCE]
+            )[1]
             yield
 
     def _touch(self, numbers):
@@ -137,7 +139,7 @@ class StabilityMap:
             return None
 
     def _note(self, number, result):
-        self.reason[number] = KEYS.index("patch" if result.status == "ok" else "doubt")
+        self.reason[number] = REASON_KEYS.index("patch" if result.status == "ok" else "doubt")
         off = core.height_error(result, self.surface)
         self.error[number] = NOTHING if off is None else off
         self.height_std[number] = result.mean_height_std
@@ -153,7 +155,7 @@ class StabilityMap:
     def report(self):
         """What there is to say, a dict of plain values; medians are of the patches."""
         reasons = Counter(self.reason[: self.done].tolist())
-        counts = {key: reasons[code] for code, key in enumerate(KEYS)}
+        counts = {key: reasons[code] for code, key in enumerate(REASON_KEYS)}
         report = {
             "points": len(self.chosen),
             "touched": self.done,
@@ -161,7 +163,7 @@ class StabilityMap:
             "in_doubt": counts.pop("doubt"),
             "refused": counts,
         }
-        for name in QUANTITIES:
+        for name in MEASURES:
             values = getattr(self, name)[: self.done]
             known = values[values != NOTHING].tolist()
             if known:
@@ -184,8 +186,8 @@ def _ended(contours, point):
 
 def _reason_of(stops):
     """The code of the commonest of these; curves that go on, but have no tangent plane, are on a crease."""
-    counts = Counter(stop for stop in stops if stop in STOPS)
-    return STOPS[counts.most_common(1)[0][0] if counts else core.CREASE]
+    counts = Counter(stop for stop in stops if stop in STOP_CODES)
+    return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
 
 
 class _Plane:

@@ -7,7 +7,7 @@ import zlib
 
 import numpy as np
 
-FARTHEST = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
+FARTHEST_VERTEX = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
 
 
 def checksum_of(obj, depsgraph):
@@ -69,8 +69,8 @@ def coordinates(name, evaluated):
     if not math.isfinite(largest):
         raise ValueError(f'"{name}" has vertices at no finite place: delete them, or mend its modifiers')
     reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
-    if not reach <= FARTHEST:  # NaN is nowhere
-        raise ValueError(f'"{name}" reaches farther than {FARTHEST:g} from the origin: scale it down')
+    if not reach <= FARTHEST_VERTEX:  # NaN is nowhere
+        raise ValueError(f'"{name}" reaches farther than {FARTHEST_VERTEX:g} from the origin: scale it down')
     return co
 
 

@@ -4,14 +4,17 @@
 
 import numpy as np
 
-LARGEST, SMALLEST = 1e15, 1e-15  # lengths whose squares, and those of their inverses, are numbers there
+LARGEST_SINGLE, SMALLEST_SINGLE = (
+    1e15,
+    1e-15,
+)  # lengths whose squares, and those of their inverses, are numbers there
 
 
 def require_single(result):
     """Raises ValueError for a patch too large, too small or too far away for Blender's numbers."""
     reach = result.radius + float(np.abs(result.frame.origin).max())
-    if not (result.radius >= SMALLEST and reach <= LARGEST):
+    if not (result.radius >= SMALLEST_SINGLE and reach <= LARGEST_SINGLE):
         raise ValueError(
             f"The patch has a radius of {result.radius:.3g} and reaches to {reach:.3g}, and Blender's "
-            f"numbers are good from {SMALLEST:g} to {LARGEST:g}: take another unit of length"
+            f"numbers are good from {SMALLEST_SINGLE:g} to {LARGEST_SINGLE:g}: take another unit of length"
         )

@@ -22,15 +22,15 @@ from .touch_report import (
     suggestion_report,
 )
 
-FARTHEST = 1.0 / 2.0  # Share of the object's size: a half contour that ends by itself is no longer.
+FARTHEST_SHARE = 1.0 / 2.0  # Share of the object's size: a half contour that ends by itself is no longer.
 AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where no extent is given.
-FINEST = 1.0 / 128.0  # Share of it: the step where neither is given.
-STEPS = 12  # Least steps of a half contour, where no step is given.
-COARSE = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
+FINEST_STEP = 1.0 / 128.0  # Share of it: the step where neither is given.
+LEAST_STEPS = 12  # Least steps of a half contour, where no step is given.
+MOST_ROUNDING = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class Touched:
     """What a touch gave; `report` is a dict of plain values.
 
     surface : None where the contours were measured elsewhere
@@ -81,7 +81,7 @@ def touch(
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
     size = {
-        "farthest": FARTHEST * surface.size,
+        "farthest": FARTHEST_SHARE * surface.size,
         "tolerance": tolerance,
         "most_planes": MOST_PLANES,
         "extent": extent or "auto",
@@ -112,10 +112,10 @@ def touch(
         "stops": [list(contour.stops) for contour in result.contours],
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
-    return Touch(surface, result, report)
+    return Touched(surface, result, report)
 
 
-def verify(touched, most=None):
+def completed(touched, most=None):
     """The touch with what is dear in its report too: where to touch next, and distances to the mesh.
 
     most : of the vertices around, where not all are to be compared
@@ -141,7 +141,7 @@ def require_lengths(name, size, extent, step, noise):
         )
     if extent > size:
         raise ValueError(f'The extent {extent:g} is longer than "{name}" ({size:g}): take a shorter one')
-    longest = extent or FARTHEST * size
+    longest = extent or FARTHEST_SHARE * size
     if step > longest:
         raise ValueError(f"The step {step:g} is longer than the extent {longest:g}: take a shorter one")
     if noise > longest:
@@ -159,13 +159,13 @@ def _reference_point(name, surface, location, extent, step):
             f'The location is {distance:g} away from "{name}", farther than {farthest:g}: '
             "move it to the surface"
         )
-    require_fine(surface.spacing(point), step or extent / STEPS or FINEST * surface.size)
+    require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
     return point, normal
 
 
 def require_fine(spacing, step):
     """Raises ValueError where coordinates are too coarse for the step."""
-    if spacing > COARSE * step:
+    if spacing > MOST_ROUNDING * step:
         raise ValueError(
             f"Coordinates at the point are {spacing:g} apart in single precision, too coarse "
             f"for a step of {step:g}: move the object nearer to the origin of the world or of its own mesh"

@@ -2,198 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handles of the active probe: for its point, to turn sampling planes, to tilt one, and for the extent."""
 
-import math
-
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, IntProperty
 from mathutils import Matrix, Vector
-from mathutils.geometry import intersect_line_plane
 
-from ..probes import anchor, probe
-from ..touch.settings import MOST_PLANES, STEEPEST
-from ..touch.surface import MeshSurface
+from ..probes import probe
 from ..touch.touch_object import plane_axes
-from .mouse import draw_hints, mouse_ray
+from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .overlay import PLANE_COLORS
 
-TURN, TILT, EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 REACH = 1.15  # Place of the handles, in extents.
 UPRIGHT = 0.75
-EDGE_ON, STEEP = (
-    0.03,
-    0.25,
-)  # sines of the view against a plane: below, nothing can be dragged in it, or not well
-SNAP = math.radians(5.0)
-PRECISE = 0.1
-HINTS = (
-    ("MOUSE_LMB", "Confirm"),
-    ("MOUSE_RMB", "Cancel"),
-    ("EVENT_CTRL", "Snap"),
-    ("EVENT_SHIFT", "Precise"),
-)
-
-
-class TACTILE_OT_drag(bpy.types.Operator):
-    """Drag to slide the probe over the surface, to turn or tilt a sampling plane, or to feel farther"""
-
-    bl_idname = "tactile.drag"
-    bl_label = "Drag Probe"
-    bl_options = {"UNDO", "INTERNAL", "BLOCKING"}
-
-    what: EnumProperty(
-        name="What",
-        items=[
-            (TURN, "Turn", "Turn a sampling plane about the normal"),
-            (TILT, "Tilt", "Lean a sampling plane to the side"),
-            (EXTENT, "Extent", "Feel farther or less far"),
-            (POINT, "Point", "Slide over the surface"),
-        ],
-    )
-    plane: IntProperty(name="Plane", min=0, max=MOST_PLANES - 1)
-
-    @classmethod
-    def poll(cls, context):
-        return _shown_probe(context) is not None
-
-    def invoke(self, context, event):
-        found = _shown_probe(context)
-        if self.what in (TURN, TILT):
-            found.tactile_probe.active_plane = self.plane
-        self._matrix = found.matrix_world.copy()
-        # The handle comes to the mouse; where the button went down is not known, for a busy Blender hears
-        # of it late, with the mouse already elsewhere.
-        self._before = self._value = self._free = self._last = self._get(context)
-        if self.what != POINT and self._below(context, event) is None:
-            self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
-            return {"CANCELLED"}
-        context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
-        context.window_manager.modal_handler_add(self)
-        self._say(context)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        if event.type in {"ESC", "RIGHTMOUSE"}:
-            self._set(context, self._before)
-            self._end(context)
-            return {"CANCELLED"}
-        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            self._end(context)
-            return {"FINISHED"}
-        if event.type == "MOUSEMOVE":
-            self._follow(context, event)
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context):
-        self._end(context)
-
-    def _follow(self, context, event):
-        """Moves the value by what the mouse has moved, the point to below it."""
-        if self.what == POINT:
-            self._slide(context, event)
-            return
-        now = self._below(context, event)
-        if now is None:
-            return
-        pace = PRECISE if event.shift else 1.0
-        if self.what == EXTENT:
-            self._free *= (now / self._last) ** pace
-            value = self._free
-        else:
-            self._free += pace * math.remainder(now - self._last, 2.0 * math.pi)
-            value = SNAP * round(self._free / SNAP) if event.ctrl else self._free
-        self._last = now
-        if self.what == TILT:
-            value = min(max(value, -STEEPEST), STEEPEST)
-        self._set(context, value)
-
-    def _slide(self, context, event):
-        """Puts the probe on the surface below the mouse, turned by no more than the normal turns."""
-        origin, direction = mouse_ray(context.region, context.region_data, event)
-        depsgraph = context.evaluated_depsgraph_get()
-        try:
-            surface = MeshSurface(probe.probe_of(context.object).tactile_probe.target, depsgraph, sound=True)
-            if not context.region_data.is_perspective:
-                origin -= context.space_data.clip_end * direction
-            hit = surface.ray_cast(list(origin), list(direction), 4.0 * context.space_data.clip_end)
-        except (ValueError, AttributeError):  # the target is gone, or cannot be touched: the panel says so
-            return
-        if hit is None:
-            return
-        upright, normal = self._matrix.col[2].xyz.normalized(), Vector(hit[1])
-        if upright.dot(direction) * normal.dot(direction) < 0.0:  # it stays on its side of the surface
-            normal.negate()
-        turn = upright.rotation_difference(normal) @ self._matrix.to_quaternion()
-        self._set(context, Matrix.LocRotScale(Vector(hit[0]), turn, self._matrix.to_scale()))
-
-    def _below(self, context, event):
-        """Where the mouse is: an angle, or a distance from the point; None where that cannot be told."""
-        origin, direction = mouse_ray(context.region, context.region_data, event)
-        center, normal = self._matrix.translation, self._matrix.col[2].xyz.normalized()
-        e1 = self._matrix.col[0].xyz.normalized()
-        right, up = e1, normal.cross(e1)
-        if self.what == TILT:
-            t = Vector(
-                plane_axes(self._matrix, probe.probe_of(context.object).tactile_probe, self.plane)[:, 0]
-            )
-            right, up, normal = normal, normal.cross(t), t
-        if abs(direction.dot(normal)) < EDGE_ON:
-            return None
-        at = intersect_line_plane(origin, origin + direction, center, normal)
-        if at is None or (at - center).length == 0.0:
-            return None
-        if self.what == EXTENT:
-            return (at - center).length
-        return math.atan2((at - center).dot(up), (at - center).dot(right))
-
-    def _get(self, context):
-        found = probe.probe_of(context.object)
-        settings = found.tactile_probe
-        if self.what == POINT:
-            return self._matrix
-        if self.what == EXTENT:
-            return settings.extent or probe.record_of(found)["extent"]
-        return (settings.azimuths if self.what == TURN else settings.tilts)[self.plane]
-
-    def _set(self, context, value):
-        found = probe.probe_of(context.object)
-        settings, self._value = found.tactile_probe, value
-        if self.what == POINT:
-            anchor.put(found, value)
-        elif self.what == EXTENT:
-            settings.extent = value
-        else:
-            (settings.azimuths if self.what == TURN else settings.tilts)[self.plane] = value
-        self._say(context)
-
-    def _say(self, context):
-        if self.what == POINT:
-            words = "Point on " + probe.probe_of(context.object).tactile_probe.target.name
-        elif self.what == EXTENT:
-            settings = context.scene.unit_settings
-            length = bpy.utils.units.to_string(
-                settings.system, "LENGTH", self._value * settings.scale_length, precision=4
-            )
-            words = f"Extent {length}"
-        else:
-            angle = "Azimuth" if self.what == TURN else "Tilt"
-            words = f"{angle} {self.plane + 1}: {math.degrees(self._value):.1f}°"
-        context.area.header_text_set(words)
-
-    def _end(self, context):
-        context.area.header_text_set(None)
-        context.workspace.status_text_set(None)
-        found = probe.probe_of(context.object)
-        if found.tactile_probe.live:
-            probe.refresh(found, context)
-
-
-def _shown_probe(context):
-    """The probe that the panel shows, active by itself, its patch or its contours; None without handles."""
-    found = probe.probe_of(context.object)
-    if found is None or not found.visible_get() or probe.lock_of(found) is not None:
-        return None
-    return found if probe.record_of(found) is not None else None
 
 
 class TACTILE_GGT_handles(bpy.types.GizmoGroup):
@@ -206,20 +25,22 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == "OBJECT" and _shown_probe(context) is not None
+        return context.mode == "OBJECT" and shown_probe(context) is not None
 
     def setup(self, context):
-        self.extent = self._handle("GIZMO_GT_dial_3d", EXTENT, 0, (1.0, 1.0, 1.0))
+        self.extent = self._handle("GIZMO_GT_dial_3d", DRAG_EXTENT, 0, (1.0, 1.0, 1.0))
         self.extent.use_draw_scale = False
         self.extent.line_width = 2.0
         self.point = self._ball(POINT, 0, (1.0, 1.0, 1.0))
-        self.turns = [self._ball(TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
-        self.tilts = [self._ball(TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
+        self.turns = [self._ball(DRAG_TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
+        self.tilts = [self._ball(DRAG_TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
 
     def _ball(self, what, plane, color):
         ball = self._handle("GIZMO_GT_move_3d", what, plane, color)
         ball.draw_style = "RING_2D"
-        ball.draw_options = {"FILL", "ALIGN_VIEW"} if what in (TURN, POINT) else {"FILL_SELECT", "ALIGN_VIEW"}
+        ball.draw_options = (
+            {"FILL", "ALIGN_VIEW"} if what in (DRAG_TURN, POINT) else {"FILL_SELECT", "ALIGN_VIEW"}
+        )
         ball.scale_basis, ball.line_width = 0.12, 3.0
         return ball
 
@@ -233,7 +54,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         return handle
 
     def draw_prepare(self, context):
-        obj = _shown_probe(context)
+        obj = shown_probe(context)
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
         center = np.array(matrix.translation)

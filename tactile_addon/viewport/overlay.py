@@ -9,7 +9,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
-from ..scene import colors, patch_object
+from ..scene import colors, patch_record
 from ..stability_map import map_object
 from ..touch import units
 from ..touch.touch_object import plane_axes
@@ -93,12 +93,12 @@ def draw_legend():
     record = probe.record_of(obj)
     if record is not None and "color_limit" in record and patch.visible_get():
         shown = patch.tactile_colors
-        low = 0.0 if shown in patch_object.POSITIVE else -1.0
+        low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
-        bar = _scale(context, title, record, record["radius"], patch_object.POWERS[shown], low)
+        bar = _scale(context, title, record, record["radius"], patch_record.POWERS[shown], low)
         _draw_box(context, *bar)
-    elif obj is not None and patch_object.MAP_RECORD in obj and obj.visible_get():
-        record, shown = obj[patch_object.MAP_RECORD], obj.tactile_map_colors
+    elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
+        record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["spacing"], map_object.POWERS[shown], 0.0)
         if shown == "reason":

@@ -5,7 +5,7 @@
 import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
 
-from ..probes import anchor, probe
+from ..probes import anchor, probe, touch_again
 from ..probes.operators import make_active, report_error, target_object
 from ..touch import units
 from ..touch.settings import NAMES, TouchSettings, draw_all, touch_arguments
@@ -135,7 +135,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             anchor.attach(found, target)
         for name in NAMES:
             setattr(settings, name, getattr(self, name))
-        probe.adopt(found, touched, depsgraph, complete=True)
+        touch_again.adopt(found, touched, depsgraph, complete=True)
         settings.is_probe = True
         make_active(context, found)
         report = touched.report

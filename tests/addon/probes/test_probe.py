@@ -754,9 +754,9 @@ def test_the_legend_has_the_range_of_the_colors_in_the_unit_of_the_scene(
     _, patch = pick(empty)
     patch.tactile_colors = shown
     record, label = report_of(patch), patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
-    lowest = 0.0 if shown in addon.scene.patch_object.POSITIVE else -1.0
+    lowest = 0.0 if shown in addon.scene.patch_record.POSITIVE else -1.0
     said, begin, labels = addon.viewport.overlay._scale(
-        empty.context, label, record, record["radius"], addon.scene.patch_object.POWERS[shown], lowest
+        empty.context, label, record, record["radius"], addon.scene.patch_record.POWERS[shown], lowest
     )
     assert (said, begin) == (title, low)
     top = record["color_limit"] * 1000.0**power
@@ -875,7 +875,10 @@ def test_what_no_probe_depends_on_costs_none_of_them_anything(empty, ball, count
         pick(empty, target="Sphere", location=Matrix.Rotation(turn, 3, "X") @ TOP)
     update(empty)
     counted("probes.change_handlers", "is_outdated"), counted("probes.change_handlers", "update")
-    looked, calls = counted("probes.probe", "_made"), counted("probes.change_handlers", "may_be_outdated")
+    looked, calls = (
+        counted("probes.touch_again", "_made"),
+        counted("probes.change_handlers", "may_be_outdated"),
+    )
     empty.ops.object.empty_add()  # who is there has changed: whether their targets are is looked at
     assert (calls["is_outdated"], calls["update"]) == (0, 0)
     calls["may_be_outdated"] = looked["_made"] = 0
@@ -893,7 +896,7 @@ def test_a_change_touches_once_what_depends_on_it_and_nothing_else(empty, ball, 
     empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=RADIUS, location=(9, 0, 0))
     pick(empty, location=TOP + Vector((9, 0, 0)))
     update(empty)
-    calls, surfaces = counted("probes.probe", "touch_at"), counted("touch.surface", "size_of")
+    calls, surfaces = counted("probes.touch_again", "touch_at"), counted("touch.surface", "size_of")
     ball.scale = (1.1, 1.1, 1.1)
     update(empty)
     assert calls["touch_at"] == 3

@@ -99,7 +99,7 @@ def test_while_a_gesture_goes_on_the_extent_stays(empty, sheet, extension):
     probe = empty.context.object
     before = probe.children[0]["tactile"].to_dict()
     probe.location.x += 0.3
-    touch_at = extension.tactile_addon.probes.probe.touch_at
+    touch_at = extension.tactile_addon.probes.touch_again.touch_at
     depsgraph = empty.context.evaluated_depsgraph_get()
     going, ended = (touch_at(probe, depsgraph, complete=complete).report for complete in (False, True))
     assert (going["extent"], going["step"]) == pytest.approx((before["extent"], before["step"]), rel=1e-6)
@@ -134,7 +134,7 @@ def test_no_patch_across_an_edge_or_a_rib(empty, extension, scans, name, noise):
             touched = add_on.touch.touch_object.touch(obj, depsgraph, at, planes, **inputs)
         except ValueError:  # on a crease or beside one: no patch
             continue
-        touched = add_on.touch.touch_object.verify(touched)
+        touched = add_on.touch.touch_object.completed(touched)
         if touched.report["status"] == "ok":
             trusted += 1
             off = extension.core.height_error(touched.result, touched.surface)

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from core import MongePatch, SamplingPlane, reconstruct, track
 from core.patch.domain import Domain, closed_spline_domain
-from core.patch.triangulation import MOST, patch_mesh, triangulate
+from core.patch.triangulation import MOST_RIM_EDGES, patch_mesh, triangulate
 
 LEAST_ANGLE = 15.0  # degrees
 
@@ -89,7 +89,7 @@ def test_a_mesh_is_as_near_as_asked_and_has_no_slivers(patch, domain, tolerance)
     assert np.hypot(*rim.T) == pytest.approx(domain._radius(azimuths), abs=1e-4)
     middle = 0.5 * (rim + np.roll(rim, -1, axis=0))
     off, _ = cKDTree(domain.boundary(20000)).query(middle)
-    assert off.max() <= 1.1e-3 or len(rim) == MOST
+    assert off.max() <= 1.1e-3 or len(rim) == MOST_RIM_EDGES
     a, b, c = points[triangles][:, :, :2].transpose(1, 2, 0)
     area = 0.5 * np.sum((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
     assert area == pytest.approx(domain.area, rel=3e-3)
