@@ -8,6 +8,7 @@ from . import command_line
 from .comparison import register_operator, verify_operator
 from .files import contact_operators
 from .probes import change_handlers, operators, probe, probe_operators
+from .scene import color_range
 from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick
@@ -33,6 +34,7 @@ _commands, _drawings = [], []
 
 def register():
     probe.register()
+    color_range.register()
     map_object.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
@@ -56,4 +58,5 @@ def unregister():
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     map_object.unregister()
+    color_range.unregister()
     probe.unregister()

@@ -70,6 +70,7 @@ def write(path, obj):
             bpy.ops.wm.ply_export(
                 filepath=str(temporary),
                 export_selected_objects=True,
+                apply_modifiers=False,
                 export_attributes=True,
                 export_uv=False,  # whose seams would split vertices
             )

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..scene import patch_object
+from ..scene import patch_object, patch_record
 from ..touch.evaluated_mesh import checksum_of, is_disabled
 from ..touch.settings import touch_arguments
 from ..touch.touch_object import completed, touch
@@ -52,8 +52,8 @@ def update(probe, depsgraph, complete):
         settings.message = sentence(error)
         if patch is not None:
             anchor.carry(probe, patch)
-            patch_object.hold(patch)
-            patch_object.mark_failed(patch, settings.message)
+            patch_record.hold(patch)
+            patch_record.mark_failed(patch, settings.message)
         _sign(probe, depsgraph)
     else:
         adopt(probe, touched, depsgraph, complete)
@@ -85,19 +85,19 @@ def stand_by(probe, outdated, complete):
             settings.message = "The probe has no patch: touch again for one, or delete the probe too"
         return
     anchor.carry(probe, patch)
-    patch_object.hold(patch)
+    patch_record.hold(patch)
     record = record_of(patch)
-    if settings.message and record is not None and patch_object.VERDICT not in patch:
+    if settings.message and record is not None and patch_record.VERDICT not in patch:
         settings.message = ""  # there was no patch, and undo has brought it back
     if outdated:
-        patch_object.mark_stale(patch)
+        patch_record.mark_stale(patch)
     elif not settings.message:
-        patch_object.mark_current(patch)
+        patch_record.mark_current(patch)
 
 
 def _left_contours(probe):
     """Those of a patch that was deleted, where they are still there."""
-    lines = (obj for obj in bpy.data.objects if patch_object.CONTOURS in obj and obj.parent is None)
+    lines = (obj for obj in bpy.data.objects if patch_record.CONTOURS in obj and obj.parent is None)
     own = (obj for obj in lines if obj.is_editable and obj.data is not None)
     return next((obj for obj in own if obj.data.get(DIGEST) == probe.tactile_probe.digest), None)
 

@@ -13,11 +13,12 @@ from ..probes.probe_operators import (
     TACTILE_OT_add_planes,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
+    TACTILE_OT_share_range,
     TACTILE_OT_show_colors,
     TACTILE_OT_update,
-    shows_colors,
 )
-from ..scene import patch_record
+from ..scene import color_range, patch_record
+from ..scene.viewports import shows_colors
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
@@ -112,6 +113,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if is_outdated and found is not None:
             layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
         _draw_colors(context, layout, patch, "tactile_colors")
+        _draw_range(context, layout, patch, record)
         draw_rows(layout, main_rows(record, unit), active=not is_outdated)
         _draw_details(context, layout, record, unit)
         layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
@@ -163,6 +165,17 @@ def _draw_colors(context, layout, obj, name):
     layout.prop(obj, name)
     if not shows_colors(context.space_data):
         layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
+
+
+def _draw_range(context, layout, patch, record):
+    """Where the colors end, and a button for one range on all patches."""
+    power, unit = color_range.unit_of_range(patch, context.scene)
+    row = layout.row(align=True)
+    row.use_property_split = False
+    word = "Range" if patch_record.RANGE in patch else "Range (Auto)"
+    ends = units.say(record["color_limit"], power, unit)
+    row.prop(patch, "tactile_range", text=f"{word} {ends}", translate=False)
+    row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
 
 
 def _draw_verification(layout, found, unit):

@@ -146,7 +146,7 @@ def test_the_contours_are_an_object_of_their_own(empty, ball):
     assert lines.parent == patch
     assert lines.users_collection == patch.users_collection
     contact, contour = values(lines.data, "contact"), values(lines.data, "contour")
-    assert np.unique(contour).tolist() == [0, 1, 2]
+    assert np.unique(contour).tolist() == [-1, 0, 1, 2]  # -1 is the rim of the patch
     assert np.unique(contact).tolist() == list(range(-1, 21))
     # The middle of an octahedron is its contact; the reference point is the eleventh.
     points = positions(lines.data)
