@@ -6,14 +6,9 @@ import argparse
 import sys
 from pathlib import Path
 
-import bpy
-
-from .command_run import run, write
+from .command_run import Misuse, run, write
 from .files import contact_file
-from .scene import patch_record
-from .stability_map.map_report import map_readable
 from .touch.settings import METHODS, SOLVERS
-from .touch.wording import readable
 
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
@@ -21,10 +16,12 @@ VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 def main(args):
     """Blender's entry of the command; `args` is what follows its name. Returns the exit code."""
     sys.stdout.reconfigure(line_buffering=True)
-    options = _parser().parse_args([f" {a}" if _is_number(a) else a for a in args])
+    parser = _parser()
+    options = parser.parse_args([f" {a}" if _is_number(a) else a for a in args])
     try:
-        report = run(options)
-        write(report, options)
+        write(run(options), options)
+    except Misuse as error:
+        parser.error(str(error))
     except (RuntimeError, OSError, ValueError) as error:
         print(f"tactile: {_sentence(error)}", file=sys.stderr)
         return 1
@@ -36,14 +33,13 @@ def main(args):
 
 def _parser():
     parser = argparse.ArgumentParser(prog="blender -c tactile", description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
     for name, add_arguments, help in (
         ("reconstruct", _add_reconstruct, "touch a mesh and rebuild the patch around a point"),
         ("fit", _add_fit, "rebuild the patch that measured contacts show"),
         ("map", _add_map, "touch a mesh all over and paint a copy by how well it goes"),
     ):
         add_arguments(commands.add_parser(name, help=help))
-    parser.set_defaults(fail=parser.error, record=patch_record.RECORD, words=readable, more={})
     parser.set_defaults(**dict.fromkeys(("file", "contacts", "onto", "verify", "normal_std")))
     return parser
 
@@ -57,7 +53,6 @@ def _add_reconstruct(command):
     add("--contacts", type=Path, metavar="CSV", help="write the simulated contacts")
     _add_inputs(add)
     _add_verify(add)
-    command.set_defaults(operator=bpy.ops.tactile.reconstruct)
 
 
 def _add_fit(command):
@@ -76,7 +71,6 @@ def _add_fit(command):
     add("--onto", type=Path, metavar="MESH", help=help)
     _add_method(add)
     _add_verify(add)
-    command.set_defaults(operator=bpy.ops.tactile.import_contacts)
 
 
 def _add_map(command):
@@ -84,8 +78,6 @@ def _add_map(command):
     help = "distance between the points that are touched (a quarter of the extent)"
     add("--spacing", type=float, help=help)
     _add_inputs(add)
-    command.set_defaults(operator=bpy.ops.tactile.stability_map, more={"progress": True})
-    command.set_defaults(record=patch_record.MAP_RECORD, words=map_readable)
 
 
 def _add_verify(add):

@@ -6,7 +6,9 @@ import csv
 import io
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 
@@ -15,8 +17,32 @@ from .comparison.verification_wording import verification_columns
 from .comparison.verify_operator import verify_patch
 from .files import contact_file, measured, mesh_file, whole_file
 from .scene import patch_record
+from .stability_map.map_report import map_readable
 from .touch.units import ADAPTIVE, METERS
+from .touch.wording import readable
 
+
+class Misuse(ValueError):
+    """Words on the command line that do not go together."""
+
+
+class Command(NamedTuple):
+    """The operator behind a command, where what it makes keeps its report, and what puts that in words.
+
+    more : arguments of the operator that are no options
+    """
+
+    operator: str
+    record: str
+    words: Callable
+    more: dict
+
+
+COMMANDS = {
+    "reconstruct": Command("reconstruct", patch_record.RECORD, readable, {}),
+    "fit": Command("import_contacts", patch_record.RECORD, readable, {}),
+    "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
+}
 # What the operators take as it is given.
 PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
 PLAIN |= {"tolerance", "unit", "point", "flip", "radius"}
@@ -32,17 +58,17 @@ def _arguments(options):
     if "files" in options:
         if "location" in given:
             if "point" in given:
-                options.fail("--location: wanted it or --point, got both")
+                raise Misuse("--location: wanted it or --point, got both")
             given |= {"point": given.pop("location"), "strokes": True}
         return given | _open_contacts(options)
     given["target"] = options.target or _default_target()
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
-            options.fail(f"--azimuths: wanted three to six, got {len(options.azimuths)}")
+            raise Misuse(f"--azimuths: wanted three to six, got {len(options.azimuths)}")
         given |= {"plane_count": len(options.azimuths), "azimuths": _six_radians(options.azimuths)}
     if options.tilts is not None:
         if len(options.tilts) != given.get("plane_count", 3):
-            options.fail("--tilts: wanted as many as there are planes")
+            raise Misuse("--tilts: wanted as many as there are planes")
         given["tilts"] = _six_radians(options.tilts)
     return given
 
@@ -50,18 +76,19 @@ def _arguments(options):
 def run(options):
     """Opens the file, runs the operator, saves; returns the report."""
     if "files" in options and options.verify is not None and options.onto is None:
-        options.fail("--verify: wanted --onto MESH too, to compare with")
+        raise Misuse("--verify: wanted --onto MESH too, to compare with")
     _require_outputs(options)
     if options.file is not None:
         mesh_file.open_file(options.file)
     arguments = _arguments(options)
     before = set(bpy.data.objects)
-    options.operator(**arguments, **options.more)
+    command = COMMANDS[options.command]
+    getattr(bpy.ops.tactile, command.operator)(**arguments, **command.more)
     # Its name may be another's, and it is not active where the scene was saved in edit mode.
-    (made,) = (obj for obj in set(bpy.data.objects) - before if options.record in obj)
-    if options.record == patch_record.RECORD:
+    (made,) = (obj for obj in set(bpy.data.objects) - before if command.record in obj)
+    if command.record == patch_record.RECORD:
         _compare(made, options)
-    report = made[options.record].to_dict()
+    report = made[command.record].to_dict()
     if options.contacts is not None:
         r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
@@ -79,15 +106,15 @@ def _require_outputs(options):
     taken = {path.resolve(): "reads" for path in inputs}
     for name, path in outputs.items():
         if path.exists() and not path.is_file():
-            options.fail(f"--{name}: wanted the name of a file, got {path}")
+            raise Misuse(f"--{name}: wanted the name of a file, got {path}")
         if path.resolve() in taken:
-            options.fail(f"--{name}: wanted another file than one that this {taken[path.resolve()]}: {path}")
+            raise Misuse(f"--{name}: wanted another file than one that this {taken[path.resolve()]}: {path}")
         taken[path.resolve()] = "writes"
         if not path.absolute().parent.is_dir():
             raise OSError(f'there is no folder "{path.parent}" to write "{path.name}" to')
-    kinds = [".blend", ".ply", *([".json"] if options.record == patch_record.RECORD else [])]
+    kinds = [".blend", ".ply", *([".json"] if options.command != "map" else [])]
     if "output" in outputs and options.output.suffix.lower() not in kinds:
-        options.fail(f"--output: wanted a file {' or '.join(kinds)}, got {options.output}")
+        raise Misuse(f"--output: wanted a file {' or '.join(kinds)}, got {options.output}")
 
 
 def _compare(patch, options):
@@ -113,7 +140,7 @@ def _open_contacts(options):
             settings.length_unit = name
     paths = [path.absolute() for path in options.files]
     if len({path.parent for path in paths}) > 1:
-        options.fail("FILE: wanted files of one folder")
+        raise Misuse("FILE: wanted files of one folder")
     return {
         "filepath": str(paths[0]),
         "directory": str(paths[0].parent),
@@ -151,7 +178,7 @@ def write(report, options):
         return
     if options.json is not None:
         whole_file.write_text(options.json, json.dumps(report, indent=2, allow_nan=False) + "\n")
-    print(options.words(report))
+    print(COMMANDS[options.command].words(report))
 
 
 def _six_radians(degrees):

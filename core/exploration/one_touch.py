@@ -14,7 +14,7 @@ from ..bayes.residual_evidence import PLACES
 from ..contours.contour import Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.residual import cholesky, solved
-from ..reconstruction.next_plane import azimuth_of, suggest_plane
+from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from .growth import (
     CONTACTS,
@@ -87,14 +87,11 @@ class Touch:
         while (
             self.tolerance is not None and stds[-1] > self.tolerance and len(found.planes) < self.most_planes
         ):
-            plane, expected = suggest_plane(found.result)
+            plane, expected = suggest_plane(found.result, self.reference[:, 1], self.reference[:, 0])
             if expected > (1.0 - HELPS) * stds[-1]:
                 break
-            d1, _, n = found.result.frame.axes.T
-            along = plane.axes(n, d1)[:, 0]
-            azimuth = azimuth_of(along, self.reference[:, 1], self.reference[:, 0])
             try:
-                found = yield from self._with_plane(found, SamplingPlane(azimuth))
+                found = yield from self._with_plane(found, plane)
             except ValueError:  # nothing can be felt along that one: what was felt so far stays
                 break
             stds.append(found.result.mean_height_std)

@@ -16,12 +16,15 @@ COARSE_STRIDE = 4  # So many azimuths lie between those that are tried first.
 MOST_CONTACTS = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
 
 
-def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
+def suggest_plane(
+    r: Reconstruction, outward: ArrayLike | None = None, tangent: ArrayLike | None = None
+) -> tuple[SamplingPlane, float]:
     """The plane that would lower the mean variance of the height over the domain most.
 
-    Also the mean height_std that is expected after it, in the caller's unit. The plane holds the
-    normal and is measured from d1 about n of `r.frame`: track it with outward=r.frame.axes[:, 2],
-    tangent=r.frame.axes[:, 0].
+    outward, tangent : what the contours were tracked with, and the plane is measured by, see `track`;
+        d3 and d1 of the frame without
+
+    Also the mean height_std that is expected after it, in the caller's unit.
 
     The contour is taken to reach as far and to have as many contacts as those before, with their
     noise. What it will show follows from where it runs, not from the heights found there.
@@ -36,8 +39,11 @@ def suggest_plane(r: Reconstruction) -> tuple[SamplingPlane, float]:
     tried, lost = np.concatenate([tried, near]), np.vstack([lost, _lost(r, over, AZIMUTHS[near])])
     best = int(np.argmax(lost @ weights))
     variance = np.maximum((r.height_std(*points.T) / r.radius) ** 2 - lost[best], 0.0)
-    azimuth = float(AZIMUTHS[tried[best]])
-    return SamplingPlane(azimuth), r.radius * float(weights @ np.sqrt(variance))
+    plane = SamplingPlane(float(AZIMUTHS[tried[best]]))
+    if outward is not None:
+        d1, _, n = r.frame.axes.T
+        plane = SamplingPlane(azimuth_of(plane.axes(n, d1)[:, 0], outward, tangent))
+    return plane, r.radius * float(weights @ np.sqrt(variance))
 
 
 def _lost(r: Reconstruction, over: Array, azimuths: Array) -> Array:

@@ -47,12 +47,11 @@ def judgment(result, mean, ended):
 
 def suggestion_report(result, reference):
     """The plane that would tell most, as an azimuth like those of `planes`, and what it would bring."""
-    plane, expected = core.suggest_plane(result)
-    d1, _, n = result.frame.axes.T
-    tangent = plane.axes(n, d1)[:, 0]
+    e1, outward = reference[:, 0], reference[:, 1]
+    plane, expected = core.suggest_plane(result, outward, e1)
     return {
-        "azimuth": math.degrees(core.azimuth_of(tangent, reference[:, 1], reference[:, 0])),
-        "tangent": tangent.tolist(),
+        "azimuth": math.degrees(plane.azimuth),
+        "tangent": plane.axes(outward, e1)[:, 0].tolist(),
         "expected_height_std": expected,
     }
 

@@ -393,3 +393,16 @@ def test_the_priors_mean_between_is_that_of_a_surface_that_goes_on_and_of_a_toru
     x, y = 0.3, -0.7
     whole = (k1 * x**2 + k2 * y**2) / 2.0 * (a * x**2 + b * y**2) ** 2 / 8.0
     assert monomials(np.array([x]), np.array([y]), posterior.TERMS[20:]) @ mean[20:] == pytest.approx([whole])
+
+
+def test_the_suggested_plane_is_measured_as_the_contours_were_tracked():
+    s = surfaces.pear()
+    r = s.fit(s.track(surfaces.planes((0, 60, 120))))
+    plane, expected = suggest_plane(r)
+    d1, _, n = r.frame.axes.T
+    along = plane.axes(n, d1)[:, 0]
+    for tangent in (None, (0.3, -1.0, 0.2)):
+        other, same = suggest_plane(r, s.normal, tangent)
+        assert same == expected
+        t = other.axes(s.normal, tangent)[:, 0]
+        assert abs(np.cross(t, along) @ s.normal) < 1e-3  # but for the fit's normal beside the true one
