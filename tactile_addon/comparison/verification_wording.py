@@ -26,8 +26,8 @@ def verification_summary(record):
         return True, record["message"]
     mean, most = found["vertex_distance_mean"], found["vertex_distance_max"]
     return False, (
-        f'{vertices} vertices of "{name}" are {mean:.3g} off the patch in the mean, {most:.3g} at most; it '
-        f"covers {percent:.0f} %"
+        f'{vertices} vertices of "{name}" are {units.length(mean)} off the patch in the mean, '
+        f"{units.length(most)} at most; it covers {percent:.0f} %"
     )
 
 

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The reports of patches and maps as tables and sentences for people; and errors as sentences."""
 
-from .units import say
+import bpy
+
+from .units import length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
 
@@ -86,9 +88,10 @@ def sentence(error):
 
 def fit_summary(report):
     """The fit in a sentence: its status, the curvatures, and how far its contacts are missed."""
+    unit = unit_of(bpy.context.scene, report["radius"])
     return (
-        f"{report['message']} Curvatures {report['k1']:.4g} and {report['k2']:.4g}, "
-        f"{report['contacts']} contacts missed by {report['fit_error']:.3g} in the mean"
+        f"{report['message']} Curvatures {say(report['k1'], -1, unit)} and {say(report['k2'], -1, unit)}, "
+        f"{report['contacts']} contacts missed by {length(report['fit_error'])} in the mean"
     )
 
 
@@ -123,7 +126,7 @@ def _verified_rows(found):
 def registration_summary(found):
     """Where a patch was put, in a sentence."""
     residual = found["residuals"][found["pose"] - 1]
-    words = f'The contacts are {residual:.3g} off "{found["target"]}" (root mean square)'
+    words = f'The contacts are {length(residual)} off "{found["target"]}" (root mean square)'
     if not found["is_ambiguous"]:
         return words
     return f"{words}; others of its {len(found['residuals'])} poses are about as good"

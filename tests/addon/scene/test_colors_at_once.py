@@ -48,7 +48,7 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball):
     own = [patch["tactile"]["color_limit"] for patch in patches]
     assert own[1] > 2.0 * own[0]
     empty.context.view_layer.objects.active = patches[0]
-    assert empty.ops.tactile.share_range() == {"FINISHED"}
+    assert empty.ops.tactile.share_range() == {"FINISHED"}  # and says: 2 patches have one range of colors
     assert [patch["tactile"]["color_limit"] for patch in patches] == [max(own)] * 2
     assert "tactile_color_range" not in other
     patches[0].tactile_range = 2e-6  # in 1/mm², as the legend has it

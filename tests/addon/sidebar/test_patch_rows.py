@@ -85,3 +85,22 @@ def test_every_row_says_what_it_is(said, extension, ball):
         label for label in labels if not re.match(r"[A-Z1\d].{15,}", addon.sidebar.rows.tip_of(label))
     ]
     assert addon.sidebar.rows.tip_of("Error on 9 More") != addon.sidebar.rows.tip_of("Error on Curves")
+
+
+def test_a_map_knows_about_how_many_points_it_will_touch(extension, empty):
+    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64)
+    ball = empty.context.object
+    ball.scale = (2.0, 2.0, 2.0)
+    depsgraph = empty.context.evaluated_depsgraph_get()
+    expected = extension.tactile_addon.stability_map.stability.expected_count(ball, depsgraph, 0.0, 0.5)
+    empty.ops.tactile.stability_map(spacing=0.5)
+    assert expected == pytest.approx(empty.context.object["tactile_map"]["points"], rel=0.1)
+
+
+def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
+    empty.ops.mesh.primitive_cube_add(size=0.05)
+    empty.context.scene.unit_settings.length_unit = "MILLIMETERS"
+    with pytest.raises(RuntimeError, match=r'The extent 200 mm is longer than "Cube" \(50 mm\)'):
+        empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=0.2)
+    with pytest.raises(RuntimeError, match=r"got nan mm, 0 mm and 0 mm"):
+        empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=float("nan"))
