@@ -17,6 +17,7 @@ WAVINESS = np.geomspace(0.15, 1.3, 6)
 USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
 NOISES = 5  # grid points, from the floor up
 FREE_PRECISION = 1e-4  # Prior precision of the five free terms: nearly none, it keeps the matrix invertible.
+ROUNDING = 1e-13  # Share of the trace of a system.
 GROUP = 4  # touches whose likelihoods are computed at once
 
 
@@ -55,16 +56,23 @@ def prior_variances(waviness: Array) -> Array:
     return (SCALE * waviness[..., None] ** POWERS) ** 2
 
 
-def restricted(basis: Array, heights: Array, weights: Array) -> Restricted:
-    """What heights (b, n) ~ basis (b, n, 27) @ coefficients say of the higher terms, by QR."""
-    b, n = weights.shape
-    size = len(TERMS) + 1
-    rows = np.zeros((b, max(n, size), size))  # QR needs so many rows for a whole triangle.
-    rows[:, :n, :-1], rows[:, :n, -1] = basis, heights
-    rows[:, :n] *= np.sqrt(weights)[..., None]
-    triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
+VARIANCES = prior_variances(WAVINESS)
+UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior
+
+
+def restricted(data: NormalEquations) -> Restricted:
+    """What contacts say of the higher terms, by a Cholesky factor of their system bordered by the heights."""
+    b, size = data.seen.shape
+    bordered = np.empty((b, size + 1, size + 1))
+    bordered[:, :size, :size] = data.gram
+    bordered[:, :size, size] = bordered[:, size, :size] = data.seen
+    bordered[:, size, size] = data.square
+    diagonal = np.einsum("bii->bi", bordered)  # a view
+    # More than rounding takes from what no contact shows, and far less than noise hides.
+    diagonal += ROUNDING * np.cumsum(diagonal, axis=1)[:, [-2] * size + [-1]]
+    triangle: Array = np.swapaxes(np.linalg.cholesky(bordered), 1, 2)
     target, square = triangle[:, FREE:-1, -1], triangle[:, -1, -1] ** 2
-    return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, (weights > 0.0).sum(axis=1, dtype=float))
+    return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, data.contacts)
 
 
 def noises(data: Restricted, floor: Array) -> Array:
@@ -91,8 +99,7 @@ def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
     """
     triangle, target = data.triangle, data.target
     b, size = target.shape
-    variances = prior_variances(WAVINESS)
-    explained = (triangle[:, None] * variances[:, None]) @ np.swapaxes(triangle, 1, 2)[:, None]
+    explained = (triangle[:, None] * VARIANCES[:, None]) @ np.swapaxes(triangle, 1, 2)[:, None]
     corner = 2.0 * (target**2).sum(axis=1) / noises[:, 0] ** 2 + 1.0  # more than t' K^-1 t
     bordered = np.zeros((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
     bordered[..., :size, :size] = explained[:, :, None]
@@ -115,15 +122,14 @@ def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
 
 def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
     """Over a grid of waviness and noise, by -2 log likelihood there (b, 6, 5) and the waviness's prior."""
-    likelihood = -0.5 * (surprise + (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD)[:, None] ** 2)
-    variances = prior_variances(WAVINESS)
+    likelihood = -0.5 * (surprise + UNUSUAL[:, None])
     with np.errstate(under="ignore"):  # what is that unlikely counts for nothing
         weights = np.exp(likelihood - likelihood.max(axis=(1, 2), keepdims=True))
         weights /= weights.sum(axis=(1, 2), keepdims=True)
     by_waviness = weights.sum(axis=2)
     return Hyperparameters(
         np.exp(by_waviness @ np.log(WAVINESS)),
-        by_waviness @ variances,
+        by_waviness @ VARIANCES,
         np.sqrt((weights.sum(axis=1) * noises**2).sum(axis=1)),
     )
 
@@ -135,14 +141,13 @@ def evidence_with_slopes(heights: NormalEquations, slopes: NormalEquations, nois
     precision A = gram / noise^2 + slopes' gram + prior^-1 and v = A @ the likeliest coefficients, one
     Cholesky factor of [[A, v], [v', square]] has log |A| in its diagonal and what is left over in the last.
     """
-    variances = prior_variances(WAVINESS)
     size, at_noise = len(TERMS), noises[:, None, :, None]
     bordered = np.zeros((*(len(noises), len(WAVINESS), noises.shape[1]), size + 1, size + 1))
     diagonal = np.einsum("...ii->...i", bordered)  # a view
     bordered[..., :size, :size] = heights.gram[:, None, None] / at_noise[..., None] ** 2
     bordered[..., :size, :size] += slopes.gram[:, None, None]
     diagonal[..., :FREE] += FREE_PRECISION
-    diagonal[..., FREE:size] += 1.0 / variances[:, None]
+    diagonal[..., FREE:size] += 1.0 / VARIANCES[:, None]
     seen = heights.seen[:, None, None] / at_noise**2 + slopes.seen[:, None, None]
     bordered[..., :size, size] = bordered[..., size, :size] = seen
     # One more, lest rounding leaves less than nothing over.
@@ -151,7 +156,7 @@ def evidence_with_slopes(heights: NormalEquations, slopes: NormalEquations, nois
     factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
     surprise = (
         2.0 * np.log(factors[..., :size]).sum(axis=3)
-        + np.log(variances).sum(axis=1)[:, None]
+        + np.log(VARIANCES).sum(axis=1)[:, None]
         + factors[..., size] ** 2
         + heights.contacts[:, None, None] * np.log(noises[:, None] ** 2)
     )

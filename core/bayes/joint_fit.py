@@ -27,6 +27,7 @@ from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances, restrict
 from .linear_system import (
     hyperparameters,
     linear_system,
+    of_heights,
     posterior,
     prior_mean,
     solution,
@@ -111,7 +112,7 @@ def _pass(
         waviness = np.full(len(expected), USUAL_WAVINESS)
         hyper = Hyperparameters(waviness, prior_variances(waviness), touches.floor)
     else:
-        data = restricted(system.basis, system.heights, touches.weights)
+        data = restricted(of_heights(system, touches.weights))
         hyper = hyperparameters(system, data, touches.weights, touches.floor)
     found = solution(system, hyper)
     mean = expected + found
@@ -136,7 +137,7 @@ def posterior_of(k1: float, k2: float, contacts: Array, accuracy: float) -> Post
     """What contacts (n, 3) say in a frame and about curvatures that are given; all in unit radius."""
     weights, expected = np.ones((1, len(contacts))), prior_mean(k1, k2)[None]
     system = linear_system(contacts[None], weights, expected, contacts[None, :0])
-    data = restricted(system.basis, system.heights, weights)
+    data = restricted(of_heights(system, weights))
     hyper = hyperparameters(system, data, weights, np.array([max(accuracy, MISFIT)]))
     return posterior(expected + solution(system, hyper), system, data, hyper, weights).at(0)
 

@@ -90,18 +90,18 @@ def hyperparameters(system: System, data: Restricted, weights: Array, floor: Arr
     """The most likely waviness and noise; `data` is what the system's heights say of the higher terms."""
     if system.slopes is None:
         return evidence(data, noises(data, floor))
-    return evidence_with_slopes(*_normal_equations(system, weights), noises(data, floor))
-
-
-def _normal_equations(system: System, weights: Array) -> tuple[NormalEquations, NormalEquations]:
-    """The posterior of the heights and of the slopes."""
-    square = (weights * system.heights**2).sum(axis=1)
-    heights = NormalEquations(system.gram, system.seen, square, (weights > 0.0).sum(axis=1, dtype=float))
-    assert system.slopes is not None and system.steepness is not None
+    assert system.steepness is not None
     turned, steepness = np.swapaxes(system.slopes, 1, 2), system.steepness
-    return heights, NormalEquations(
+    slopes = NormalEquations(
         turned @ system.slopes, (turned @ steepness[..., None])[..., 0], (steepness**2).sum(axis=1)
     )
+    return evidence_with_slopes(of_heights(system, weights), slopes, noises(data, floor))
+
+
+def of_heights(system: System, weights: Array) -> NormalEquations:
+    """The normal equations of the heights alone."""
+    square = (weights * system.heights**2).sum(axis=1)
+    return NormalEquations(system.gram, system.seen, square, (weights > 0.0).sum(axis=1, dtype=float))
 
 
 def solution(system: System, hyper: Hyperparameters) -> Array:

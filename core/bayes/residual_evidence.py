@@ -22,6 +22,7 @@ from .posterior import FREE, Posterior
 
 # Chosen with benchmarks.real.
 MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
+FACETS = 1e-3  # Share of the radius: misfits of a smooth surface, whose curvatures a polynomial tells best.
 UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
 ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
@@ -64,7 +65,7 @@ def asking(contacts: Array, weights: Array, posterior: Posterior, accuracy: Arra
     basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
     off = contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0]
     rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
-    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, MISFIT))
+    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, FACETS))
 
 
 class System(NamedTuple):
@@ -109,14 +110,7 @@ def sizes(touch: Touch, system: System) -> Sizes:
     """
     basis, heights, kernels_within = _weighted(touch, system)
     noises = touch.least * (touch.most / touch.least) ** (np.arange(NOISES) / (NOISES - 1.0))
-    covariances = _bordered(basis, heights, kernels_within)
-    # The middle noise first; the others where it does not rule out a length and an amplitude.
-    with_it = np.full((*covariances.shape[:2], NOISES), np.inf)
-    for at in np.ndindex(with_it.shape[:2]):
-        with_it[at][MIDDLE] = _surprise(covariances[at], noises[MIDDLE])
-    for at in zip(*np.nonzero(with_it[..., MIDDLE] < with_it.min() + NEGLIGIBLE), strict=True):
-        for i in (i for i in range(NOISES) if i != MIDDLE):
-            with_it[at][i] = _surprise(covariances[at], noises[i])
+    with_it = _surprises(basis, heights, kernels_within, noises)
     without = _surprises_alone(basis / touch.most, heights / touch.most)
     without += 2.0 * len(heights) * math.log(touch.most)
     least = min(with_it.min(), without.min())
@@ -140,28 +134,46 @@ def _prior(waviness: float) -> Array:
     return np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(waviness))])
 
 
-def _bordered(basis: Array, heights: Array, kernels_within: list[Array]) -> Array:
-    """(2, 3, m + 1, m + 1): for each length and amplitude K without noise, bordered by the heights."""
-    m = len(heights)
-    bordered = np.empty((len(kernels_within), len(AMPLITUDES), m + 1, m + 1))
-    bordered[..., :m, m] = bordered[..., m, :m] = heights
-    terms = (basis * _prior(USUAL_WAVINESS)) @ basis.T
-    for found, within in zip(bordered, kernels_within, strict=True):
-        for matrix, amplitude in zip(found, AMPLITUDES, strict=True):
-            np.add(terms, amplitude**2 * within, out=matrix[:m, :m])
-    return bordered
+def _surprises(basis: Array, heights: Array, kernels_within: list[Array], noises: Array) -> Array:
+    """-2 log likelihood for each length, amplitude and noise, (2, 5, 3); inf where that is NEGLIGIBLE.
+
+    The middle noise first, from the middle amplitude to where they only become worse; other noises where that
+    does not rule out a length and an amplitude.
+    """
+    m, size = len(heights), len(AMPLITUDES)
+    terms, work, *kernels_of = np.zeros((2 + len(kernels_within), m + 1, m + 1))
+    terms[:m, :m] = (basis * _prior(USUAL_WAVINESS)) @ basis.T
+    terms[:m, m] = terms[m, :m] = heights
+    found = np.full((len(kernels_within), size, NOISES), np.inf)
+    for within, kernel, surprises in zip(kernels_within, kernels_of, found, strict=True):
+        kernel[:m, :m] = within
+        for side in (range(size // 2, size), range(size // 2 - 1, -1, -1)):
+            before = surprises[side.start - side.step, MIDDLE]
+            for at in side:
+                surprises[at, MIDDLE] = now = _surprise(terms, kernel, work, at, noises[MIDDLE])
+                if now > max(before, found.min() + NEGLIGIBLE):
+                    break
+                before = now
+    for length, at in np.argwhere(found[..., MIDDLE] < found.min() + NEGLIGIBLE).tolist():
+        for i in (i for i in range(NOISES) if i != MIDDLE):
+            found[length, at, i] = _surprise(terms, kernels_of[length], work, at, noises[i])
+    return found
 
 
-def _surprise(bordered: Array, noise: float) -> float:
-    """-2 log likelihood of heights that border their covariance, (m + 1, m + 1), and of a noise."""
+def _surprise(terms: Array, kernel: Array, work: Array, amplitude: int, noise: float) -> float:
+    """-2 log likelihood by terms that the heights border, (m + 1, m + 1), as are kernel and work."""
+    from scipy.linalg.blas import daxpy
     from scipy.linalg.lapack import dpotrf
 
-    matrix, m = bordered.copy(), len(bordered) - 1
-    matrix.flat[:: m + 2] += noise**2
+    flat, m, heights = work.reshape(-1), len(work) - 1, terms[-1, :-1]
+    flat[:] = terms.reshape(-1)
+    daxpy(kernel.reshape(-1), flat, a=AMPLITUDES[amplitude] ** 2)  # in place
+    diagonal = flat[:: m + 2]
+    diagonal += noise**2
     # More than heights' K^-1 heights.
-    corner = matrix[m, m] = 2.0 * float(bordered[m, :m] @ bordered[m, :m]) / noise**2 + 1.0
-    factor = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)[0].diagonal()
-    return float(2.0 * np.log(factor[:m]).sum() + corner - factor[m] ** 2)
+    corner = diagonal[m] = 2.0 * float(heights @ heights) / noise**2 + 1.0
+    dpotrf(work.T, lower=1, clean=0, overwrite_a=1)  # in place
+    return float(2.0 * np.log(diagonal[:m]).sum() + corner - diagonal[m] ** 2)
 
 
 def _surprises_alone(basis: Array, heights: Array) -> Array:
@@ -186,7 +198,7 @@ def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
     from scipy.linalg.lapack import dposv
 
     if touch.normals is not None or len(system.places) < len(touch.weights):
-        return fitted(touch, system, sizes.variances, sizes.noise)[0].mean
+        return fitted(touch, system, sizes.variances, sizes.noise).mean
     # Heights ~ N(0, K), K as in `sizes`: the mean alone takes one Cholesky factor.
     (basis, heights, within), (one, other) = _weighted(touch, system), sizes.variances
     prior = _prior(USUAL_WAVINESS)
@@ -197,8 +209,8 @@ def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
     return np.concatenate([prior * (solution @ basis), np.sqrt(touch.weights) * solution])
 
 
-def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tuple[Residual, Array]:
-    """What the contacts say, given these; and the factor L of k(u, u).
+def fitted(touch: Touch, system: System, variances: Array, noise: float) -> Residual:
+    """What the contacts say, given these.
 
     The unknowns are the terms and what L^-1 k(u, p) is multiplied with: that makes the prior's precision 1
     and the system well-conditioned.
@@ -219,7 +231,9 @@ def fitted(touch: Touch, system: System, variances: Array, noise: float) -> tupl
     factor = cholesky(precision)
     mean = solved(factor, solved(factor, seen), transposed=True)
     mean[terms:] = solved(places, mean[terms:], transposed=True)
-    return Residual(touch.contacts[index, :2], variances, mean, factor, np.array(noise)), places
+    residual = Residual(touch.contacts[index, :2], variances, mean, factor, np.array(noise))
+    vars(residual)["places_factor"] = places  # It need not be found again.
+    return residual
 
 
 def _add_slopes(touch: Touch, precision: Array, seen: Array) -> None:

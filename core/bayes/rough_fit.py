@@ -89,10 +89,10 @@ def _settle(found: RoughFit, place: int, touch: Touch, system: System, size: Siz
     touch = touch.moved(turn, scale)
     second = fitted(touch, system_of(touch), size.variances / scale**2, size.noise / scale)
     found.turns[place], found.scales[place] = turn, scale
-    _put(found, place, *second)
+    _put(found, place, second)
 
 
-def _put(found: RoughFit, place: int, residual: Residual, places: Array) -> None:
+def _put(found: RoughFit, place: int, residual: Residual) -> None:
     """One fit: the polynomial nearest to it with its covariance, and the residual beside that."""
     (at, weights), terms = _projection(), _terms()
     told = weights @ kernel(at, residual.places, residual.variances)
@@ -100,7 +100,7 @@ def _put(found: RoughFit, place: int, residual: Residual, places: Array) -> None
     _, k1, k2, _ = turned(np.eye(3), mean, np.eye(3)[0])
     mean[:FREE] = 0.0, 0.0, k1 / 2.0, 0.0, k2 / 2.0
     residual.mean[: len(TERMS)] -= mean
-    told, left = whitened(places, residual.factor, terms.T, told.T)
+    told, left = whitened(residual.places_factor, residual.factor, terms.T, told.T)
     own = np.tensordot(residual.variances, _own(tuple(beside.LENGTHS)), axes=1)
     found.posterior.mean[place], found.posterior.noise[place] = mean, residual.noise
     found.posterior.covariance[place] = own + left.T @ left - told.T @ told

@@ -119,8 +119,10 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     felt = Felt(feel(min(first, farthest)), point, step, partial=first < farthest)
     known: dict[bytes, Grown] = {}
     found = yield from _seed(felt, known)
-    most = NEAR if len(known) > 1 else 1.0
-    growing = np.full(found.counts.shape, found.doubt <= 1.0)
+    # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
+    noisy = found.result.accuracy > MISFIT and found is not list(known.values())[-1]
+    most = np.inf if noisy else NEAR if len(known) > 1 else 1.0
+    growing = np.full(found.counts.shape, noisy or found.doubt <= 1.0)
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(GROWTH * found.counts), found.counts).astype(np.intp)
         if (felt.open & (longer > felt.whole)).any():
@@ -132,7 +134,7 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
             break
         if trial.misfits.max() > 1.0:  # the half curve that is explained worst ends here
             growing.flat[np.argmax(np.where(growing, trial.misfits, -1.0))] = False
-        elif trial.spread > 1.0 or (found.sure and not trial.sure):
+        elif trial.spread > max(1.0, found.spread) or (found.sure and not trial.sure):
             break  # what is known for sure is not given away for more
         else:
             found = trial

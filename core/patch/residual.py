@@ -100,10 +100,11 @@ class Residual:
     def whitened(self, p: Array) -> tuple[Array, Array]:
         """L^-1 k(places, p), (m, n), and factor^-1 f(p), (27 + m, n), at points (n, 2)."""
         terms = monomials(p[:, 0], p[:, 1], TERMS).T
-        return whitened(self._places_factor, self.factor, terms, kernel(self.places, p, self.variances))
+        return whitened(self.places_factor, self.factor, terms, kernel(self.places, p, self.variances))
 
     @cached_property
-    def _places_factor(self) -> Array:
+    def places_factor(self) -> Array:
+        """L of k(u, u), (m, m)."""
         return places_factor(kernel(self.places, self.places, self.variances))
 
 

@@ -23,7 +23,9 @@ def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
     """The same, with their mean_height_std known: what status and message ask for first."""
     stds = mean_height_stds(results)
-    return [replace(r, known_height_std=std) for r, std in zip(results, stds, strict=True)]
+    # With a residual they know it already, and more than the mean.
+    pairs = zip(results, stds, strict=True)
+    return [replace(r, known_height_std=std) if r.residual is None else r for r, std in pairs]
 
 
 def _mean_stds_of_sextics(results: Sequence[Reconstruction]) -> list[float]:

@@ -61,6 +61,12 @@ def reconstruct(
 
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
     method. A fit in doubt comes back with a status.
+
+    >>> s, azimuths = np.linspace(-0.5, 0.5, 21), np.radians([0, 60, 120])  # meridians of the unit ball
+    >>> meridian = lambda a: Contour(np.stack([np.sin(s) * np.cos(a), np.sin(s) * np.sin(a), np.cos(s)], 1))
+    >>> r = reconstruct((0, 0, 1), [meridian(a) for a in azimuths], outward=(0, 0, 1))
+    >>> round(r.patch.k1, 2), round(r.patch.k2, 2), r.status
+    (-1.0, -1.0, 'ok')
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     options = _options(method, degree, noise, weight, solver, radius)

@@ -117,8 +117,12 @@ class Reconstruction:
         """The mean of height_std over the domain."""
         if self.known_height_std is not None:
             return self.known_height_std
-        (x, y), weights = self.domain.nodes[0].T, self.domain.nodes[1]
-        return float(weights @ self.height_std(x, y))
+        return float(self.domain.nodes[1] @ self.node_stds)
+
+    @cached_property
+    def node_stds(self) -> Array:
+        """height_std at the domain's nodes, (n,)."""
+        return self.height_std(*self.domain.nodes[0].T)
 
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).

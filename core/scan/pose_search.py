@@ -62,6 +62,9 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     vertices : (n, 3), in the contacts' unit; faces : (m, 3), indices, counterclockwise from outside
 
     Raises ValueError for bad arguments, and for a mesh that is smaller or very much larger than the patch.
+
+    >>> pose, *others = register(r, vertices, faces)  # doctest: +SKIP
+    >>> there = r.contours[0].points @ pose.rotation.T + pose.translation  # doctest: +SKIP
     """
     if not isinstance(best, int | np.integer) or best < 1:
         raise ValueError(f"best: wanted a whole number of 1 or more, got {shown(best)}")

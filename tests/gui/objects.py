@@ -53,8 +53,10 @@ def is_outdated():
 
 def fresh():
     """How far off the curvatures of the patch are from those of a touch made now, in 1 / radius."""
-    addon = sys.modules[type(probe().tactile_probe).__module__]
-    touched = addon.touch_at(probe(), bpy.context.evaluated_depsgraph_get(), complete=True)
+    module = type(probe().tactile_probe).__module__.rpartition(".")[0]
+    touched = sys.modules[f"{module}.touch_again"].touch_at(
+        probe(), bpy.context.evaluated_depsgraph_get(), complete=True
+    )
     record = patch()["tactile"]
     return max(abs(record[k] - touched.report[k]) for k in ("k1", "k2")) * touched.result.radius
 

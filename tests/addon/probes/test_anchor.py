@@ -33,7 +33,7 @@ def touches(extension, monkeypatch):
     """A list that grows by one with each touch of a probe."""
     found, touch_at = [], extension.tactile_addon.probes.touch_again.touch_at
     counting = lambda probe, *given, **named: found.append(probe.name) or touch_at(probe, *given, **named)  # noqa: E731
-    monkeypatch.setattr(extension.tactile_addon.probes.probe, "touch_at", counting)
+    monkeypatch.setattr(extension.tactile_addon.probes.touch_again, "touch_at", counting)
     return found
 
 

@@ -181,7 +181,7 @@ def test_without_slopes_both_likelihoods_are_one():
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
     alone = linear_system.linear_system(local, weights, nothing, local[:, :0])
-    data = evidence.restricted(alone.basis, alone.heights, weights)
+    data = evidence.restricted(linear_system.of_heights(alone, weights))
     empty = alone._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
     one, other = (linear_system.hyperparameters(s, data, weights, np.array([2e-3])) for s in (alone, empty))
     for a, b in zip(one, other, strict=True):

@@ -84,7 +84,7 @@ def test_the_mean_alone_is_that_of_the_posterior(weight):
     system = system_of(touch)
     size = residual_evidence.sizes(touch, system)
     mean = residual_evidence.mean_given(touch, system, size)
-    whole = fitted(touch, system, size.variances, size.noise)[0]
+    whole = fitted(touch, system, size.variances, size.noise)
     over = np.random.default_rng(1).uniform(-0.6, 0.6, (50, 2))
     heights = (
         monomials(*over.T, TERMS) @ m[: len(TERMS)]
@@ -121,7 +121,7 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     contacts, (x, y, z) = r.contacts / r.radius, r.contacts.T / r.radius
     sizes = np.array([4e-4, 9e-4])
     touch = Touch(contacts, np.ones(len(x)), noise, noise, None)
-    residual, _ = fitted(touch, system_of(touch), sizes, noise)
+    residual = fitted(touch, system_of(touch), sizes, noise)
     variances = np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(USUAL_WAVINESS))])
     places, points = contacts[:, :2], over(r) / r.radius
     basis, wanted = monomials(x, y, TERMS), monomials(*points.T, TERMS)

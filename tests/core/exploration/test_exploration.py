@@ -66,6 +66,21 @@ def test_on_a_sphere_the_patch_is_large_and_as_good_as_it_says(radius, noise):
     assert off < 3.0 * r.mean_height_std
 
 
+@pytest.mark.parametrize(("high", "wide"), [(1.6, 2.4), (1.2, 2.1), (3.2, 2.8)])
+def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_lengths_tried_first(high, wide):
+    def waves(x, y):
+        return high * np.sin(x / wide) * np.sin(y / wide)
+
+    def slopes(x, y):
+        a, b = x / wide, y / wide
+        return high / wide * np.cos(a) * np.sin(b), high / wide * np.sin(a) * np.cos(b)
+
+    surface = bowl_with(waves, slopes)
+    found = explore(surface, noise=0.08, rng=0)
+    assert found.extent == pytest.approx(9 * 30.0 / 96)  # 6, 12 and 24 of 96 are the lengths tried first
+    assert true_error(surface, found) < 1.5 * found.result.mean_height_std
+
+
 def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
     found = explore(surfaces.plane(), noise=0.01, rng=0)
     assert found.extent == pytest.approx(30.0)
