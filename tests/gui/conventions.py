@@ -33,7 +33,7 @@ from common import (
 )
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
-MENU, HUD, HUD_EXTENT = (330, 40), (148, 703), (255, 427)
+MENU, HUD, HUD_EXTENT = (330, 40), (148, 703), (255, 450)
 MOVE_BUTTON, AZIMUTH, ADD_BUTTON, REMOVE_BUTTON = (837, 128), (828, 226), (1001, 205), (1001, 226)
 EXTENSION = "bl_ext.user_default.tactile_patch"
 

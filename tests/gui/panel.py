@@ -10,7 +10,7 @@ import gui
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import PICK_BUTTON, is_complete, look, open_tab, picture, until
+from common import PICK_BUTTON, check, is_complete, look, open_tab, picture, until
 
 NUMBER = (835, 500)
 
@@ -28,11 +28,16 @@ def steps():
     gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.2, "mousemove", *at, "sleep", 0.5, "click", 1)
     yield from until(is_complete)
     picture("panel_first")
+    check(
+        "a pick has the viewport show colors", space.shading.color_type == "VERTEX", space.shading.color_type
+    )
     gui.xdo("mousemove", *NUMBER)
     yield 2
     picture("panel_tip")
-    gui.find("VIEW_3D", "UI")
+    gui.click(*NUMBER)
     yield 0.5
+    copied = bpy.context.window_manager.clipboard
+    check("a click on the name of a number copies it", " ± " in copied and copied.endswith("1/m"), copied)
 
 
 gui.play(steps())
