@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lengths and curvatures in words, in the unit the scene shows lengths in."""
 
+import math
+
+import bpy
+
 METERS = {
     "KILOMETERS": ("km", 1e3),
     "METERS": ("m", 1.0),
@@ -40,6 +44,12 @@ def say(value, power, unit, std=None):
     """A value in length^power, as in "0.0123 mm" or "-4.2 ± 0.3 1/mm²"; the panel has room for one digit."""
     spread = "" if std is None else f" ± {float(f'{std / unit[1] ** power:.1g}'):g}"
     return f"{value / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
+
+
+def length(value, unit=None):
+    """A length in words, in that unit or in the open scene's, for a message."""
+    size = abs(value) if 0.0 < abs(value) < math.inf else 1.0
+    return say(value, 1, unit or unit_of(bpy.context.scene, size))
 
 
 def symbol(power, unit):

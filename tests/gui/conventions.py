@@ -78,9 +78,10 @@ def adjust(place):
     gui.click(*PICK_BUTTON)
     yield 0.5
     yield from click_on(place)
+    yield from until(is_complete)
     full, first = data_blocks(), state()
     gui.click(*HUD)
-    yield 1
+    yield 1.5
     gui.xdo("mousemove", *HUD_EXTENT, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1, "sleep", 0.4)
     gui.xdo("key", "ctrl+a", "sleep", 0.2, "type", "0.25")
     gui.xdo("key", "Return")
