@@ -23,8 +23,9 @@ import bpy
 # Blender's own modules can be found once bpy is there.
 import addon_utils
 
-# A no-op where the extension is enabled already, as it is in an installed Blender.
-addon_utils.enable("bl_ext.user_default.tactile_patch", default_set=False)
+# In an installed Blender the extension is enabled already, from a file or from Blender's platform.
+if not hasattr(bpy.types, "TACTILE_OT_reconstruct"):
+    addon_utils.enable("bl_ext.user_default.tactile_patch", default_set=False)
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("scene", nargs="?", help="a .blend to open; without, the scene as it is")

@@ -4,10 +4,12 @@
 
 import bpy
 
-from . import command_line, panel
+from . import command_line
 from .comparison import register_operator, verify_operator
 from .files import contact_operators
 from .probes import change_handlers, operators, probe, probe_operators
+from .scene import color_range
+from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick
 
@@ -21,23 +23,25 @@ CLASSES = (
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,
+    rows.TACTILE_OT_copy_value,
     *panel.PANELS,
-    panel.VIEW3D_MT_tactile,
-    panel.TactilePreferences,
+    preferences.VIEW3D_MT_tactile,
+    preferences.TactilePreferences,
 )
-MENUS = (*panel.MENUS, *contact_operators.MENUS)
+MENUS = (*preferences.MENUS, *contact_operators.MENUS)
 _commands, _drawings = [], []
 
 
 def register():
     probe.register()
+    color_range.register()
     map_object.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    panel.restore_tab()
+    preferences.restore_tab()
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
-    bpy.utils.register_manual_map(panel.manual_map)
+    bpy.utils.register_manual_map(preferences.manual_map)
     change_handlers.register()
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
     _drawings.extend(overlay.draw_handlers())
@@ -48,10 +52,11 @@ def unregister():
         bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
     change_handlers.unregister()
     bpy.utils.unregister_cli_command(_commands.pop())
-    bpy.utils.unregister_manual_map(panel.manual_map)
+    bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     map_object.unregister()
+    color_range.unregister()
     probe.unregister()

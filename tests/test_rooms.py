@@ -13,7 +13,9 @@ ROOT = Path(__file__).parents[1]
 # Ground floor first. What is in no room is below all rooms where it is listed, and above them where not.
 ROOMS = {
     "core": ("arguments", "contours", "patch", "paper", "bayes", "reconstruction", "exploration", "scan"),
-    "tactile_addon": ("touch", "scene", "probes", "stability_map", "files", "comparison", "viewport"),
+    "tactile_addon": (
+        *("touch", "scene", "probes", "stability_map", "files", "comparison", "viewport", "sidebar"),
+    ),
 }
 MOST_FILES, MOST_LINES = 9, 250
 

@@ -35,6 +35,9 @@ pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
 {}
 </html>
 """
+LEAD = """<!doctype html><meta charset="utf-8"><title>Tactile Patch</title>
+<meta http-equiv="refresh" content="0; url=viewport.html#{}">
+"""
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}
 
 
@@ -154,6 +157,9 @@ def write_manual(folder: Path) -> None:
     text = MANUAL.read_text(encoding="utf-8")
     body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
     (folder / "viewport.html").write_text(PAGE.format(body), encoding="utf-8")
+    # Windows opens files without what stands behind the "#", so each section has a page that leads to it.
+    for section in re.findall(r'<h[23] id="(.+?)"', body):
+        (folder / f"{section}.html").write_text(LEAD.format(section), encoding="utf-8")
     for picture in re.findall(r"!\[.*?\]\((.+?)\)", text):
         shutil.copy2(MANUAL.parent / picture, folder)
 

@@ -10,9 +10,9 @@ from ..arguments import Array
 from ..patch.monge import TERMS
 from .posterior import FREE, ORDERS
 
-POWERS = ORDERS[FREE:] - 1.0  # Powers of the waviness, one for each term.
+WAVINESS_POWERS = ORDERS[FREE:] - 1.0  # Powers of the waviness, one for each term.
 # Chosen with benchmarks.accuracy.
-SCALE = 0.1
+PRIOR_SCALE = 0.1
 WAVINESS = np.geomspace(0.15, 1.3, 6)
 USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
 NOISES = 5  # grid points, from the floor up
@@ -53,7 +53,7 @@ class NormalEquations(NamedTuple):
 
 def prior_variances(waviness: Array) -> Array:
     """Prior variances of the coefficients of degree 3 to 6, (..., 22), for waviness (...)."""
-    return (SCALE * waviness[..., None] ** POWERS) ** 2
+    return (PRIOR_SCALE * waviness[..., None] ** WAVINESS_POWERS) ** 2
 
 
 VARIANCES = prior_variances(WAVINESS)

@@ -36,8 +36,8 @@ from .posterior import FREE, Posterior
 
 MISFIT = 2e-3  # Share of the radius: no surface is a polynomial, so the noise is never less.
 PASSES = 8  # At most: two passes turn the frame to what they found, and more are for outliers.
-SETTLED = 0.1  # Change of a weight between passes that counts as none.
-UMBILIC = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
+SETTLED_WEIGHT = 0.1  # Change of a weight between passes that counts as none.
+ALIKE_CURVATURES = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
 LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
 OUTLYING = 5.0  # standard deviations
 STUDENT = 4.0  # degrees of freedom
@@ -124,7 +124,7 @@ def _pass(
     if data is not None and level.any():
         residuals = system.heights - (system.basis @ found[..., None])[..., 0]
         weights = np.where(level[:, None], _student_weights(residuals, weights > 0.0, touches.floor), weights)
-        settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED)
+        settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED_WEIGHT)
     if data is not None and settled.any():
         which = slice(None) if settled.all() else settled
         surface = posterior(mean, system, data, hyper, touches.weights).at(which).turned(angle[which])
@@ -164,7 +164,7 @@ def turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, floa
     n = axes @ np.array([-sx, -sy, 1.0]) / math.sqrt(1.0 + sx**2 + sy**2)
     tx, ty, _ = (tangent @ axes).tolist()
     half, angle = math.hypot(xx - yy, xy), 0.5 * math.atan2(-xy, yy - xx)
-    if half <= UMBILIC * max(1.0, abs(xx), abs(yy)):
+    if half <= ALIKE_CURVATURES * max(1.0, abs(xx), abs(yy)):
         half, angle = 0.0, math.atan2(ty, tx)
     if math.cos(angle) * tx + math.sin(angle) * ty < 0.0:
         angle += math.pi

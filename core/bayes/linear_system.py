@@ -10,7 +10,7 @@ from ..arguments import Array
 from ..patch.monge import TERMS, monomials
 from .evidence import (
     FREE_PRECISION,
-    SCALE,
+    PRIOR_SCALE,
     Hyperparameters,
     NormalEquations,
     Restricted,
@@ -120,14 +120,14 @@ def posterior(
 ) -> Posterior:
     """What is left open, under the averaged prior, about the means (b, 27)."""
     covariance = np.linalg.inv(_precision(system, hyper.variances, hyper.noise))
-    visibility = data.triangle * (SCALE / hyper.noise)[:, None, None]
+    visibility = data.triangle * (PRIOR_SCALE / hyper.noise)[:, None, None]
     if system.slopes is not None:
         # What the slopes show of the free terms too: the QR of all there is, each in its deviation.
         rows = np.concatenate(
             [np.sqrt(weights)[..., None] * system.basis / hyper.noise[:, None, None], system.slopes], axis=1
         )
         triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
-        visibility = SCALE * triangle[:, FREE:, FREE:]
+        visibility = PRIOR_SCALE * triangle[:, FREE:, FREE:]
     return Posterior(mean, covariance, hyper.noise, visibility, _level(covariance, system, hyper, weights))
 
 

@@ -161,7 +161,7 @@ def _turn(angle: Array) -> Array:
     to_complex, from_complex = _complex_terms()
     phases = np.exp(1j * np.asarray(angle)[..., None] * (TERMS[:, 0] - TERMS[:, 1]))
     turn: Array = ((from_complex * phases[..., None, :]) @ to_complex).real
-    return turn
+    return turn.copy()  # The real parts among complex numbers are nothing that BLAS multiplies.
 
 
 @cache

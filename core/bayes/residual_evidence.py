@@ -21,13 +21,13 @@ from .measured_slopes import slope_equations
 from .posterior import FREE, Posterior
 
 # Chosen with benchmarks.real.
-MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
+ROUGH_MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
 FACETS = 1e-3  # Share of the radius: misfits of a smooth surface, whose curvatures a polynomial tells best.
 UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
 ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
-NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
-PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
+RESIDUAL_NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
+MOST_PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
 ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
 NEGLIGIBLE = 80.0  # -2 log likelihood beside the best, at which no other noise is tried
 FREE_VARIANCE = 0.03  # of slopes and second derivatives: where curves end early, of 100 they run away
@@ -84,7 +84,7 @@ def system_of(touch: Touch) -> System:
     """What fits of the touch are made of."""
     flat = touch.contacts[:, :2]
     basis = monomials(flat[:, 0], flat[:, 1], TERMS)
-    places = _some(len(flat), PLACES)
+    places = _some(len(flat), MOST_PLACES)
     return System(basis, touch.contacts[:, 2], places, kernels(flat, flat[places]))
 
 
@@ -109,7 +109,9 @@ def sizes(touch: Touch, system: System) -> Sizes:
     heights, as in evidence.py; each contact's row times the root of its weight.
     """
     basis, heights, kernels_within = _weighted(touch, system)
-    noises = touch.least * (touch.most / touch.least) ** (np.arange(NOISES) / (NOISES - 1.0))
+    noises = touch.least * (touch.most / touch.least) ** (
+        np.arange(RESIDUAL_NOISES) / (RESIDUAL_NOISES - 1.0)
+    )
     with_it = _surprises(basis, heights, kernels_within, noises)
     without = _surprises_alone(basis / touch.most, heights / touch.most)
     without += 2.0 * len(heights) * math.log(touch.most)
@@ -144,7 +146,7 @@ def _surprises(basis: Array, heights: Array, kernels_within: list[Array], noises
     terms, work, *kernels_of = np.zeros((2 + len(kernels_within), m + 1, m + 1))
     terms[:m, :m] = (basis * _prior(USUAL_WAVINESS)) @ basis.T
     terms[:m, m] = terms[m, :m] = heights
-    found = np.full((len(kernels_within), size, NOISES), np.inf)
+    found = np.full((len(kernels_within), size, RESIDUAL_NOISES), np.inf)
     for within, kernel, surprises in zip(kernels_within, kernels_of, found, strict=True):
         kernel[:m, :m] = within
         for side in (range(size // 2, size), range(size // 2 - 1, -1, -1)):
@@ -155,7 +157,7 @@ def _surprises(basis: Array, heights: Array, kernels_within: list[Array], noises
                     break
                 before = now
     for length, at in np.argwhere(found[..., MIDDLE] < found.min() + NEGLIGIBLE).tolist():
-        for i in (i for i in range(NOISES) if i != MIDDLE):
+        for i in (i for i in range(RESIDUAL_NOISES) if i != MIDDLE):
             found[length, at, i] = _surprise(terms, kernels_of[length], work, at, noises[i])
     return found
 

@@ -3,8 +3,8 @@
 """The joint fit where contacts ask for a residual: the frame, curvatures and polynomial of the surface.
 
 A real surface has other curvatures at each scale; at the point itself they are those of its texture.
-Those of the patch are of the quartic nearest to sextic and residual over a disk of SCALE. Off dense fits
-of the scans they are by half as much, or less, as those of the sextic that was fitted to the contacts
+Those of the patch are of the quartic nearest to sextic and residual over a disk of QUARTIC_SHARE. Off dense
+fits of the scans they are by half as much, or less, as those of the sextic that was fitted to the contacts
 alone, and their intervals are true.
 """
 
@@ -19,9 +19,19 @@ from ..patch.monge import TERMS, exponents, monomials
 from ..patch.residual import Residual, kernel, kernels, weighted_kernel, whitened
 from .joint_fit import turned
 from .posterior import DISK, FREE, Posterior, nodes
-from .residual_evidence import MISFIT, Sizes, System, Touch, asking, fitted, mean_given, sizes, system_of
+from .residual_evidence import (
+    ROUGH_MISFIT,
+    Sizes,
+    System,
+    Touch,
+    asking,
+    fitted,
+    mean_given,
+    sizes,
+    system_of,
+)
 
-SCALE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.
+QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.
 
 
 class RoughFit(NamedTuple):
@@ -62,7 +72,7 @@ def rough_fit(
         return found
     found = found._replace(posterior=Posterior(*(values.copy() for values in posterior)))
     for i in candidates.tolist():
-        there, least = weights[i] > 0.0, max(float(accuracy[i]), MISFIT)
+        there, least = weights[i] > 0.0, max(float(accuracy[i]), ROUGH_MISFIT)
         point = np.zeros((int(through), 3))  # a contact like the others: on facets it may be off as they are
         touch = Touch(
             np.vstack([contacts[i][there], point]),
@@ -111,12 +121,12 @@ def _put(found: RoughFit, place: int, residual: Residual) -> None:
 def _projection() -> tuple[Array, Array]:
     """Points (n, 2) and weights (27, n) that take the heights there to the nearest polynomial's coefficients.
 
-    To degree 2 those of the quartic nearest over the disk of SCALE; the others nearest to what these leave
-    over DISK.
+    To degree 2 those of the quartic nearest over the disk of QUARTIC_SHARE; the others nearest to what these
+    leave over DISK.
     """
     x, y, shares = nodes()
     whole, root = np.column_stack([x, y]), np.sqrt(shares)
-    near = SCALE / DISK * whole
+    near = QUARTIC_SHARE / DISK * whole
     quartic = np.linalg.pinv(root[:, None] * monomials(near[:, 0], near[:, 1], exponents(0, 4)))[1:] * root
     basis = monomials(x, y, TERMS)
     rest = np.linalg.pinv(root[:, None] * basis[:, FREE:]) * root

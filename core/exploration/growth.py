@@ -21,12 +21,13 @@ from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_STD
 
-CONTACTS = (12, 24, 48)  # Numbers of contacts of the longest half curve: the first that is enough is taken.
+# Numbers of contacts of the longest half curve: the first that is enough is taken.
+CONTACT_COUNTS = (12, 24, 48)
 LEAST = 4  # contacts of the shortest half curve
 FELT = 96  # contacts of a half curve as long as may be
 SEEDS = (24, 12, 6, 3)  # Numbers of these contacts that a half curve may begin with.
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
-GROWTH = 1.5  # A half curve grows by this factor at once.
+STRETCH = 1.5  # A half curve grows by this factor at once.
 NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
@@ -124,7 +125,7 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     most = np.inf if noisy else NEAR if len(known) > 1 else 1.0
     growing = np.full(found.counts.shape, noisy or found.doubt <= 1.0)
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
-        longer = np.where(growing, np.ceil(GROWTH * found.counts), found.counts).astype(np.intp)
+        longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
         if (felt.open & (longer > felt.whole)).any():
             felt = Felt(feel(farthest), point, step)
         longer = np.minimum(longer, felt.whole)
@@ -163,7 +164,7 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
 
 def tried(felt: Felt, counts: Counts) -> Fits:
     """With so many contacts, of which as few are fitted as most often are enough."""
-    stride = max(1, int(spacing(counts, CONTACTS[0])))
+    stride = max(1, int(spacing(counts, CONTACT_COUNTS[0])))
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
@@ -175,4 +176,4 @@ def spacing(reaches: Array | Counts, count: int) -> float:
     """A step that gives the longest of half curves (c, 2) some `count` contacts, the shortest LEAST."""
     longest = float(reaches.max())
     shortest = float(np.where(reaches > 0, reaches, longest).min())
-    return min(longest / count, max(shortest / LEAST, longest / CONTACTS[-1]))
+    return min(longest / count, max(shortest / LEAST, longest / CONTACT_COUNTS[-1]))

@@ -10,17 +10,17 @@ import numpy as np
 
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
-from ..bayes.residual_evidence import PLACES
+from ..bayes.residual_evidence import MOST_PLACES
 from ..contours.contour import Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.residual import cholesky, solved
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from .growth import (
-    CONTACTS,
+    CONTACT_COUNTS,
     FELT,
-    GROWTH,
     LEAST,
+    STRETCH,
     Counts,
     Felt,
     Grown,
@@ -98,7 +98,7 @@ class Touch:
         return replace(found, stds=tuple(stds))
 
     def _of_extent(self, extent: float) -> Steps:
-        steps = [extent / count for count in CONTACTS] if self.step is None else [self.step]
+        steps = [extent / count for count in CONTACT_COUNTS] if self.step is None else [self.step]
         return (yield from self._enough(lambda step: (self._felt(extent, step), step, None), extent, steps))
 
     def _felt(self, extent: float, step: float) -> list[Contour]:
@@ -119,7 +119,7 @@ class Touch:
         found = yield from self._of_reaches(largest, largest.counts)
         if largest.sure and found.result.status != "ok" and self.is_grown:
             # These contacts are others than those felt.
-            return (yield from self._of_reaches(largest, np.floor(largest.counts / GROWTH).astype(np.intp)))
+            return (yield from self._of_reaches(largest, np.floor(largest.counts / STRETCH).astype(np.intp)))
         return found
 
     def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
@@ -139,7 +139,7 @@ class Touch:
             fewer = np.minimum((reaches / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
             return again.shortened(fewer), step, None
 
-        steps = [spacing(reaches, count) for count in CONTACTS] if self.step is None else [self.step]
+        steps = [spacing(reaches, count) for count in CONTACT_COUNTS] if self.step is None else [self.step]
         return (yield from self._enough(at, length, steps))
 
     def _enough(self, at: Callable[[float], Contacts], extent: float, steps: list[float]) -> Steps:
@@ -172,7 +172,7 @@ class Touch:
             worst = int(np.argmax(misfits))
             if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * LEAST:
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
-            counts.flat[worst] = max(2 * LEAST, int(counts.flat[worst] / GROWTH) // 2 * 2)
+            counts.flat[worst] = max(2 * LEAST, int(counts.flat[worst] / STRETCH) // 2 * 2)
 
 
 def is_enough(r: Reconstruction) -> bool:
@@ -183,7 +183,7 @@ def is_enough(r: Reconstruction) -> bool:
     if r.mean_height_std <= MISFIT * r.radius:
         return True
     (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
-    some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), PLACES)).astype(np.intp)]
+    some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)]
     over, m = points / r.radius, len(some)
     shared, seen = r.uncertainty.height_covariances(some / r.radius, over)
     # A patch by another method departs from the posterior's mean, of which no contact takes anything off.

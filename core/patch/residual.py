@@ -26,8 +26,8 @@ from .differential_geometry import Derivatives
 from .monge import TERMS, derived_monomials, monomials
 
 LENGTHS = np.array([0.4, 1.6])  # of the radius; with benchmarks.real
-BLOCK = 6000  # distances at once: they fit into a processor's cache
-ROUNDING = 1e-9  # Share of k(u, u).
+DISTANCES_AT_ONCE = 6000  # distances at once: they fit into a processor's cache
+KERNEL_ROUNDING = 1e-9  # Share of k(u, u).
 ORDER = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 
 
@@ -110,7 +110,7 @@ class Residual:
 
 def places_factor(within: Array) -> Array:
     """L of k(u, u) of places, (m, m), lower triangular."""
-    np.einsum("ii->i", within)[:] += ROUNDING * within.trace() / len(within)  # a view
+    np.einsum("ii->i", within)[:] += KERNEL_ROUNDING * within.trace() / len(within)  # a view
     return cholesky(within)
 
 
@@ -155,7 +155,7 @@ def kernels(p: Array, q: Array) -> list[Array]:
 
 def weighted_kernel(p: Array, q: Array, variances: Array, weights: Array) -> Array:
     """k(p, q) @ weights at points (n, 2) and (m, 2), (n,)."""
-    total, rows = np.empty(len(p)), max(1, BLOCK // max(len(q), 1))
+    total, rows = np.empty(len(p)), max(1, DISTANCES_AT_ONCE // max(len(q), 1))
     for start in range(0, len(p), rows):
         one, other = _maternes(distances(p[start : start + rows], q))
         total[start : start + rows] = one @ (variances[0] * weights) + other @ (variances[1] * weights)

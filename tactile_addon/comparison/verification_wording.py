@@ -26,8 +26,8 @@ def verification_summary(record):
         return True, record["message"]
     mean, most = found["vertex_distance_mean"], found["vertex_distance_max"]
     return False, (
-        f'{vertices} vertices of "{name}" are {mean:.3g} off the patch in the mean, {most:.3g} at most; it '
-        f"covers {percent:.0f} %"
+        f'{vertices} vertices of "{name}" are {units.length(mean)} off the patch in the mean, '
+        f"{units.length(most)} at most; it covers {percent:.0f} %"
     )
 
 
@@ -59,8 +59,8 @@ def verification_table(found, unit):
 def verification_rows(found, unit):
     """(label, value) of what else a verification found."""
     return [
-        ("Fit Error on Curves", _length(found, "fit_error", unit)),
-        (f"… on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
+        ("Error on Curves", _length(found, "fit_error", unit)),
+        (f"Error on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),
         ("Total |K|", f"{found['total_absolute_curvature']:.3g}"),
         ("Overlap", f"{100.0 * found['overlap']:.0f} %"),
     ]

@@ -19,6 +19,7 @@ from ..probes import probe
 from ..probes.operators import make_active, report_error
 from ..scene import patch_object, patch_record
 from ..touch.settings import FitSettings, draw_solver
+from ..touch.units import length
 from ..touch.wording import fit_summary
 from . import contact_file, measured
 
@@ -127,7 +128,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         report = touched.report
         summary = fit_summary(report)
         if "misses" in report:
-            summary += f", their common point by {max(report['misses']):.3g} at most"
+            summary += f", their common point by {length(max(report['misses']))} at most"
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
@@ -183,7 +184,7 @@ class TACTILE_OT_export_contacts(_PatchExport, bpy.types.Operator):
     """Write the contacts of the active patch as CSV, in the scene's units"""
 
     bl_idname = "tactile.export_contacts"
-    bl_label = "Export Contacts"
+    bl_label = "Export Contact Data"
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
@@ -220,7 +221,7 @@ def draw_import(self, context):
 
 
 def draw_export(self, context):
-    self.layout.operator(TACTILE_OT_export_contacts.bl_idname, text="Tactile Contacts (.csv)")
+    self.layout.operator(TACTILE_OT_export_contacts.bl_idname, text="Contact Data (.csv)")
     self.layout.operator(TACTILE_OT_export_patch.bl_idname, text="Tactile Patch (.json)")
 
 

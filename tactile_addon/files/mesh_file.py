@@ -19,6 +19,7 @@ def open_file(path):
         bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
     else:
         add(path, empty=True)
+        bpy.context.scene.unit_settings.system = "NONE"  # nobody knows what the numbers of such a file are in
 
 
 def add(path, empty=False):
@@ -70,6 +71,7 @@ def write(path, obj):
             bpy.ops.wm.ply_export(
                 filepath=str(temporary),
                 export_selected_objects=True,
+                apply_modifiers=False,
                 export_attributes=True,
                 export_uv=False,  # whose seams would split vertices
             )

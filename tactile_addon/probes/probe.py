@@ -184,7 +184,9 @@ def make(context, target):
     return probe
 
 
-def _recolor(obj):
+def _show(obj):
+    """Colors a patch by what it is set to show now; the range of what it showed is none of that."""
+    obj.pop(patch_record.RANGE, None)
     if patch_record.RECORD not in obj or not obj.is_editable:
         return
     try:
@@ -202,7 +204,7 @@ def register():
         description="What the colors of the patch show",
         items=[item[:3] for item in patch_record.QUANTITIES],
         override=OVERRIDABLE,
-        update=lambda obj, _: _recolor(obj),
+        update=lambda obj, _: _show(obj),
     )
     bpy.types.Object.tactile_target = StringProperty(  # a pointer would keep a mesh that is deleted
         name="Target",

@@ -7,7 +7,8 @@ import math
 import bpy
 from bpy.props import FloatProperty, IntProperty
 
-from ..scene import patch_object, patch_record
+from ..scene import color_range, patch_object, patch_record
+from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
 from ..touch.settings import MOST_PLANES
 from ..touch.wording import added_planes
@@ -175,13 +176,29 @@ class TACTILE_OT_show_colors(bpy.types.Operator):
 
     def execute(self, context):
         context.space_data.shading.type = "SOLID"
-        context.space_data.shading.color_type = "VERTEX"
+        show_colors(context.space_data)
         return {"FINISHED"}
 
 
-def shows_colors(space):
-    kind = space.shading.type
-    return kind in ("MATERIAL", "RENDERED") or (kind == "SOLID" and space.shading.color_type == "VERTEX")
+class TACTILE_OT_share_range(bpy.types.Operator):
+    """Have all patches that show the same as this one use one range of colors, which suits all of them"""
+
+    bl_idname = "tactile.share_range"
+    bl_label = "Same Range for All Patches"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if probe.patch_near(context.view_layer.objects.active) is None:
+            cls.poll_message_set("Select a patch, or its probe")
+            return False
+        return True
+
+    def execute(self, context):
+        patch = probe.patch_near(context.view_layer.objects.active)
+        count = color_range.share(patch, context.view_layer.objects)
+        self.report({"INFO"}, f"{count} patches have one range of colors")
+        return {"FINISHED"}
 
 
 OPERATORS = (
@@ -191,4 +208,5 @@ OPERATORS = (
     TACTILE_OT_update,
     TACTILE_OT_delete,
     TACTILE_OT_show_colors,
+    TACTILE_OT_share_range,
 )

@@ -1,17 +1,20 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The contours as a mesh, tubes and contacts; and the contacts of strokes."""
+"""The contours as a mesh, tubes and contacts; the contacts of strokes; and the rim of the patch."""
 
 import numpy as np
 
 from .mesh_data import fill
 
+CORNERS, RIM = 96, 0.6  # points around a patch, and how thick its rim is beside a contour
+
 
 def fill_contours(mesh, touched):
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
-    Point attributes tell them apart: `contour` counts the contours and is -1 for strokes, `contact` the
-    contacts along one, and is -1 on the tubes. They show what the patch keeps in its reconstruction.
+    Point attributes tell them apart: `contour` counts the contours and is -1 for strokes and the rim,
+    `contact` the contacts along one, and is -1 on the tubes and the rim. They show what the
+    patch keeps in its reconstruction.
     """
     frame, thickness = touched.result.frame, 0.009 * touched.result.radius
     parts = []  # (number of the contour, points, triangles, index of the contact)
@@ -22,6 +25,8 @@ def fill_contours(mesh, touched):
         parts.append((number, *_contacts(path, thickness)))
     if len(touched.result.strokes):
         parts.append((-1, *_contacts(frame.to_local(touched.result.strokes), thickness)))
+    rim = _rim(touched.result)  # by which a flat patch is told from a flat face below it
+    parts.append((-1, *_tube(rim, np.array([0.0, 0.0, 1.0]), RIM * thickness), np.full(4 * len(rim), -1)))
     points, triangles, contour_index, contact_index = [], [], [], []
     count = 0
     for number, mesh_points, mesh_triangles, contact in parts:
@@ -35,6 +40,13 @@ def fill_contours(mesh, touched):
         ("contact", "INT", np.concatenate(contact_index)),
     ]
     fill(mesh, np.vstack(points), np.vstack(triangles), attributes)
+
+
+def _rim(result):
+    """The closed path (n, 3) around a patch, in its frame."""
+    edge = result.domain.boundary(CORNERS)
+    edge = np.vstack([edge, edge[:1]])
+    return np.column_stack([edge, result.height(*edge.T)])
 
 
 def _tube(path, across, thickness):

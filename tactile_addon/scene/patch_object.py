@@ -18,6 +18,7 @@ from .patch_record import (
     CONTOURS,
     POWERS,
     QUANTITIES_OF_A_FIT,
+    RANGE,
     RECONSTRUCTION,
     RECORD,
     VERDICT,
@@ -26,6 +27,7 @@ from .patch_record import (
     matrix_of,
     place,
 )
+from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
@@ -45,6 +47,7 @@ def insert(scene, touched, parent=None, lines=None):
     for obj in (patch, lines):
         add(obj)
     rewrite(patch, touched)
+    show_colors()
     return patch
 
 
@@ -106,7 +109,8 @@ def recolor(patch):
     own_mesh(patch)
     shown, mesh = patch.tactile_colors, patch.data
     shades, record = values(mesh, shown), patch[RECORD]
-    limit = colors.symmetric_range(shades, floor=FLOOR * record["radius"] ** POWERS[shown])
+    floor = FLOOR * record["radius"] ** POWERS[shown]
+    limit = patch.get(RANGE) or colors.symmetric_range(shades, floor)
     mesh.attributes[COLOR].data.foreach_set("color", colors.diverging(shades, limit).ravel())
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()

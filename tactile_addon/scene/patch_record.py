@@ -14,6 +14,7 @@ RECORD = "tactile"  # the patch object's custom property that holds the report,
 RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
 VERDICT = "tactile_verdict"  # and the one with its status and message while these say that it is outdated
 COLOR = "curvature_color"
+RANGE = "tactile_color_range"  # and the one with the range of its colors, where that is given
 MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 # What the colors can show: attribute, name, description, and the power of length it is measured in.

@@ -2,16 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A stability map as an object: a painted copy of the mesh that was touched."""
 
+import math
+
 import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
 from ..scene import colors, patch_object, patch_record
 from ..scene.mesh_data import emission
+from ..scene.viewports import show_colors
 from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
 
 COLOR = "stability_color"
 SHADES = 256
+ABOVE = 2e-3  # of the object's size
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
 SHOWN = [
     ("error", "Error", "How far patch and mesh are apart, in height", 1),
@@ -45,13 +49,16 @@ def insert(context, obj, touched):
     painted.matrix_world = obj.matrix_world
     # Under a parent the target may be sheared, which an object of its own cannot be.
     mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
-    painted.show_in_front = True  # it lies in the mesh it describes
+    # It lies in the mesh it describes: shown a little above it, but not in front, as the patches are in it.
+    above = painted.modifiers.new("Above the Mesh", "DISPLACE")
+    above.mid_level, above.strength = 0.0, ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
     _paint(mesh, touched)
     mesh.materials.clear()
     mesh.materials.append(emission("Tactile Stability", attribute=COLOR))
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
     recolor(painted)
+    show_colors()
     return painted
 
 

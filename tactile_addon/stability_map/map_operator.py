@@ -12,9 +12,10 @@ from ..probes import probe
 from ..probes.operators import make_active, report_error, target_object
 from ..scene import patch_record
 from ..touch.settings import NAMES, TouchSettings, draw_all, draw_chosen, touch_arguments
+from ..touch.wording import sentence
 from . import map_object
 from .map_report import map_summary
-from .stability import StabilityMap
+from .stability import StabilityMap, expected_count
 
 SLICE = 0.05  # seconds of work between two events
 SAY = 1.0  # seconds between two lines of progress
@@ -61,6 +62,10 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         found = probe.probe_of(context.view_layer.objects.active)
         for name in NAMES if found is not None else ():
             setattr(self, name, getattr(found.tactile_probe, name))
+        try:
+            self.target = target_object(context, self.target).name
+        except ValueError as error:
+            return report_error(self, error)
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
     def execute(self, context):
@@ -153,10 +158,21 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         self.report({"INFO"} if record["patches"] else {"WARNING"}, map_summary(record))
         return {"FINISHED"}
 
+    def _about(self, context):
+        """What is going to be touched, and at how many points; or why not."""
+        try:
+            target = target_object(context, self.target)
+            depsgraph = context.evaluated_depsgraph_get()
+            count = expected_count(target, depsgraph, self.extent, self.spacing)
+        except ValueError as error:
+            return sentence(error)
+        return f"{target.name}: about {count} points are touched"
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(self, "target")
+        layout.prop_search(self, "target", context.scene, "objects")
+        layout.label(text=self._about(context), translate=False)
         draw_chosen(layout, self, "spacing")
         layout.separator()
         draw_all(layout, self)

@@ -10,8 +10,9 @@ import numpy as np
 
 from ... import core
 from ..touch.detached_mesh import MeshSnapshot
-from ..touch.evaluated_mesh import coordinates, evaluated_object
+from ..touch.evaluated_mesh import coordinates, evaluated_object, size_of
 from ..touch.touch_object import LEAST_STEPS, require_fine, require_lengths
+from ..touch.units import length
 
 EXTENT_SHARE = 1.0 / 8.0  # Share of the object's size, where no extent is given.
 SPACING_SHARE = 1.0 / 4.0  # Share of the extent, where no spacing is given.
@@ -23,13 +24,26 @@ REASONS = [
     ("patch", "Patch", None),
     ("doubt", "In Doubt", None),
     ("crease", "Crease", core.CREASE),
-    ("edge", "Border", core.NO_CONTACT),
+    ("edge", "Edge", core.NO_CONTACT),
     ("steep", "Too Steep", core.NOT_MONGE),
     ("nothing", "No Area", None),
 ]
 REASON_KEYS = [key for key, _, _ in REASONS]
 STOP_CODES = {stop: code for code, (_, _, stop) in enumerate(REASONS) if stop}
 MEASURES = ("error", "height_std", "condition_number", "blind_share")
+
+
+def expected_count(obj, depsgraph, extent, spacing):
+    """How many points of an object are touched, about; inputs are 0 as in StabilityMap.
+
+    Raises ValueError, with a sentence, for what cannot be touched.
+    """
+    evaluated, linear, _ = evaluated_object(obj, depsgraph)
+    extent = extent or EXTENT_SHARE * size_of(evaluated, linear)
+    areas = np.empty(len(evaluated.data.polygons), dtype=np.float32)
+    evaluated.data.polygons.foreach_get("area", areas)
+    area = float(areas.sum()) * abs(np.linalg.det(linear)) ** (2.0 / 3.0)
+    return min(len(evaluated.data.vertices), core.spaced_count(area, spacing or SPACING_SHARE * extent))
 
 
 class StabilityMap:
@@ -49,7 +63,7 @@ class StabilityMap:
 
         self.surface = MeshSnapshot(obj, depsgraph)
         if not spacing >= 0.0:  # NaN is none
-            raise ValueError(f"The spacing is a length of 0 or more, got {spacing:g}")
+            raise ValueError(f"The spacing is a length of 0 or more, got {length(spacing)}")
         self.extent = extent or EXTENT_SHARE * self.surface.size
         self.step = step or self.extent / LEAST_STEPS
         require_lengths(obj.name, self.surface.size, self.extent, self.step, noise)

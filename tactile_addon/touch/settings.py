@@ -5,6 +5,7 @@
 import math
 from contextlib import contextmanager
 
+from bpy.app.translations import pgettext_iface as iface
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
 from bpy.types import Object
 
@@ -189,24 +190,28 @@ def touch_arguments(settings):
     }
 
 
-def draw_chosen(layout, settings, name):
-    """A number that the surface chooses where it is 0, which the label says."""
+def draw_chosen(layout, settings, name, found=None):
+    """A number that the surface chooses where it is 0, which the label says, with what it has `found`."""
     if getattr(settings, name):
         layout.prop(settings, name)
+    elif found and found.get(name):
+        row = layout.row()
+        row.use_property_split = False  # for the label, which takes the width it needs
+        row.prop(settings, name, text=f"{iface(AUTO[name])} {found[name]}", translate=False)
     else:
         layout.prop(settings, name, text=AUTO[name])
 
 
-def draw_sensor(layout, settings):
-    draw_chosen(layout, settings, "step")
+def draw_sensor(layout, settings, found=None):
+    draw_chosen(layout, settings, "step", found)
     layout.prop(settings, "noise")
     if settings.noise:
         layout.prop(settings, "seed")
 
 
-def draw_solver(layout, settings):
+def draw_solver(layout, settings, found=None):
     layout.prop(settings, "method")
-    draw_chosen(layout, settings, "degree")
+    draw_chosen(layout, settings, "degree", found)
     if settings.method in ("tagc", "quadratic-variation"):
         layout.prop(settings, "weight")
 

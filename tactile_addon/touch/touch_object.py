@@ -21,6 +21,7 @@ from .touch_report import (
     reconstruction_report,
     suggestion_report,
 )
+from .units import length
 
 FARTHEST_SHARE = 1.0 / 2.0  # Share of the object's size: a half contour that ends by itself is no longer.
 AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where no extent is given.
@@ -137,15 +138,22 @@ def require_lengths(name, size, extent, step, noise):
     """Raises ValueError for lengths, 0 where they are not given, that no touch of an object can have."""
     if not all(length >= 0.0 for length in (extent, step, noise)):  # NaN is none
         raise ValueError(
-            f"Extent, step and noise are lengths of 0 or more, got {extent:g}, {step:g} and {noise:g}"
+            f"Extent, step and noise are lengths of 0 or more, got "
+            f"{length(extent)}, {length(step)} and {length(noise)}"
         )
     if extent > size:
-        raise ValueError(f'The extent {extent:g} is longer than "{name}" ({size:g}): take a shorter one')
+        raise ValueError(
+            f'The extent {length(extent)} is longer than "{name}" ({length(size)}): take a shorter one'
+        )
     longest = extent or FARTHEST_SHARE * size
     if step > longest:
-        raise ValueError(f"The step {step:g} is longer than the extent {longest:g}: take a shorter one")
+        raise ValueError(
+            f"The step {length(step)} is longer than the extent {length(longest)}: take a shorter one"
+        )
     if noise > longest:
-        raise ValueError(f"The noise {noise:g} is larger than the extent {longest:g}: take a smaller one")
+        raise ValueError(
+            f"The noise {length(noise)} is larger than the extent {length(longest)}: take a smaller one"
+        )
 
 
 def _reference_point(name, surface, location, extent, step):
@@ -156,7 +164,7 @@ def _reference_point(name, surface, location, extent, step):
     farthest = extent or AWAY * surface.size
     if distance > farthest:
         raise ValueError(
-            f'The location is {distance:g} away from "{name}", farther than {farthest:g}: '
+            f'The location is {length(distance)} away from "{name}", farther than {length(farthest)}: '
             "move it to the surface"
         )
     require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
@@ -167,8 +175,9 @@ def require_fine(spacing, step):
     """Raises ValueError where coordinates are too coarse for the step."""
     if spacing > MOST_ROUNDING * step:
         raise ValueError(
-            f"Coordinates at the point are {spacing:g} apart in single precision, too coarse "
-            f"for a step of {step:g}: move the object nearer to the origin of the world or of its own mesh"
+            f"Coordinates at the point are {length(spacing)} apart in single precision, too coarse "
+            f"for a step of {length(step)}: move the object nearer to the origin of the world or of its own "
+            "mesh"
         )
 
 

@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lengths and curvatures in words, in the unit the scene shows lengths in."""
 
+import math
+
+import bpy
+
 METERS = {
     "KILOMETERS": ("km", 1e3),
     "METERS": ("m", 1.0),
@@ -17,7 +21,7 @@ ADAPTIVE = {
     "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
 }
-POWERS = {1: "", 2: "²"}
+SUPERSCRIPTS = {1: "", 2: "²"}
 
 
 def unit_of(scene, size):
@@ -42,7 +46,13 @@ def say(value, power, unit, std=None):
     return f"{value / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
 
 
+def length(value, unit=None):
+    """A length in words, in that unit or in the open scene's, for a message."""
+    size = abs(value) if 0.0 < abs(value) < math.inf else 1.0
+    return say(value, 1, unit or unit_of(bpy.context.scene, size))
+
+
 def symbol(power, unit):
     """The unit of length^power, as in "mm" or "1/mm²"; empty for a number, and where lengths have none."""
     name = unit[0] if power else ""
-    return f"1/{name}{POWERS[-power]}" if name and power < 0 else name
+    return f"1/{name}{SUPERSCRIPTS[-power]}" if name and power < 0 else name

@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The reports of patches and maps as tables and sentences for people; and errors as sentences."""
 
-from . import units
-from .units import say
+import bpy
 
-FLAT = 2.0  # A curvature within so many deviations of 0 has no radius.
-FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
-NOTHING = 1e-6  # of a number in unit radius
+from .units import length, say, unit_of
+
 SPREAD = ("mean", "median", "max", "rms")
 
 
@@ -90,9 +88,10 @@ def sentence(error):
 
 def fit_summary(report):
     """The fit in a sentence: its status, the curvatures, and how far its contacts are missed."""
+    unit = unit_of(bpy.context.scene, report["radius"])
     return (
-        f"{report['message']} Curvatures {report['k1']:.4g} and {report['k2']:.4g}, "
-        f"{report['contacts']} contacts missed by {report['fit_error']:.3g} in the mean"
+        f"{report['message']} Curvatures {say(report['k1'], -1, unit)} and {say(report['k2'], -1, unit)}, "
+        f"{report['contacts']} contacts missed by {length(report['fit_error'])} in the mean"
     )
 
 
@@ -127,52 +126,10 @@ def _verified_rows(found):
 def registration_summary(found):
     """Where a patch was put, in a sentence."""
     residual = found["residuals"][found["pose"] - 1]
-    words = f'The contacts are {residual:.3g} off "{found["target"]}" (root mean square)'
+    words = f'The contacts are {length(residual)} off "{found["target"]}" (root mean square)'
     if not found["is_ambiguous"]:
         return words
     return f"{words}; others of its {len(found['residuals'])} poses are about as good"
-
-
-def patch_rows(record, unit):
-    """(label, value) of what matters of a patch, with lengths in a unit of units.py."""
-
-    def value(key, power):
-        # What is left of nothing in single precision is none.
-        return record[key] if abs(record[key]) > NOTHING * record["radius"] ** power else 0.0
-
-    def row(label, key, power=1):
-        return label, units.say(value(key, power), power, unit)
-
-    def measured(label, key, power):
-        return label, units.say(value(key, power), power, unit, record[f"{key}_std"])
-
-    rows = [
-        measured("Curvature κ1", "k1", -1),
-        measured("Curvature κ2", "k2", -1),
-        *_radii(record, unit),
-        measured("Gaussian K", "gaussian_curvature", -2),
-        measured("Mean H", "mean_curvature", -1),
-        row("Fit Error", "fit_error"),
-        ("Standard Deviation", "± " + units.say(record["height_std"], 1, unit)),
-    ]
-    if not record["is_verified"]:
-        return [*rows, ("Mesh to Patch", "…")]
-    if record["vertices"] and "verification" not in record:
-        rows += [row("Mesh to Patch", "vertex_distance_mean"), row("… at Most", "vertex_distance_max")]
-    plane = record["suggested_plane"]
-    return [
-        *rows,
-        ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
-        ("… Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
-    ]
-
-
-def _radii(record, unit):
-    """Rows of the radii 1 / kappa, with their deviations, as far as the curvatures are known not to be 0."""
-    for number in (1, 2):
-        k, std = record[f"k{number}"], record[f"k{number}_std"]
-        if abs(k) > FLAT * std and abs(k) * record["radius"] > FLATTEST:
-            yield f"Radius 1/κ{number}", units.say(1.0 / k, 1, unit, std / k**2)
 
 
 def _suggestion(plane):

@@ -4,6 +4,7 @@
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
 from ..probes import probe
@@ -13,6 +14,8 @@ from .overlay import PLANE_COLORS
 
 REACH = 1.15  # Place of the handles, in extents.
 UPRIGHT = 0.75
+BALL, LEAST_BALL = 0.12, 0.05  # sizes of balls, in those of Blender's gizmos,
+SHARE = 0.125  # and that of one in the reach of a patch that is small in the view
 
 
 class TACTILE_GGT_handles(bpy.types.GizmoGroup):
@@ -41,7 +44,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         ball.draw_options = (
             {"FILL", "ALIGN_VIEW"} if what in (DRAG_TURN, POINT) else {"FILL_SELECT", "ALIGN_VIEW"}
         )
-        ball.scale_basis, ball.line_width = 0.12, 3.0
+        ball.scale_basis, ball.line_width = BALL, 3.0
         return ball
 
     def _handle(self, kind, what, plane, color):
@@ -58,6 +61,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
         center = np.array(matrix.translation)
+        self._shrink(context, matrix.translation, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
         self.point.hide = settings.target is None
@@ -71,6 +75,21 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
                 turn.matrix_basis = Matrix.Translation(center + REACH * reach * t)
                 tilt.matrix_basis = Matrix.Translation(center + UPRIGHT * reach * up)
         self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)
+
+    def _shrink(self, context, center, reach):
+        """Makes the balls no larger than suits a patch that is small in the view, which they would hide."""
+        side = context.region_data.view_matrix.inverted_safe().col[0].xyz.normalized()
+        ends = (
+            location_3d_to_region_2d(context.region, context.region_data, at)
+            for at in (center, center + reach * side)
+        )
+        here, there = ends
+        if here is None or there is None:
+            return
+        gizmo = context.preferences.view.gizmo_size * context.preferences.system.ui_scale
+        scale = min(max(SHARE * (there - here).length / gizmo, LEAST_BALL), BALL)
+        for ball in (self.point, *self.turns, *self.tilts):
+            ball.scale_basis = scale
 
 
 def _line_of_sight(view, point):

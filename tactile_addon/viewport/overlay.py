@@ -10,6 +10,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
 from ..scene import colors, patch_record
+from ..scene.viewports import shows_colors
 from ..stability_map import map_object
 from ..touch import units
 from ..touch.touch_object import plane_axes
@@ -65,8 +66,10 @@ def _active(context):
 
 
 def draw_plane():
-    """The active sampling plane of the active probe, as far as its contour may reach."""
+    """While a handle is dragged, the active sampling plane, as far as its contour may reach."""
     context = bpy.context
+    if not any(operator.bl_idname == "TACTILE_OT_drag" for operator in context.window.modal_operators):
+        return
     obj = probe.probe_of(_active(context))
     if obj is None or not obj.visible_get():
         return
@@ -88,6 +91,8 @@ def draw_plane():
 def draw_legend():
     """The legend of the active patch or map: quantity, unit and range, beside the sidebar."""
     context = bpy.context
+    if not shows_colors(context.space_data):
+        return
     obj = _active(context)
     patch = probe.patch_near(obj)
     record = probe.record_of(obj)

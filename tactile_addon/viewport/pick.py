@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
 
 from ..probes import anchor, probe, touch_again
 from ..probes.operators import make_active, report_error, target_object
+from ..scene.viewports import show_colors
 from ..touch import units
 from ..touch.settings import NAMES, TouchSettings, draw_all, touch_arguments
 from ..touch.surface import MeshSurface
@@ -138,6 +139,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         touch_again.adopt(found, touched, depsgraph, complete=True)
         settings.is_probe = True
         make_active(context, found)
+        show_colors(context.space_data)
         report = touched.report
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, report["message"])
         return {"FINISHED"}

@@ -33,7 +33,7 @@ from common import (
 )
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
-MENU, HUD, HUD_EXTENT = (330, 40), (148, 703), (255, 427)
+MENU, HUD, HUD_EXTENT = (330, 40), (148, 703), (255, 450)
 MOVE_BUTTON, AZIMUTH, ADD_BUTTON, REMOVE_BUTTON = (837, 128), (828, 226), (1001, 205), (1001, 226)
 EXTENSION = "bl_ext.user_default.tactile_patch"
 
@@ -78,9 +78,10 @@ def adjust(place):
     gui.click(*PICK_BUTTON)
     yield 0.5
     yield from click_on(place)
+    yield from until(is_complete)
     full, first = data_blocks(), state()
     gui.click(*HUD)
-    yield 1
+    yield 1.5
     gui.xdo("mousemove", *HUD_EXTENT, "sleep", 0.3, "click", "--repeat", 2, "--delay", 60, 1, "sleep", 0.4)
     gui.xdo("key", "ctrl+a", "sleep", 0.2, "type", "0.25")
     gui.xdo("key", "Return")

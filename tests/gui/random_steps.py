@@ -28,7 +28,10 @@ taken = []
 
 def is_quiet():
     """Whether no gesture goes on, and no timer of the extension is left."""
-    timers = (sys.modules[f"{ADDON}.live"]._settle, sys.modules[f"{ADDON}.deleted"].remove)
+    timers = (
+        sys.modules[f"{ADDON}.probes.change_handlers"]._settle,
+        sys.modules[f"{ADDON}.probes.deleted"].remove,
+    )
     windows = bpy.context.window_manager.windows
     return not any(window.modal_operators for window in windows) and not any(
         map(bpy.app.timers.is_registered, timers)

@@ -53,8 +53,8 @@ def report_of(what, *args):
 
 def check_files(first):
     """The same point of the same surface, from a file of each kind."""
-    # The extent too: where none is given it follows the object's bounding box, which an import may turn.
-    same = ["--location", *first["frame"]["origin"], "--extent", first["extent"]]
+    # Extent and step too: where none is given they follow the object's bounding box, which files may turn.
+    same = ["--location", *first["frame"]["origin"], "--extent", first["extent"], "--step", first["step"]]
     for background in ([], ["-b"]):
         for kind in ("blend", "ply", "stl", "obj"):
             what = f"blender {' '.join([*background, '-c'])} tactile reconstruct scene.{kind}"

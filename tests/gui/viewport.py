@@ -38,7 +38,7 @@ from common import (
 )
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
-EXTENT_FIELD, MOVE_BUTTON, DELETE_BUTTON, COLORS_BUTTON = (943, 180), (837, 128), (1001, 128), (893, 430)
+EXTENT_FIELD, MOVE_BUTTON, DELETE_BUTTON, COLORS_BUTTON = (943, 180), (837, 128), (1001, 128), (893, 451)
 PLANES_BUTTON = (893, 634)  # once the sidebar is scrolled to its end
 VIEW = 6.0  # extents, that the view is away from the probe
 
@@ -279,9 +279,9 @@ def two_probes():
     check("Shift D makes a second probe", second != first and second.tactile_probe.is_probe, second)
     check("... with a patch of its own", patch(second) is not None and patch(second) != patch(first), "")
     check("... and the first keeps its own", same(state(first), was), state(first))
-    consistent("the copy", second)
-    yield from until(lambda: "vertices" in patch(second)["tactile"], 10)
+    yield from until(lambda: is_complete() and "vertices" in patch(second)["tactile"], 10)
     check("... and is completed", "vertices" in patch(second)["tactile"], "")
+    consistent("the copy", second)
     picture("two")
     gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
     yield 1

@@ -122,7 +122,7 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
         extension.tactile_addon.touch.wording,
     )
     found = {"target": "A", "pose": 1, "residuals": [0.1, 0.2], "is_ambiguous": False}
-    assert report.registration_summary(found) == 'The contacts are 0.1 off "A" (root mean square)'
+    assert report.registration_summary(found) == 'The contacts are 0.1 m off "A" (root mean square)'
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
     with pytest.raises(ValueError, match=r"poses on .* take one of them"):

@@ -423,7 +423,7 @@ def test_a_probe_off_the_surface_says_so_and_keeps_its_patch(empty, ball):
         probe.location = (0.0, 0.0, height)
         update(empty)
         assert probe.tactile_probe.message == (
-            f'The location is {height - 2:g} away from "Sphere", farther than 0.6: move it to the surface'
+            f'The location is {height - 2:g} m away from "Sphere", farther than 0.6 m: move it to the surface'
         )
         assert state_but_status(patch) == before
         assert report_of(patch)["status"] == "outdated"
@@ -656,7 +656,7 @@ def test_undo_and_redo_bring_back_probe_and_patch_together(empty, ball):
         ({"target": "Flat", "new": True}, '"Flat" has no faces to touch'),
         ({"location": (0.0, float("nan"), 0.0)}, "coordinates that are not finite"),
         ({"location": (0.0, 0.0, 9.0), "new": True}, "The location is 7 away"),
-        ({"extent": 50.0}, 'The extent 50 is longer than "Sphere"'),
+        ({"extent": 50.0}, 'The extent 50 m is longer than "Sphere"'),
         ({"azimuths": [0.0] * 6}, "run in one direction"),
     ],
 )

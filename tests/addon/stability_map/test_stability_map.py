@@ -257,7 +257,7 @@ def test_faces_of_no_area_are_nothing_to_feel(empty):
         ({"spacing": -0.1}, "The spacing is a length"),
         ({"spacing": np.nan}, "The spacing is a length"),
         ({"extent": 50.0}, "longer than"),
-        ({"extent": 0.1, "step": 0.2}, "The step 0.2 is longer"),
+        ({"extent": 0.1, "step": 0.2}, "The step 0.2 m is longer"),
         ({"extent": 0.1, "step": 0.09}, "of the 3 contacts it needs"),
         ({"noise": -1.0}, "lengths of 0 or more"),
         ({"azimuths": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "run in one direction"),

@@ -43,10 +43,11 @@ def test_a_plane_gets_no_advice_about_directions_that_it_does_not_have(empty, cu
 
 
 def test_what_rounding_leaves_of_nothing_is_said_to_be_none(extension):
-    rows = dict(extension.tactile_addon.touch.wording.patch_rows(RECORD, ("mm", 1.0)))
-    assert rows["Curvature κ1"] == "0 ± 0.01 1/mm"
-    assert rows["Curvature κ2"] == "0.02 ± 0.01 1/mm"
-    assert rows["Gaussian K"] == "0 ± 0.01 1/mm²"
+    said = extension.tactile_addon.sidebar.patch_rows
+    rows = dict(said.main_rows(RECORD, ("mm", 1.0)) + said.other_rows(RECORD, ("mm", 1.0)))
+    assert rows["κ1 Curvature"] == "0 ± 0.01 1/mm"
+    assert rows["κ2 Curvature"] == "0.02 ± 0.01 1/mm"
+    assert rows["K Gaussian"] == "0 ± 0.01 1/mm²"
     assert rows["Fit Error"] == "0 mm"
 
 
@@ -59,6 +60,10 @@ RECORD = {
     "fit_error": 1.1e-7,
     "height_std": 0.1,
     "is_verified": False,
+    "shape_index": 0.5,
+    "curvedness": 0.014,
+    "degree": 4,
+    "contacts": 60,
     **{f"{name}_std": 0.01 for name in ("k1", "k2", "gaussian_curvature", "mean_curvature")},
 }
 

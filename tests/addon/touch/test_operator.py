@@ -146,7 +146,7 @@ def test_the_contours_are_an_object_of_their_own(empty, ball):
     assert lines.parent == patch
     assert lines.users_collection == patch.users_collection
     contact, contour = values(lines.data, "contact"), values(lines.data, "contour")
-    assert np.unique(contour).tolist() == [0, 1, 2]
+    assert np.unique(contour).tolist() == [-1, 0, 1, 2]  # -1 is the rim of the patch
     assert np.unique(contact).tolist() == list(range(-1, 21))
     # The middle of an octahedron is its contact; the reference point is the eleventh.
     points = positions(lines.data)
@@ -481,19 +481,19 @@ def nothing(bpy):
         (excluded, {}, "disabled in viewports or excluded from the view layer"),
         (far_away, {"location": (2e6, 0.0, 2.0)}, "apart in single precision, too coarse"),
         (far_in_its_mesh, {}, "apart in single precision, too coarse"),
-        (nothing, {"location": (0.0, 0.0, 9.0)}, "The location is 7 away"),
+        (nothing, {"location": (0.0, 0.0, 9.0)}, "The location is 7 m away"),
         (nothing, {"location": (float("nan"), 0.0, 0.0)}, "coordinates that are not finite"),
         (nothing, {"location": (float("inf"), 0.0, 0.0)}, "too far away to be measured"),
         (nothing, {"outward": (0.0, 0.0, 0.0)}, "Outward: wanted a vector with a direction"),
         (nothing, {"outward": (float("nan"), 0.0, 0.0)}, "Outward: wanted finite numbers"),
-        (nothing, {"extent": 50.0}, 'The extent 50 is longer than "Sphere"'),
+        (nothing, {"extent": 50.0}, 'The extent 50 m is longer than "Sphere"'),
         (nothing, {"step": 1e-5}, "Step: wanted at least a 10000th of the extent 0.6"),
-        (nothing, {"step": 0.9}, "The step 0.9 is longer than the extent 0.6"),
+        (nothing, {"step": 0.9}, "The step 0.9 m is longer than the extent 0.6 m"),
         (nothing, {"extent": -1.0}, "lengths of 0 or more"),
         (nothing, {"step": -0.1}, "lengths of 0 or more"),
         (nothing, {"noise": -0.1}, "lengths of 0 or more"),
-        (nothing, {"extent": float("nan")}, "lengths of 0 or more, got nan"),
-        (nothing, {"noise": 1e30}, "The noise 1e+30 is larger than the extent 0.6"),
+        (nothing, {"extent": float("nan")}, "lengths of 0 or more, got nan m"),
+        (nothing, {"noise": 1e30}, "The noise 1e+27 km is larger than the extent 0.6 m"),
         (nothing, {"weight": -1.0}, "Weight: wanted a finite number above 0"),
         (nothing, {"step": 0.6}, "Curve 1 has 2 of the 3 contacts"),
         (nothing, {"azimuths": [0.0] * 6}, "run in one direction"),

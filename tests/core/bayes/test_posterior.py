@@ -100,7 +100,7 @@ def test_intervals_cover_surfaces_drawn_from_the_prior(planes):
     covered = []
     for seed in range(60):
         waviness = 0.6 * np.exp(0.5 * rng.normal())
-        sizes = evidence.SCALE * waviness ** (posterior.ORDERS - 1.0) * rng.normal(size=27)
+        sizes = evidence.PRIOR_SCALE * waviness ** (posterior.ORDERS - 1.0) * rng.normal(size=27)
         b = np.where(posterior.ORDERS <= 2, [0.3], 1.0) * sizes * length ** (1.0 - posterior.ORDERS)
         s = surfaces.graph(dict(zip(map(tuple, posterior.TERMS[2:].tolist()), b[2:], strict=True)))
         r = touched(s, planes, noise=0.03, seed=seed, extent=length, degree=6)

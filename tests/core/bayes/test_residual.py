@@ -21,7 +21,7 @@ from core.bayes import residual_evidence
 from core.bayes.evidence import USUAL_WAVINESS, prior_variances
 from core.bayes.posterior import DISK, FREE, nodes
 from core.bayes.residual_evidence import FREE_VARIANCE, Touch, fitted, system_of
-from core.bayes.rough_fit import SCALE
+from core.bayes.rough_fit import QUARTIC_SHARE
 from core.patch import residual
 from core.patch.monge import TERMS, exponents, monomials
 from core.patch.residual import kernel, weighted_kernel
@@ -143,7 +143,7 @@ def test_the_patch_is_that_of_the_surface_over_a_disk():
     covered = []
     for seed in range(25):
         height, r = touched(seed, azimuths=(0, 45, 90, 135))
-        x, y = SCALE * r.radius * np.array(nodes()[:2]) / DISK
+        x, y = QUARTIC_SHARE * r.radius * np.array(nodes()[:2]) / DISK
         terms, shares = exponents(0, 4), np.sqrt(nodes()[2])[:, None]
         at = shares * monomials(x, y, terms)
         b = np.linalg.lstsq(at, shares[:, 0] * r.height(x, y), rcond=None)[0][1:]

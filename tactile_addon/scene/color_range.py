@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The range of a patch's colors where it is given, by hand or as that of several patches."""
+
+import bpy
+from bpy.props import FloatProperty
+
+from ..touch import units
+from . import patch_object
+from .patch_record import POWERS, RANGE, RECORD, report_of, require_whole
+
+
+def unit_of_range(patch, scene):
+    """The power of length of what a patch shows, and the unit its legend has."""
+    report = report_of(patch)
+    unit = ("", 1.0) if report is None else units.unit_of(scene, report["radius"])
+    return POWERS[patch.tactile_colors], unit
+
+
+def share(patch, patches):
+    """Gives all `patches` that show what `patch` shows the largest of their own ranges; returns how many."""
+    same = [other for other in patches if other.tactile_colors == patch.tactile_colors and _is_whole(other)]
+    for other in same:
+        set_range(other, 0.0)
+    limit = max((other[RECORD]["color_limit"] for other in same), default=0.0)
+    for other in same:
+        set_range(other, limit)
+    return len(same)
+
+
+def set_range(patch, limit):
+    """The range in units of the world; 0 for the patch's own."""
+    patch[RANGE] = limit
+    if limit <= 0.0:
+        del patch[RANGE]
+    if _is_whole(patch):
+        patch_object.recolor(patch)
+
+
+def _is_whole(obj):
+    if RECORD not in obj or not obj.is_editable:
+        return False
+    try:
+        require_whole(obj)
+    except ValueError:
+        return False
+    return True
+
+
+def _get(obj):
+    power, unit = unit_of_range(obj, bpy.context.scene)
+    return obj.get(RANGE, 0.0) / unit[1] ** power
+
+
+def _set(obj, value):
+    power, unit = unit_of_range(obj, bpy.context.scene)
+    set_range(obj, value * unit[1] ** power)
+
+
+def register():
+    bpy.types.Object.tactile_range = FloatProperty(
+        name="Range",
+        description="Where the colors of the patch end, in the unit of the legend; 0 for what its values ask",
+        min=0.0,
+        precision=4,
+        get=_get,
+        set=_set,
+    )
+
+
+def unregister():
+    del bpy.types.Object.tactile_range

@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether viewports show the colors of vertices, and making them do so."""
+
+import bpy
+
+
+def shows_colors(space):
+    """Whether a 3D viewport draws the colors of vertices."""
+    kind = space.shading.type
+    return kind in ("MATERIAL", "RENDERED") or (kind == "SOLID" and space.shading.color_type == "VERTEX")
+
+
+def show_colors(chosen=None):
+    """Has a viewport draw them in Solid shading, and all others that nobody has set to anything else.
+
+    A file that is made without a window has viewports too, in which it is opened.
+    """
+    areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    for shading in (area.spaces.active.shading for area in areas):
+        if shading.color_type == "MATERIAL":
+            shading.color_type = "VERTEX"
+    if chosen is not None and chosen.type == "VIEW_3D":
+        chosen.shading.color_type = "VERTEX"

@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panels of the sidebar's tab."""
+
+import bpy
+
+from ..comparison.register_operator import TACTILE_OT_register
+from ..comparison.verification_wording import verification_rows, verification_table
+from ..comparison.verify_operator import TACTILE_OT_verify
+from ..probes import probe
+from ..probes.probe_operators import (
+    TACTILE_OT_add_plane,
+    TACTILE_OT_add_planes,
+    TACTILE_OT_delete,
+    TACTILE_OT_remove_plane,
+    TACTILE_OT_share_range,
+    TACTILE_OT_show_colors,
+    TACTILE_OT_update,
+)
+from ..scene import color_range, patch_record
+from ..scene.viewports import shows_colors
+from ..stability_map.map_operator import TACTILE_OT_stability_map
+from ..stability_map.map_report import map_rows, median_rows
+from ..touch import units
+from ..touch.settings import draw_chosen, draw_sensor, draw_solver
+from ..touch.wording import registration_summary
+from ..viewport.pick import TACTILE_OT_pick
+from .patch_rows import found_values, main_rows, other_rows, plane_rows, verdict
+from .rows import draw_rows, draw_sentence
+
+TAB = "Tactile"
+ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
+
+
+class _Sidebar:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = TAB
+
+    def draw(self, context):
+        self.layout.use_property_split, self.layout.use_property_decorate = True, False
+        self.draw_active(context, self.layout, context.view_layer.objects.active)
+
+
+class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
+    bl_idname = "TACTILE_PT_probe"
+    bl_label = "Tactile Probe"
+
+    def draw_active(self, context, layout, obj):
+        found = probe.probe_of(obj)
+        if found is None:
+            layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
+            return
+        row = layout.row(align=True)
+        move = row.row(align=True)
+        move.enabled = probe.lock_of(found) is None
+        move.operator(TACTILE_OT_pick.bl_idname, text="Move", icon="EYEDROPPER")
+        row.operator(TACTILE_OT_pick.bl_idname, text="New", icon="ADD").new = True
+        row.operator(TACTILE_OT_delete.bl_idname, text="", icon="TRASH")
+        settings = found.tactile_probe
+        layout.prop(settings, "target")
+        chosen = found_values(probe.record_of(found), context.scene)
+        draw_chosen(layout, settings, "extent", chosen)
+        _draw_planes(layout, settings)
+        row = layout.row()
+        row.prop(settings, "live")
+        row.operator(TACTILE_OT_update.bl_idname, text="", icon="FILE_REFRESH")
+        for identifier, title, draw in (("sensor", "Sensor", draw_sensor), ("solver", "Fit", draw_solver)):
+            header, body = layout.panel(f"TACTILE_PT_{identifier}", default_closed=True)
+            header.label(text=title)
+            if body:
+                draw(body, settings, chosen)
+
+
+def _draw_planes(layout, settings):
+    column = layout.column(align=True)
+    heading = column.row(align=True)
+    for text in ("Azimuth", "Tilt"):
+        heading.label(text=text)
+    heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
+    for i in range(settings.plane_count):
+        row = column.row(align=True)
+        row.use_property_split = False
+        row.prop(settings, "azimuths", index=i, text="")
+        row.prop(settings, "tilts", index=i, text="")
+        row.operator(TACTILE_OT_remove_plane.bl_idname, text="", icon="REMOVE").plane = i
+
+
+class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
+    bl_idname = "TACTILE_PT_result"
+    bl_label = "Patch"
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.view_layer.objects.active
+        return probe.probe_of(obj) is not None or probe.patch_near(obj) is not None
+
+    def draw_active(self, context, layout, obj):
+        found, patch = probe.probe_of(obj), probe.patch_near(obj)
+        if found is not None and found.tactile_probe.message:
+            draw_sentence(context, layout, found.tactile_probe.message, "ERROR")
+        if patch is None:
+            return
+        record = probe.record_of(patch)
+        if record is None:
+            layout.label(text="This patch was edited: touch again", icon="ERROR")
+            return
+        unit = units.unit_of(context.scene, record["radius"])
+        is_outdated = record["status"] == "outdated"
+        # What has failed stands above already.
+        if not is_outdated or found is None or not found.tactile_probe.message:
+            draw_sentence(context, layout, verdict(record, unit), ICONS.get(record["status"], "ERROR"))
+        if is_outdated and found is not None:
+            layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
+        _draw_colors(context, layout, patch, "tactile_colors")
+        _draw_range(context, layout, patch, record)
+        draw_rows(layout, main_rows(record, unit), active=not is_outdated)
+        _draw_details(context, layout, record, unit)
+        layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
+        if found is None:
+            layout.prop_search(patch, "tactile_target", context.scene, "objects")
+            layout.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
+        if "registration" in record:
+            draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
+        if "verification" in record:
+            _draw_verification(layout, record["verification"], unit)
+        if found is not None:
+            draw_rows(layout, plane_rows(record, unit), active=not is_outdated)
+            layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
+            layout.operator(TACTILE_OT_add_planes.bl_idname, icon="PLUS")
+
+
+class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
+    bl_idname = "TACTILE_PT_map"
+    bl_label = "Stability Map"
+
+    def draw_active(self, context, layout, obj):
+        layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
+        if obj is None or patch_record.MAP_RECORD not in obj:
+            return
+        _draw_colors(context, layout, obj, "tactile_map_colors")
+        record = obj[patch_record.MAP_RECORD]
+        box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
+        draw_rows(box, map_rows(record, unit))
+        medians = median_rows(record, unit)
+        if medians:
+            box.label(text="Medians of the Patches")
+            draw_rows(box, medians)
+
+
+def _draw_details(context, layout, record, unit):
+    """What the fit says of itself, and all other numbers, folded away."""
+    header, body = layout.panel("TACTILE_PT_why", default_closed=True)
+    header.label(text="Reasons")
+    if body:
+        draw_sentence(context, body, record["message"], ICONS.get(record["status"], "ERROR"))
+    header, body = layout.panel("TACTILE_PT_numbers", default_closed=True)
+    header.label(text="More Numbers")
+    if body:
+        draw_rows(body, other_rows(record, unit), active=record["status"] != "outdated")
+
+
+def _draw_colors(context, layout, obj, name):
+    """What the colors show, and a button where the viewport does not show them."""
+    layout.prop(obj, name)
+    if not shows_colors(context.space_data):
+        layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
+
+
+def _draw_range(context, layout, patch, record):
+    """Where the colors end, and a button for one range on all patches."""
+    power, unit = color_range.unit_of_range(patch, context.scene)
+    row = layout.row(align=True)
+    row.use_property_split = False
+    word = "Range" if patch_record.RANGE in patch else "Range (Auto)"
+    ends = units.say(record["color_limit"], power, unit)
+    row.prop(patch, "tactile_range", text=f"{word} {ends}", translate=False)
+    row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
+
+
+def _draw_verification(layout, found, unit):
+    layout.label(text=found["target"], icon="MESH_DATA", translate=False)
+    column = layout.column(align=True)
+    for label, *values in verification_table(found, unit):
+        row = column.row(align=True).split(factor=0.31, align=True)
+        row.label(text=label)
+        row = row.row(align=True)
+        for value in values:
+            row.label(text=value)
+    draw_rows(layout, verification_rows(found, unit))
+
+
+PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_map)

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the sidebar says of a patch: a verdict in plain words, the numbers that matter, and all others."""
+
+from collections import Counter
+
+from ..touch import units
+from ..touch.touch_report import ENDS
+
+FLAT = 2.0  # A curvature within so many deviations of 0 has no radius.
+FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
+NOTHING = 1e-6  # of a number in unit radius
+
+
+def verdict(record, unit):
+    """Whether a patch is good, and what to do where it is not, in a sentence."""
+    if record["status"] == "outdated":
+        return "Outdated: touch again"
+    if record["status"] != "ok":
+        doubt = record["message"].partition(". ")[0].rstrip(".")
+        return f"Doubtful: {doubt.rpartition(': ')[2]}"
+    stops = Counter(stop for pair in record.get("stops", ()) for stop in pair)
+    early = [(count, ENDS[stop]) for stop, count in stops.most_common() if ENDS.get(stop, "").endswith(SHORT)]
+    if early:
+        count, where = early[0]
+        return f"Good, with {count} of {stops.total()} half curves cut short {where}"
+    return f"Good: heights to ± {units.say(record['height_std'], 1, unit)}"
+
+
+SHORT = ("edge", "crease", "turns away")  # what ends a curve that could be felt on
+
+
+def main_rows(record, unit):
+    """(label, value) of what matters most, with lengths in a unit of units.py."""
+    mesh = "…"
+    if record["is_verified"]:
+        mesh = _said(record, "vertex_distance_mean", 1, unit) if record["vertices"] else "–"
+    return [
+        ("κ1 Curvature", _measured(record, "k1", -1, unit)),
+        ("κ2 Curvature", _measured(record, "k2", -1, unit)),
+        ("Height", "± " + units.say(record["height_std"], 1, unit)),
+        ("Mesh to Patch", mesh),
+    ]
+
+
+def other_rows(record, unit):
+    """(label, value) of the rest."""
+    rows = [
+        *_radii(record, unit),
+        ("K Gaussian", _measured(record, "gaussian_curvature", -2, unit)),
+        ("H Mean", _measured(record, "mean_curvature", -1, unit)),
+        ("Shape Index", f"{record['shape_index']:.2f}"),
+        ("Curvedness", _said(record, "curvedness", -1, unit)),
+        ("Fit Error", _said(record, "fit_error", 1, unit)),
+    ]
+    if record["is_verified"] and record["vertices"]:
+        rows.append(("Farthest Vertex", _said(record, "vertex_distance_max", 1, unit)))
+    lengths = ("extent", "step") if "step" in record else ("radius",)
+    rows += [(key.title(), units.say(record[key], 1, unit)) for key in lengths]
+    return [*rows, ("Degree", str(record["degree"])), ("Contacts", str(record["contacts"]))]
+
+
+def plane_rows(record, unit):
+    """(label, value) of the plane that would tell most, once it is known."""
+    if not record["is_verified"]:
+        return []
+    plane = record["suggested_plane"]
+    return [
+        ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
+        ("Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
+    ]
+
+
+def found_values(record, scene):
+    """What the last touch had in the place of numbers that are left to the surface, in words by name."""
+    if record is None or record["status"] == "outdated" or "step" not in record:
+        return {}
+    unit = units.unit_of(scene, record["radius"])
+    lengths = {name: units.say(record[name], 1, unit) for name in ("extent", "step")}
+    return lengths | {"degree": str(record["degree"])}
+
+
+def _said(record, key, power, unit):
+    return units.say(_value(record, key, power), power, unit)
+
+
+def _measured(record, key, power, unit):
+    return units.say(_value(record, key, power), power, unit, record[f"{key}_std"])
+
+
+def _value(record, key, power):
+    # What is left of nothing in single precision is none.
+    return record[key] if abs(record[key]) > NOTHING * record["radius"] ** power else 0.0
+
+
+def _radii(record, unit):
+    """Rows of the radii 1 / kappa, with their deviations, as far as the curvatures are known not to be 0."""
+    for number in (1, 2):
+        k, std = record[f"k{number}"], record[f"k{number}_std"]
+        if abs(k) > FLAT * std and abs(k) * record["radius"] > FLATTEST:
+            yield f"1/κ{number} Radius", units.say(1.0 / k, 1, unit, std / k**2)

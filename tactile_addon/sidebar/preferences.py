@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The menu entries, the manual's pages and the preferences."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from ..comparison.register_operator import TACTILE_OT_register
+from ..comparison.verify_operator import TACTILE_OT_verify
+from ..probes.operators import TACTILE_OT_reconstruct
+from ..probes.probe_operators import (
+    TACTILE_OT_add_plane,
+    TACTILE_OT_add_planes,
+    TACTILE_OT_delete,
+    TACTILE_OT_update,
+)
+from ..stability_map.map_operator import TACTILE_OT_stability_map
+from ..viewport.pick import TACTILE_OT_pick
+from .panel import PANELS, TAB
+
+
+class VIEW3D_MT_tactile(bpy.types.Menu):
+    bl_idname = "VIEW3D_MT_tactile"
+    bl_label = "Tactile Patch"
+
+    def draw(self, context):
+        for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
+            self.layout.operator(operator.bl_idname)
+        self.layout.separator()
+        for operator in (TACTILE_OT_verify, TACTILE_OT_register):
+            self.layout.operator(operator.bl_idname)
+        self.layout.separator()
+        for operator in (TACTILE_OT_add_plane, TACTILE_OT_add_planes, TACTILE_OT_update, TACTILE_OT_delete):
+            self.layout.operator(operator.bl_idname)
+
+
+def _draw_in_object(self, context):
+    self.layout.separator()
+    self.layout.menu(VIEW3D_MT_tactile.bl_idname)
+
+
+def _draw_in_add(self, context):
+    self.layout.separator()
+    self.layout.operator(TACTILE_OT_reconstruct.bl_idname, icon="SURFACE_DATA")
+
+
+MENUS = (("VIEW3D_MT_object", _draw_in_object), ("VIEW3D_MT_mesh_add", _draw_in_add))
+
+
+def manual_map():
+    """For Online Manual in the context menus: the pages that come with the extension, one a section."""
+    folder = Path(__file__).resolve().parents[2] / "manual"
+    pages = {
+        "bpy.ops.tactile.pick": "the-first-patch.html",
+        "bpy.ops.tactile.verify": "verify.html",
+        "bpy.ops.tactile.register": "register.html",
+        "bpy.ops.tactile.stability_map": "stability-map.html",
+        "bpy.types.object.tactile_map_colors": "stability-map.html",
+        "bpy.ops.tactile*": "probe.html",
+        "bpy.types.tactileprobe*": "probe.html",
+        "bpy.types.object.tactile_colors": "result.html",
+    }
+    return f"{folder.as_uri()}/", tuple(pages.items())
+
+
+def _move_tab(preferences, context):
+    """Panels learn their tab when they are registered."""
+    for panel in PANELS:
+        bpy.utils.unregister_class(panel)
+        panel.bl_category = preferences.tab or TAB
+        bpy.utils.register_class(panel)
+
+
+def restore_tab():
+    """Puts the panels where the preferences have them, if the extension has any."""
+    addon = bpy.context.preferences.addons.get(TactilePreferences.bl_idname)
+    if addon is not None and addon.preferences.tab != TAB:
+        _move_tab(addon.preferences, bpy.context)
+
+
+class TactilePreferences(bpy.types.AddonPreferences):
+    bl_idname = __package__.rsplit(".", 2)[0]
+
+    tab: StringProperty(
+        name="Sidebar Tab", description="Where the panels are in the sidebar", default=TAB, update=_move_tab
+    )
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, "tab")
+        self.layout.operator(
+            "wm.url_open", text="Manual", icon="HELP"
+        ).url = f"{manual_map()[0]}viewport.html"

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the sidebar draws rows of numbers, which say what they are below the mouse, and sentences."""
+
+import re
+import textwrap
+
+import bpy
+from bpy.props import StringProperty
+
+TIPS = {
+    "κ1 Curvature": "The larger principal curvature at the point; below 0 the surface bulges outward",
+    "κ2 Curvature": "The smaller principal curvature at the point; below 0 the surface bulges outward",
+    "Height": "Standard deviation of the patch's height: how well the contacts determine it",
+    "Mesh to Patch": "Mean distance of the mesh's vertices over the patch from it; … until you let go",
+    "1/κ1 Radius": "Radius of the circle that bends like the surface along the first principal direction",
+    "1/κ2 Radius": "Radius of the circle that bends like the surface along the second principal direction",
+    "K Gaussian": "Gaussian curvature, κ1 times κ2: above 0 on domes and bowls, below 0 on saddles",
+    "H Mean": "Mean curvature, the mean of κ1 and κ2",
+    "Shape Index": "1 on caps, 0.5 on ridges, 0 on saddles, -0.5 in ruts, -1 in cups",
+    "Curvedness": "How strongly the surface bends, whatever its shape",
+    "Fit Error": "Mean distance in height of the contacts from the patch",
+    "Farthest Vertex": "Greatest distance of the mesh's vertices over the patch from it",
+    "Extent": "How far the longest half curve reaches from the point",
+    "Radius": "How far the contacts reach from the point",
+    "Step": "Distance between contacts",
+    "Degree": "Of the polynomial that describes the patch",
+    "Contacts": "How many contacts the patch was fitted to",
+    "Suggested Plane": "Azimuth of the sampling plane that tells most of what is still open",
+    "Would Bring": "Standard deviation of the height to expect with the suggested plane",
+    "Error on Curves": "Mean difference in height of the contacts from the patch, equation (6) of the paper",
+    "Error on … More": "The same over contacts of more contours between the sampling planes, felt on it",
+    "Total |K|": "Absolute Gaussian curvature summed over the patch: 0 where it is flat or rolled",
+    "Overlap": "Share of the patch's area that has mesh below it",
+    "Points": "How many points of the mesh were touched",
+    "Spacing": "Distance between the points that were touched",
+    "Patches": "How many touches gave a patch",
+    "… in Doubt": "How many of these patches are in doubt",
+}
+
+
+def tip_of(label):
+    """What a row's label means; empty where that goes without saying."""
+    return TIPS.get(re.sub(r"(?<= )\d+", "…", label), "")
+
+
+class TACTILE_OT_copy_value(bpy.types.Operator):
+    """Copy this number"""
+
+    bl_idname = "tactile.copy_value"
+    bl_label = "Copy Value"
+    bl_options = {"INTERNAL"}
+
+    label: StringProperty(name="Label", description="Of the row", options={"SKIP_SAVE"})
+    value: StringProperty(name="Value", description="What is copied", options={"SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, context, properties):
+        """What the number is; Blender shows it below the mouse."""
+        return f"{tip_of(properties.label)}. Click to copy it"
+
+    def execute(self, context):
+        context.window_manager.clipboard = self.value
+        return {"FINISHED"}
+
+
+def draw_rows(layout, rows, active=True):
+    """Labels and values side by side, gray where they are not active."""
+    column = layout.column(align=True)
+    column.active = active
+    for label, value in rows:
+        split = column.split(factor=0.47, align=True)
+        if tip_of(label):
+            left = split.row(align=True)
+            left.alignment = "LEFT"
+            copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
+            copy.label, copy.value = label, value
+        else:
+            split.label(text=label)
+        split.label(text=value, translate=False)
+
+
+def draw_sentence(context, layout, sentence, icon):
+    """As many lines as the sidebar's width needs."""
+    letters = context.region.width / (6.5 * context.preferences.system.ui_scale) - 8.0
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for i, line in enumerate(textwrap.wrap(sentence, max(16, int(letters)))):
+        column.label(text=line, icon=icon if i == 0 else "BLANK1")

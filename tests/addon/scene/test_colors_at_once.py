@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A patch is seen in colors without a button: its viewports, the range of colors, its rim, maps below."""
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from scenes import positions, values
+
+
+@pytest.fixture
+def ball(empty):
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
+    return empty.context.object
+
+
+def shadings(bpy):
+    areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    return [area.spaces.active.shading for area in areas]
+
+
+def touch(bpy, location, **arguments):
+    bpy.ops.tactile.reconstruct(target="Sphere", location=location, extent=0.4, **arguments)
+    return bpy.context.object
+
+
+def test_a_script_has_the_viewports_show_colors_but_not_those_set_otherwise(empty):
+    empty.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
+    first, *others = (each for each in shadings(empty) if each.color_type == "MATERIAL")
+    first.color_type = "RANDOM"
+    assert others
+    touch(empty, (0, 0, 1))
+    assert {shading.color_type for shading in others} == {"VERTEX"}
+    assert first.color_type == "RANDOM"
+
+
+def test_patches_share_a_range_and_may_be_given_one(empty, ball):
+    empty.context.scene.unit_settings.length_unit = "MILLIMETERS"
+    ball.scale = (1.0, 1.0, 0.5)
+    empty.context.view_layer.update()
+    patches = [touch(empty, location) for location in ((0, 0, 0.5), (1, 0, 0))]
+    other = touch(empty, (0, 1, 0))
+    other.tactile_colors = "mean_curvature"
+    own = [patch["tactile"]["color_limit"] for patch in patches]
+    assert own[1] > 2.0 * own[0]
+    empty.context.view_layer.objects.active = patches[0]
+    assert empty.ops.tactile.share_range() == {"FINISHED"}  # and says: 2 patches have one range of colors
+    assert [patch["tactile"]["color_limit"] for patch in patches] == [max(own)] * 2
+    assert "tactile_color_range" not in other
+    patches[0].tactile_range = 2e-6  # in 1/mm², as the legend has it
+    assert patches[0]["tactile"]["color_limit"] == pytest.approx(2.0, rel=1e-6)
+    assert patches[0].tactile_range == pytest.approx(2e-6, rel=1e-6)
+    patches[0].tactile_range = 0.0
+    assert patches[0]["tactile"]["color_limit"] == own[0]
+    patches[1].tactile_colors = "mean_curvature"  # whose range is another
+    assert "tactile_color_range" not in patches[1]
+
+
+def test_a_flat_patch_has_a_rim_that_lies_in_it(empty):
+    empty.ops.mesh.primitive_cube_add()
+    empty.context.object.name = "Sphere"
+    patch = touch(empty, (0.1, 0.2, 1.0))
+    (lines,) = patch.children
+    is_rim = (values(lines.data, "contour") == -1) & (values(lines.data, "contact") == -1)
+    rim = positions(lines.data)[is_rim]
+    angles = np.sort(np.arctan2(rim[:, 1], rim[:, 0]))
+    assert np.diff(angles).max() < math.radians(10.0)
+    assert np.hypot(*rim[:, :2].T).min() > 0.3
+    assert np.abs(rim[:, 2]).max() < 0.01
+
+
+def test_a_map_is_above_its_mesh_and_below_patches(empty, ball):
+    empty.ops.tactile.stability_map(target="Sphere", extent=0.4, spacing=0.4)
+    painted = empty.context.object
+    patch = touch(empty, (0, 0, 1))
+    assert patch.show_in_front
+    assert not painted.show_in_front
+    depsgraph = empty.context.evaluated_depsgraph_get()
+    shown = np.linalg.norm(positions(painted.evaluated_get(depsgraph).data), axis=1)
+    assert 1.001 < shown.min() <= shown.max() < 1.01
+    assert np.allclose(np.linalg.norm(positions(painted.data), axis=1), 1.0)

@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the sidebar says: a verdict first, found values, and what each row means."""
+
+import re
+
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+UNIT = ("mm", 1.0)
+
+
+@pytest.fixture
+def said(extension):
+    return extension.tactile_addon.sidebar.patch_rows
+
+
+@pytest.fixture
+def ball(empty):
+    """The probe of a ball of radius 1, and its report."""
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
+    empty.ops.tactile.pick(location=(0.3, 0.2, 1.0))
+    (patch,) = empty.context.object.children
+    return empty.context.object, patch["tactile"].to_dict()
+
+
+def record(status="ok", message="The patch describes its contacts.", **more):
+    return {"status": status, "message": message, "height_std": 0.0123, **more}
+
+
+def test_the_verdict_says_good_and_how_good(said):
+    assert said.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
+    blind = record(
+        message="The patch describes its contacts. 3 of 28 coefficients are invisible to these planes."
+    )
+    assert said.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
+
+
+def test_the_verdict_says_what_limits_a_good_patch(said, empty):
+    empty.ops.mesh.primitive_cube_add()
+    empty.ops.tactile.pick(target="Cube", location=(0.9, 0.2, 1.0), extent=0.5)
+    (patch,) = empty.context.object.children
+    words = said.verdict(patch["tactile"].to_dict(), UNIT)
+    assert words == "Good, with 3 of 6 half curves cut short at a crease"
+
+
+@pytest.mark.parametrize("status", ["uncertain", "not_converged"])
+def test_the_verdict_says_what_to_do_where_there_is_doubt(said, status):
+    message = (
+        "Heights are good to 5.3 % of the radius in the mean: take a shorter extent, or add sampling planes."
+        " 3 of 28 coefficients are invisible to these planes. All half curves end at a crease."
+    )
+    words = said.verdict(record(status, message), UNIT)
+    assert words == "Doubtful: take a shorter extent, or add sampling planes"
+
+
+def test_the_verdict_on_an_earlier_patch_is_none(said):
+    assert said.verdict(record("outdated"), UNIT) == "Outdated: touch again"
+
+
+def test_what_was_found_stands_beside_auto(said, empty, ball):
+    _, report = ball
+    scene = empty.context.scene
+    found = said.found_values(report, scene)
+    assert found.keys() == {"extent", "step", "degree"}
+    number, unit = found["extent"].split()
+    meters = {"m": 1.0, "cm": 0.01, "mm": 0.001}[unit]
+    assert float(number) * meters == pytest.approx(report["extent"], rel=1e-2)
+    assert said.found_values(None, scene) == said.found_values(report | {"status": "outdated"}, scene) == {}
+
+
+def test_rows_are_told_apart_by_how_they_begin(said, ball):
+    _, report = ball
+    labels = [label for label, _ in said.main_rows(report, UNIT) + said.other_rows(report, UNIT)]
+    assert len({label[:5] for label in labels}) == len(labels) == len(set(labels))
+    assert max(map(len, labels)) <= 15
+
+
+def test_every_row_says_what_it_is(said, extension, ball):
+    _, report = ball
+    addon = extension.tactile_addon
+    rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT) + said.plane_rows(report, UNIT)
+    labels = [label for label, _ in rows] + ["Error on 9 More", "Total |K|", "Would Bring"]
+    assert not [
+        label for label in labels if not re.match(r"[A-Z1\d].{15,}", addon.sidebar.rows.tip_of(label))
+    ]
+    assert addon.sidebar.rows.tip_of("Error on 9 More") != addon.sidebar.rows.tip_of("Error on Curves")
+
+
+def test_a_map_knows_about_how_many_points_it_will_touch(extension, empty):
+    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64)
+    ball = empty.context.object
+    ball.scale = (2.0, 2.0, 2.0)
+    depsgraph = empty.context.evaluated_depsgraph_get()
+    expected = extension.tactile_addon.stability_map.stability.expected_count(ball, depsgraph, 0.0, 0.5)
+    empty.ops.tactile.stability_map(spacing=0.5)
+    assert expected == pytest.approx(empty.context.object["tactile_map"]["points"], rel=0.1)
+
+
+def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
+    empty.ops.mesh.primitive_cube_add(size=0.05)
+    empty.context.scene.unit_settings.length_unit = "MILLIMETERS"
+    with pytest.raises(RuntimeError, match=r'The extent 200 mm is longer than "Cube" \(50 mm\)'):
+        empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=0.2)
+    with pytest.raises(RuntimeError, match=r"got nan mm, 0 mm and 0 mm"):
+        empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=float("nan"))
