@@ -69,7 +69,7 @@ def draw_rows(layout, rows, active=True):
     column = layout.column(align=True)
     column.active = active
     for label, value in rows:
-        split = column.split(factor=0.47, align=True)
+        split = column.split(factor=0.43, align=True)
         if tip_of(label):
             left = split.row(align=True)
             left.alignment = "LEFT"
