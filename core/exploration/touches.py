@@ -25,6 +25,7 @@ from .one_touch import Answer, Ask, Exploration, Steps, Touch
 MOST_EVEN = 24  # At most so many planes are laid out evenly.
 COARSE_STEPS = 8  # Contacts of a half curve that only tell whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
+BISECTIONS = 6  # They leave a factor of two no more than a 64th.
 
 
 def explore(
@@ -125,6 +126,7 @@ def explore_many(
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
     length, generator = _given("extent", extent), generator_of(rng)
+    noise = number("noise", noise, least=0.0)
     wanted: dict[str, Any] = {
         "planes": _planes(planes),
         "extent": length,
@@ -156,22 +158,34 @@ def _planes(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
 
 
 def _farthest(feel: Callable[..., list[Contour]]) -> float:
-    """A length, within a factor of two, at which all half curves end before it."""
+    """A length, within a hundredth, at which all half curves end before it.
+
+    Raises what `feel` raises where nothing can be felt at any length.
+    """
+    felt: list[float] = []
 
     def ended(length: float) -> bool:
         """Whether all do, felt coarsely; where nothing can be felt the length is beyond all."""
         try:
             contours = feel(extent=length, step=length / COARSE_STEPS)
         except ValueError:
+            if length <= 1.0 / LONGEST and not felt:
+                raise
             return True
+        felt.append(length)
         return not any(EXTENT in (contour.stops or ()) for contour in contours)
 
-    length, factor = 1.0, 0.5 if ended(1.0) else 2.0
-    while 1.0 / LONGEST < length < LONGEST:
-        length *= factor
-        if ended(length) is (factor > 1.0):
-            return max(length, length / factor)
-    raise ValueError("The curves do not end by themselves: say how far to feel at most, by farthest")
+    least, most = (1.0, 2.0) if not ended(1.0) else (0.5, 1.0)
+    while ended(least):
+        least, most = 0.5 * least, least
+    while not ended(most):
+        least, most = most, 2.0 * most
+        if most > LONGEST:
+            raise ValueError("The curves do not end by themselves: say how far to feel at most, by farthest")
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (least + most)
+        least, most = (least, middle) if ended(middle) else (middle, most)
+    return most
 
 
 def _given(name: str, length: float | str) -> float | None:

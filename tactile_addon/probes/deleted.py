@@ -7,7 +7,7 @@ import bpy
 from ..scene import patch_object, patch_record
 from ..touch.settings import silent
 from . import anchor
-from .probe import DIGEST, is_result, record_of
+from .probe import DIGEST, is_result
 
 _deleted = set()  # session_uids of targets
 _owners = {}  # those of contours, and of the patches they were seen with last: undo may bring them back
@@ -19,7 +19,7 @@ def forget_target(probe):
     The step of undo was stored before, and undo takes back only what differs between two steps: so which one
     it was is kept, for `relink`.
     """
-    settings, record = probe.tactile_probe, record_of(probe)
+    settings = probe.tactile_probe
     target = settings.target
     # One that has never been touched is a script's, which may be about to put it into the scene.
     # A library's is not deleted by being in no scene of this file.
@@ -31,7 +31,7 @@ def forget_target(probe):
             with silent():
                 settings.target = target.override_library.reference
         return
-    if record is None or record["source"] != target.name:
+    if not settings.digest:
         return
     settings.lost = f"{target.session_uid} {int(anchor.is_attached(probe))} {target.name}"
     if anchor.is_attached(probe):  # to an object that is in no scene any more

@@ -96,6 +96,7 @@ def _chosen(settings, context):
     before = None if record is None else bpy.data.objects.get(record["source"])
     if settings.target not in (None, before) and before is not None and probe.parent == before:
         anchor.attach(probe, settings.target)
+    settings.digest = ""  # Nothing has been felt of this one.
     _appointed(settings, context)
 
 
