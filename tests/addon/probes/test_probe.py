@@ -655,7 +655,7 @@ def test_undo_and_redo_bring_back_probe_and_patch_together(empty, ball):
         ({"target": "Nobody", "new": True}, 'There is no object "Nobody"'),
         ({"target": "Flat", "new": True}, '"Flat" has no faces to touch'),
         ({"location": (0.0, float("nan"), 0.0)}, "coordinates that are not finite"),
-        ({"location": (0.0, 0.0, 9.0), "new": True}, "The location is 7 away"),
+        ({"location": (0.0, 0.0, 9.0), "new": True}, "The location is 7 m away"),
         ({"extent": 50.0}, 'The extent 50 m is longer than "Sphere"'),
         ({"azimuths": [0.0] * 6}, "run in one direction"),
     ],

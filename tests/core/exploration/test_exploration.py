@@ -311,7 +311,7 @@ def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
 def test_how_far_to_feel_is_found_where_curves_end_by_themselves():
     ball = surfaces.sphere(20.0)
     found = core.explore(ball, ball.point, ball.normal)
-    assert 5.0 < found.extent < 20.0
+    assert 5.0 < found.extent < 30.0  # along the curve, of which a quarter circle is 31.4
     assert found.result.status == "ok"
 
     class Scaled:
