@@ -64,6 +64,7 @@ def is_carried(probe):
     return not np.allclose(own, there, rtol=1e-6, atol=1e-6 * np.abs(there).max())
 
 
+@np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def settle(probe, extent):
     """Makes the world's coordinates the probe's own, without the target's scale and shear."""
     if not is_carried(probe):
@@ -81,6 +82,7 @@ def settle(probe, extent):
     patch_record.place(probe, Matrix.LocRotScale(Vector(at + to_world[:3, 3]), turn, scale))
 
 
+@np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def seat(probe, extent):
     """Where the probe is on its target, SEAT numbers: the same wherever both are moved or turned together.
 
@@ -115,6 +117,7 @@ def keep(probe, patch):
     patch[BASE] = [*_numbers(target.matrix_world), *_numbers(patch_record.matrix_of(axes, origin))]
 
 
+@np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def carry(probe, patch):
     """Where the target was moved since, the patch's record is that of a patch that was moved with it.
 
@@ -126,8 +129,11 @@ def carry(probe, patch):
     if not is_attached(probe) and seat(probe, report.get("extent", 0.0)) != list(probe.tactile_probe.seat):
         return
     before, frame = np.reshape(base, (2, 4, 4))
+    now = np.array(target.matrix_world, dtype=float)
+    if not (np.isfinite(now).all() and np.isfinite(before).all()):  # beyond single precision
+        return
     try:
-        motion = np.array(target.matrix_world, dtype=float) @ np.linalg.inv(before)
+        motion = now @ np.linalg.inv(before)
     except np.linalg.LinAlgError:
         return
     turn = np.array(Matrix(motion.tolist()).to_quaternion().to_matrix())
