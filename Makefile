@@ -17,20 +17,20 @@ READY := $(VENV)/.ready
 PEERS := $(VENV)/.peers
 # Tests run beside each other, one process a processor, each with one thread.
 BESIDE := -n auto --dist worksteal
-test core: export OMP_NUM_THREADS = 1
-test core: export OPENBLAS_NUM_THREADS = 1
+test test-core: export OMP_NUM_THREADS = 1
+test test-core: export OPENBLAS_NUM_THREADS = 1
 
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
 	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo test core fuzz chart paper stability zip zip-nowheels clean
+.PHONY: help demo test test-core fuzz chart paper stability zip zip-nowheels clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
 	@echo 'make test              check style and types, then test the extension in Blender'
-	@echo 'make core              the tests of core alone, without Blender'
+	@echo 'make test-core         the tests of core alone, without Blender'
 	@echo 'make fuzz              feed it with more than 10,000 odd inputs, in a quarter of an hour'
 	@echo 'make chart [QUICK=1]   draw speed against accuracy, beside what else one could take, in build/charts'
 	@echo 'make paper             repeat the experiments of the paper, beside its figures'
@@ -49,7 +49,7 @@ test: $(ZIP)
 	$(VENV_PY) -m mypy core
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE)
 
-core: $(READY)
+test-core: $(READY)
 	$(VENV_PY) -m mypy core
 	$(VENV_PY) -m pytest $(BESIDE) tests/core tests/test_rooms.py
 
