@@ -46,10 +46,21 @@ COMMANDS = {
 # What the operators take as it is given.
 PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
 PLAIN |= {"tolerance", "unit", "point", "flip", "radius"}
+# Operators would take the nearest number they can have for others.
+NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
+
+
+def _require_numbers(options):
+    """Ends the command where a number is one that no operator can have."""
+    for name in NEVER_NEGATIVE:
+        value = vars(options).get(name)
+        if value is not None and not 0.0 <= value < math.inf:
+            raise Misuse(f"--{name.replace('_', '-')}: wanted a finite number of 0 or more, got {value:g}")
 
 
 def _arguments(options):
     """What was given on the command line as the operator's arguments."""
+    _require_numbers(options)
     given = {name: value for name, value in vars(options).items() if name in PLAIN and value is not None}
     if options.degree is not None:
         given["degree"] = 0 if options.degree == "auto" else int(options.degree)
