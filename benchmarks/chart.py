@@ -275,7 +275,7 @@ class Mark(NamedTuple):
 
 
 def marks_of(table, noise, measure):
-    """Of those that did not always fail."""
+    """Marks of the methods that did not always fail."""
     head, rows = table
     time, error = (head.index(f"{what} q1") for what in ("ms", measure))
     return [

@@ -57,7 +57,7 @@ def grid(r, spacing):
 
 
 def grid_vertices(r, deviation):
-    """Of the widest uniform grid, no wider than the radius, that deviates by no more."""
+    """The vertices of the widest uniform grid, no wider than the radius, that deviates by no more."""
     low, high = r.radius / 200.0, r.radius
     if grid(r, high)[0] <= deviation:
         return grid(r, high)[1]

@@ -54,7 +54,7 @@ def gaussian_process(case, nu=2.5):
 
 
 def quadric_process(case):
-    """The same of what a quadric leaves over, with its deviation: what suits real surfaces better."""
+    """A process of what a quadric leaves over, with its deviation: what suits real surfaces better."""
     r, contacts, _ = _start(case)
     height, height_std = matern_on_quadric(contacts)
     fit = _scaled_fit(r, height)
@@ -62,7 +62,7 @@ def quadric_process(case):
 
 
 def matern_on_quadric(contacts, noisiest=0.1):
-    """Of contacts (n, 3) in unit radius: functions of points (m, 2) for the height and its deviation.
+    """Fits contacts (n, 3) in unit radius: functions of points (m, 2) for the height and its deviation.
 
     noisiest : variance of the noise at most, over that of what the quadric leaves
     """

@@ -94,7 +94,7 @@ def cases():
 
 
 def _exact():
-    """Of benchmarks.accuracy: point, outward, contours."""
+    """The touches of benchmarks.accuracy: point, outward, contours."""
     cases = [
         accuracy.exact_case(name, planes, noise, 0)
         for name in accuracy.SURFACES

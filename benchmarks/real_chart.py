@@ -18,7 +18,7 @@ STYLES = (  # in the order of benchmarks.real's methods
 
 
 def draw(scores, seconds, automatic):
-    """Of the scores and seconds of fixed touches, and the error and milliseconds of automatic ones.
+    """The chart of the scores and seconds of fixed touches, and the error and milliseconds of automatic ones.
 
     scores : {scan: {(planes, extent): {method: Score}}}; seconds : {(method, planes): [...]}
     """

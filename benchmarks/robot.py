@@ -142,7 +142,7 @@ ALL, CROSSED, BOTH = "strokes alone", "three curves", "curves and strokes"
 
 
 def scored(at, height, height_std, given, held_out, seconds):
-    """Of contacts (n, 3) in unit radius, `at` mm."""
+    """Scores of fits to contacts (n, 3) in unit radius, `at` mm."""
     off = np.abs(held_out[:, 2] - height(held_out[:, :2]))
     if height_std is None:
         return Score(at * off.mean(), np.nan, np.nan, seconds)
@@ -164,7 +164,7 @@ def in_unit_radius(r, judge, place):
 
 
 def inside(r, points):
-    """Those over the domain, and not of another side."""
+    """Contacts over the domain, and not of another side."""
     local = r.frame.to_local(points)
     return points[r.domain.contains(*local[:, :2].T) & (np.abs(local[:, 2]) <= r.radius)]
 
@@ -196,7 +196,7 @@ def scores_at(place, radius):
 
 
 def best(scores, prefix):
-    """Of the methods of that name, the one with the least mean error over all places."""
+    """The one method of that name with the least mean error over all places."""
     names = {name for of in scores for name in of if name.startswith(prefix)}
     return min(names, key=lambda name: np.mean([of[name].error for of in scores if name in of]))
 

@@ -64,7 +64,7 @@ class Sweep(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Of one method on one touch; numbers are NaN where it was refused."""
+    """What one method made of one touch; numbers are NaN where it was refused."""
 
     status: str
     error: float = np.nan  # mean |dz|, of the radius
@@ -119,7 +119,7 @@ def touch(surface, extent, setting, seed):
 
 
 def _measured_normals(contour, axes, degrees, rng):
-    """Those of a contour, scattered, and turned about d1."""
+    """Contacts of a contour, scattered, and turned about d1."""
     angle = np.radians(degrees)
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
     found = contour.normals + rng.normal(0.0, NORMAL_STD, contour.normals.shape)

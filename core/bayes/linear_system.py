@@ -132,7 +132,7 @@ def posterior(
 
 
 def _level(covariance: Array, system: System, hyper: Hyperparameters, weights: Array) -> Array:
-    """Of a Posterior: the height at the origin is the contacts' mean less what the terms are at the pivot."""
+    """The level of a Posterior: the contacts' mean height less what the terms are at the pivot."""
     level = np.zeros((len(weights), len(TERMS) + 1))
     if system.pivot.any():
         level[:, 1:] = -(covariance @ system.pivot[..., None])[..., 0]

@@ -86,7 +86,7 @@ class Posterior(NamedTuple):
         return added
 
     def height_covariances(self, p: Array, q: Array) -> tuple[Array, Array]:
-        """Of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
+        """Covariances of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
         return self.height_covariance(p, q), self.height_covariance(p, p)
 
     def height(self, x: Array, y: Array) -> Array:

@@ -48,7 +48,7 @@ class Felt:
 
     @cached_property
     def places(self) -> list[int]:
-        """Of the point in each contour."""
+        """The place of the point in each contour."""
         return [int(np.argmax((contour.points == self.point).all(axis=1))) for contour in self.contours]
 
     @cached_property
@@ -163,7 +163,7 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
 
 
 def tried(felt: Felt, counts: Counts) -> Fits:
-    """With so many contacts, of which as few are fitted as most often are enough."""
+    """The fit of so many contacts, of which as few are fitted as most often are enough."""
     stride = max(1, int(spacing(counts, CONTACT_COUNTS[0])))
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):

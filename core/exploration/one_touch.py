@@ -29,7 +29,7 @@ from .growth import (
 )
 
 NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
-HELPS = 0.1  # of the same, that one more plane is to take off
+HELPS = 0.1  # Share of it that one more plane must take off.
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ class Touch:
         return self.feel(self.planes, extent=extent, step=step)
 
     def _grown(self) -> Steps:
-        """As large as it can be trusted."""
+        """The touch that is as large as it can be trusted."""
         between = max(self.step or 0.0, self.farthest / FELT)
         fits = grown(lambda extent: self._felt(extent, between), self.point, self.farthest, between)
         contours = next(fits)
@@ -123,7 +123,7 @@ class Touch:
         return found
 
     def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
-        """With half curves of so many of the contacts that were felt; with these where they do."""
+        """The touch with half curves of so many of the contacts that were felt; with these where they do."""
         felt, reaches = largest.felt, largest.felt.step * counts.astype(np.float64)
         length = float(reaches.max())
 
@@ -156,8 +156,9 @@ class Touch:
         return Exploration(contours, r, extent, step, self.planes)
 
     def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
-        """With one more, as far as the fit explains its contacts; raises ValueError where it shows nothing.
+        """The touch with one plane more, as far as the fit explains its contacts.
 
+        Raises ValueError where the plane shows nothing.
         Felt twice as densely as fitted: what lies between tells whether it is explained.
         """
         half = 0.5 * found.step

@@ -138,7 +138,7 @@ def explore_many(
     }
 
     def steps(point: Array, direction: Array) -> Steps:
-        """Those of one touch."""
+        """The steps of one touch."""
         reference = SamplingPlane(0.0).axes(direction, tangent)
         feel = partial(track, surface, point, direction, tangent=tangent)
         farthest = wanted["farthest"] or _farthest(partial(feel, wanted["planes"]))
@@ -221,7 +221,7 @@ def _side_by_side(
 
 
 def _with_stds(results: list[Answer]) -> list[Answer]:
-    """With the mean_height_std of many computed at once."""
+    """The results with the mean_height_std of many computed at once."""
     if len(results) == 1:
         return results
     known = iter(with_height_stds([r for r in results if isinstance(r, Reconstruction)]))

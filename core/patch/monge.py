@@ -34,7 +34,7 @@ def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:
 
 
 def _monomials_to(x: Array, y: Array, degree: int) -> Array:
-    """Those of `exponents(1, degree)` at n points, (m, n): each degree from the one before."""
+    """The terms of `exponents(1, degree)` at n points, (m, n): each degree from the one before."""
     values = np.empty((degree * (degree + 3) // 2, len(x)))
     values[0], values[1], start = x, y, 0
     for d in range(2, degree + 1):

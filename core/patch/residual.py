@@ -82,7 +82,7 @@ class Residual:
         return self._covariance(p, self.signed(p), q, self.signed(q))
 
     def height_covariances(self, p: Array, q: Array) -> tuple[Array, Array]:
-        """Of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
+        """Covariances of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
         at_p = self.signed(p)
         return self._covariance(p, at_p, q, self.signed(q)), self._covariance(p, at_p, p, at_p)
 
@@ -126,7 +126,7 @@ def cholesky(matrix: Array) -> Array:
 
 
 def whitened(places: Array, factor: Array, terms: Array, told: Array) -> tuple[Array, Array]:
-    """As of a Residual, by the two factors, of terms (27, n) and k(places, p), (m, n), or of sums of such."""
+    """Residual.whitened by the two factors, of terms (27, n) and k(places, p), (m, n), or of sums of such."""
     told = solved(places, told)
     return told, solved(factor, np.vstack([terms, told]))
 

@@ -66,7 +66,7 @@ class Start(NamedTuple):
         return not self.curves.present.any()
 
     def contacts(self) -> tuple[Array, NDArray[np.bool_]]:
-        """Of the curves and then of the strokes, (b, n, 3), in the axes and in unit radius; which are any."""
+        """Contacts of curves, of strokes, (b, n, 3), in the axes and in unit radius; and which are there."""
         b, most = len(self.points), max(map(len, self.strokes))
         local = (self.curves.points @ self.axes[:, None] / self.radii[:, None, None, None]).reshape(b, -1, 3)
         beside, there = np.zeros((b, most, 3)), np.zeros((b, most), dtype=bool)
@@ -80,7 +80,7 @@ Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | 
 
 
 def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: float | None) -> Started:
-    """Of contours with strokes beside them: what their fits start from, contours as fitted, and errors."""
+    """For contours with strokes beside them, what their fits start from, contours as fitted, and errors."""
     thin = [[thinned(c, point) for c in touch.contours] for point, touch in zip(points, given, strict=True)]
     touches = [[contour for contour, _ in c] for c in thin]
     curves = curves_through(*stacked(points, touches))
@@ -128,7 +128,7 @@ def _over(curves: Curves, local: Array, strokes: Array) -> NDArray[np.bool_]:
 def strokes_start(
     points: Array, given: Sequence[Given], outward: Array, noise: float | None, radius: float | None
 ) -> Started:
-    """The same of strokes alone."""
+    """What `curves_start` gives, of strokes alone."""
     found = [
         first_frame(touch.strokes - point, up, radius)
         for point, touch, up in zip(points, given, outward, strict=True)

@@ -26,7 +26,7 @@ CONTRADICTED = 0.01  # Radians by which normals may contradict the contacts, bes
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts may be missed, beside the noise.
 
 
-class Judged(Protocol):
+class _Judged(Protocol):
     """What a status follows from; see Reconstruction."""
 
     @property
@@ -55,7 +55,7 @@ class Judged(Protocol):
     def contradiction(self) -> tuple[float, float]: ...
 
 
-def doubt(r: Judged) -> tuple[str, str] | None:
+def doubt(r: _Judged) -> tuple[str, str] | None:
     """Status and a sentence of advice; None where there is no doubt."""
     if not r.converged:
         return "not_converged", (
@@ -70,7 +70,7 @@ def doubt(r: Judged) -> tuple[str, str] | None:
     return _about_data(r) or _about_heights(r) or _about_frame(r)
 
 
-def _about_data(r: Judged) -> tuple[str, str] | None:
+def _about_data(r: _Judged) -> tuple[str, str] | None:
     deviations, angle = r.contradiction
     if deviations > SIGNIFICANT and angle > CONTRADICTED:
         return "uncertain", (
@@ -87,7 +87,7 @@ def _about_data(r: Judged) -> tuple[str, str] | None:
     return None
 
 
-def _about_heights(r: Judged) -> tuple[str, str] | None:
+def _about_heights(r: _Judged) -> tuple[str, str] | None:
     share = r.mean_height_std / r.radius
     if share > DOUBTFUL_STD:
         return "uncertain", (
@@ -97,7 +97,7 @@ def _about_heights(r: Judged) -> tuple[str, str] | None:
     return None
 
 
-def _about_frame(r: Judged) -> tuple[str, str] | None:
+def _about_frame(r: _Judged) -> tuple[str, str] | None:
     distances, stds = r.misses.T / r.radius
     stds = np.maximum(stds, LEAST_SCATTER * r.accuracy)
     apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))

@@ -20,12 +20,11 @@ from ..contours.contour import Contour, cross
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.monge import exponents, monomials
 
-# Of means, and as many means in each; of more the offsets of rows count for texture (benchmarks.robot).
+# Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot).
 STRIPS = 10
 SOME = 2000  # contacts that the quartic is fitted to
 NEAR = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
 DETERMINED = 0.02  # the least singular value of a quadric's terms in the mean over contacts, in unit radius
-MIX = np.array([1.0, math.pi, math.e])  # makes one number of a contact, which few others share
 QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 FAR = 0.999  # of the greatest distance, that is as far: rounding must not choose
 
@@ -59,7 +58,7 @@ def gathered(strokes: Sequence[ArrayLike | Contour]) -> tuple[Array, float]:
     ]
     noise = max((stroke.noise or 0.0 for stroke in given if isinstance(stroke, Contour)), default=0.0)
     points = np.vstack(arrays)
-    first = np.unique(points @ MIX, return_index=True)[1]
+    first = np.unique(points, axis=0, return_index=True)[1]
     return points[np.sort(first)], noise
 
 

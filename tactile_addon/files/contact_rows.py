@@ -77,7 +77,7 @@ class Rows:
 
     @property
     def labels(self):
-        """Of the curves, in the order of `contours`."""
+        """Names of the curves, in the order of `contours`."""
         return list(self._curves)
 
     def contours(self):

@@ -99,7 +99,7 @@ def seat(probe, extent):
 
 
 def _seat(to_world, place):
-    """Of the world matrices (4, 4) of a target and a probe; NaN where the target is flat."""
+    """SEAT numbers of the world matrices (4, 4) of a target and a probe; NaN where the target is flat."""
     linear = to_world[:3, :3]
     shape, size, volume = linear.T @ linear, np.linalg.norm(linear), np.linalg.det(linear)
     if not abs(volume) > 1e-12 * size**3 > 0.0:

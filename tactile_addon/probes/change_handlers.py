@@ -35,7 +35,7 @@ def on_depsgraph_update(scene, depsgraph):
 
 @persistent
 def on_frame_change(scene, depsgraph):
-    """The same in another frame, where it takes no longer than playback has time for."""
+    """Brings patches up to date in another frame, where it takes no longer than playback has time for."""
     _bring_up_to_date(depsgraph, CHEAP)
 
 

@@ -96,7 +96,7 @@ def stand_by(probe, outdated, complete):
 
 
 def _left_contours(probe):
-    """Those of a patch that was deleted, where they are still there."""
+    """The contours of a patch that was deleted, where they are still there."""
     lines = (obj for obj in bpy.data.objects if patch_record.CONTOURS in obj and obj.parent is None)
     own = (obj for obj in lines if obj.is_editable and obj.data is not None)
     return next((obj for obj in own if obj.data.get(DIGEST) == probe.tactile_probe.digest), None)

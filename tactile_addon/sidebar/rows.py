@@ -9,8 +9,8 @@ import bpy
 from bpy.props import StringProperty
 
 TIPS = {
-    "κ1 Curvature": "The larger principal curvature at the point; below 0 the surface bulges outward",
-    "κ2 Curvature": "The smaller principal curvature at the point; below 0 the surface bulges outward",
+    "κ1 Curvature": "The smaller principal curvature at the point; below 0 the surface bulges outward",
+    "κ2 Curvature": "The larger principal curvature at the point; below 0 the surface bulges outward",
     "Height": "Standard deviation of the patch's height: how well the contacts determine it",
     "Mesh to Patch": "Mean distance of the mesh's vertices over the patch from it; … until you let go",
     "1/κ1 Radius": "Radius of the circle that bends like the surface along the first principal direction",
