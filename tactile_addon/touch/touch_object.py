@@ -91,29 +91,34 @@ def touch(
     sensor = {"noise": noise, "rng": seed, "tangent": axes[:, 0]}
     found = core.explore(surface, point, outward, planes, **size, **sensor, **fit)
     clock.append(perf_counter())
-    result = found.result
-    require_single(result)
+    require_single(found.result)
     report = {
         "source": obj.name,
         "method": fit["method"],
-        "degree": result.patch.degree,
-        "extent": found.extent,
-        "step": found.step,
         "noise": noise,
         "seed": seed,
-        **reconstruction_report(result, (early_ends if extent else ends)(result.contours)),
+        **_exploration_report(found, len(planes), (early_ends if extent else ends)(found.result.contours)),
+        "axes": axes.tolist(),
+        "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
+    }
+    return Touched(surface, found.result, report)
+
+
+def _exploration_report(found, given, ended):
+    """What a touch has found, the first `given` of its planes not by itself; `ended` as in the report."""
+    added = zip(found.planes[given:], found.stds, found.stds[1:], strict=False)
+    return {
+        "degree": found.result.patch.degree,
+        "extent": found.extent,
+        "step": found.step,
+        **reconstruction_report(found.result, ended),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in found.planes],
         "added_planes": [
             {"azimuth": math.degrees(plane.azimuth), "height_std_before": before, "height_std": after}
-            for plane, before, after in zip(
-                found.planes[len(planes) :], found.stds, found.stds[1:], strict=False
-            )
+            for plane, before, after in added
         ],
-        "axes": axes.tolist(),
-        "stops": [list(contour.stops) for contour in result.contours],
-        "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
+        "stops": [list(contour.stops) for contour in found.result.contours],
     }
-    return Touched(surface, result, report)
 
 
 def completed(touched, most=None):
