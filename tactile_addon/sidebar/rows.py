@@ -57,7 +57,7 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
     @classmethod
     def description(cls, context, properties):
         """What the number is; Blender shows it below the mouse."""
-        return f"{tip_of(properties.label)}. Click to copy it"
+        return ". ".join(filter(None, (tip_of(properties.label), "Click to copy it")))
 
     def execute(self, context):
         context.window_manager.clipboard = self.value
@@ -70,13 +70,10 @@ def draw_rows(layout, rows, active=True):
     column.active = active
     for label, value in rows:
         split = column.split(factor=0.43, align=True)
-        if tip_of(label):
-            left = split.row(align=True)
-            left.alignment = "LEFT"
-            copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
-            copy.label, copy.value = label, value
-        else:
-            split.label(text=label)
+        left = split.row(align=True)
+        left.alignment = "LEFT"
+        copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
+        copy.label, copy.value = label, value
         split.label(text=value, translate=False)
 
 
