@@ -5,13 +5,15 @@
 A real surface has other curvatures at each scale; at the point itself they are those of its texture.
 Those of the patch are of the quartic nearest to sextic and residual over a disk of QUARTIC_SHARE. Off dense
 fits of the scans they are by half as much, or less, as those of the sextic that was fitted to the contacts
-alone, and their intervals are true.
+alone, and their intervals are true. On a smooth surface whose mesh has facets it is otherwise: a misfit of
+their size changes the heights; the frame and the curvatures stay those of the sextic, which averages them.
 """
 
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..patch import residual as beside
@@ -26,11 +28,14 @@ from .residual_evidence import (
     Touch,
     asking,
     fitted,
+    is_texture,
     mean_given,
+    misfit,
     sizes,
     system_of,
 )
 
+FACETS = 1.3e-3  # Share of the radius: misfit of a smooth surface, whose curvatures a polynomial tells best.
 QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.
 
 
@@ -51,6 +56,7 @@ def rough_fit(
     weights: Array,
     posterior: Posterior,
     accuracy: Array,
+    told: NDArray[np.bool_],
     tangent: Array,
     normals: Array | None = None,
     through: bool = True,
@@ -61,13 +67,15 @@ def rough_fit(
     weights : (b, n), 0 where there is none
     posterior : the stack of the sextics that were fitted to them
     accuracy : (b,), standard deviation of a contact, at least
+    told : (b,), whether that is known to be all their noise
     tangent : (b, 3), which d1 is to follow
     normals : (b, n, 3), measured, over their standard deviation; they act on the terms alone
     through : whether the origin was touched
     """
     b = len(contacts)
     found = RoughFit(np.eye(3)[None].repeat(b, axis=0), np.ones(b), posterior, [None] * b)
-    candidates = asking(contacts, weights, posterior, accuracy)
+    missed = misfit(contacts, weights, posterior)
+    candidates = asking(missed.rms, accuracy)
     if not len(candidates):
         return found
     found = found._replace(posterior=Posterior(*(values.copy() for values in posterior)))
@@ -83,7 +91,11 @@ def rough_fit(
         )
         system = system_of(touch)
         size = sizes(touch, system)
-        if size.asked:
+        if not (size.asked or (told[i] and is_texture(missed.off[i][there], float(accuracy[i])))):
+            continue
+        if missed.rms[i] <= FACETS:
+            _refine(found, i, fitted(touch, system, size.variances, size.noise))
+        else:
             _settle(found, i, touch, system, size, tangent[i])
     return found
 
@@ -100,6 +112,12 @@ def _settle(found: RoughFit, place: int, touch: Touch, system: System, size: Siz
     second = fitted(touch, system_of(touch), size.variances / scale**2, size.noise / scale)
     found.turns[place], found.scales[place] = turn, scale
     _put(found, place, second)
+
+
+def _refine(found: RoughFit, place: int, residual: Residual) -> None:
+    """One fit in the frame of the sextic, which it stays beside."""
+    residual.mean[: len(TERMS)] -= found.posterior.mean[place]
+    found.residuals[place] = residual
 
 
 def _put(found: RoughFit, place: int, residual: Residual) -> None:
