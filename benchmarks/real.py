@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
-from core.bayes import residual_evidence
+from core.bayes import residual_evidence, rough_fit
 from core.patch import residual
 from core.patch.monge import exponents, monomials
 from tools import blender
@@ -124,7 +124,9 @@ class Score(NamedTuple):
 @contextmanager
 def constants(**values):
     """The residual's, for a while."""
-    modules = [m for m in (residual, residual_evidence) if any(hasattr(m, name) for name in values)]
+    modules = [
+        m for m in (residual, residual_evidence, rough_fit) if any(hasattr(m, name) for name in values)
+    ]
     before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
     try:
         for module, old in zip(modules, before, strict=True):
@@ -296,7 +298,12 @@ def _off(scan, r):
 
 
 def _turned(scan, r):
-    """Whether the frame is off by TURNED degrees, where curvatures are not ALIKE; by a dense quartic fit."""
+    """Whether the frame is off by TURNED degrees, where curvatures are not ALIKE; by a dense quartic fit.
+
+    Not where the message says that there are no principal directions.
+    """
+    if r.posterior.is_round:
+        return False
     azimuths, reach = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(DENSE), 0.6 * r.radius
     shares = np.sqrt((np.arange(DENSE) + 0.5) / DENSE)
     flat = reach * np.column_stack([shares * np.cos(azimuths), shares * np.sin(azimuths)])

@@ -17,19 +17,17 @@ from ..arguments import Array
 from ..patch.monge import TERMS, monomials
 from ..patch.residual import Residual, cholesky, kernels, places_factor, solved
 from .evidence import USUAL_WAVINESS, prior_variances
-from .joint_fit import MISFIT
 from .measured_slopes import slope_equations
-from .posterior import FREE, Posterior
+from .posterior import FREE
 
 # Chosen with benchmarks.real.
 ROUGH_MISFIT = 5e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
-UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
 ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
 RESIDUAL_NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
 MOST_PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
 ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
-NEGLIGIBLE = 80.0  # -2 log likelihood beside the best, at which no other noise is tried
+NEGLIGIBLE = 120.0  # -2 log likelihood beside the best, at which no other noise is tried
 FREE_VARIANCE = 0.06  # of slopes and second derivatives: where curves end early, of 100 they run away
 TEMPER = 0.1  # of the log likelihood: contacts side by side tell of waves between the curves no more
 
@@ -57,34 +55,6 @@ class Touch(NamedTuple):
             most=self.most / scale,
             normals=None if self.normals is None else self.normals @ turn,
         )
-
-
-class Misfit(NamedTuple):
-    """How far contacts are off their sextics: |dz| (..., n), and its root mean square (...)."""
-
-    off: Array
-    rms: Array
-
-
-def misfit(contacts: Array, weights: Array, posterior: Posterior) -> Misfit:
-    """For b touches of contacts (b, n, 3) with weights (b, n)."""
-    flat = contacts.reshape(-1, 3)
-    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
-    off = np.abs(contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0])
-    return Misfit(off, np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0)))
-
-
-def asking(rms: Array, accuracy: Array) -> NDArray[np.intp]:
-    """Which of b touches have contacts that their sextics do not describe to an accuracy (b,)."""
-    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, ROUGH_MISFIT))
-
-
-def is_texture(off: Array, accuracy: float) -> bool:
-    """Whether most contacts of a touch, |dz| (n,) off their sextic, are so by more than it may be off.
-
-    White noise beside the sextic, or outliers, would not do there: its deviation would not know of them.
-    """
-    return 1.4826 * float(np.median(off)) > max(UNEXPLAINED * accuracy, MISFIT)
 
 
 class System(NamedTuple):

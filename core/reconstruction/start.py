@@ -59,7 +59,7 @@ class Start(NamedTuple):
     curves: Curves  # relative to the points, in the world
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
-    told: NDArray[np.bool_]  # (b,), whether the noise of each contact is known
+    told: NDArray[np.bool_]  # (b,), whether these are known to be all their noise; of means it is more
 
     @property
     def alone(self) -> bool:
@@ -108,7 +108,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
         stds.append(_std(noise, max(size, min(sizes)), [*known, given[i].noise / math.sqrt(size)]))
-        told.append(noise is not None or (not len(beside) and all(c.noise is not None for c in touches[i])))
+        told.append(not len(beside) and (noise is not None or None not in [c.noise for c in touches[i]]))
     tangents = curves.tangents[:, 0]
     noises = np.array(stds), np.array(told)
     first = Start(points[good], axes, k1, k2, radii, tangents, curves, strokes, *noises)
@@ -154,7 +154,7 @@ def strokes_start(
     axes = np.array([first.axes for first in firsts.values()])
     k1, k2, radii = np.array([(first.k1, first.k2, first.radius) for first in firsts.values()]).T
     curves = curves_through(*stacked(points[good], [[]] * len(good)))
-    strokes, told = [beside for beside, _ in thin], np.full(len(good), noise is not None)
+    strokes, told = [beside for beside, _ in thin], np.zeros(len(good), dtype=bool)
     start = Start(points[good], axes, k1, k2, radii, axes[:, :, 0], curves, strokes, np.array(stds), told)
     return start, none, errors
 
