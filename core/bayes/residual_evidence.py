@@ -27,7 +27,7 @@ ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
 RESIDUAL_NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
 MOST_PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
 ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
-NEGLIGIBLE = 120.0  # -2 log likelihood beside the best, at which no other noise is tried
+NEGLIGIBLE = 160.0  # -2 log likelihood beside the best, at which no other noise is tried
 FREE_VARIANCE = 0.06  # of slopes and second derivatives: where curves end early, of 100 they run away
 TEMPER = 0.1  # of the log likelihood: contacts side by side tell of waves between the curves no more
 

@@ -23,7 +23,7 @@ from ..contours.local_geometry import (
 from ..contours.thinning import thinned
 from ..patch.domain import Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
-from .strokes import STRIPS, FirstFrame, first_frame, means
+from .strokes import STRIPS, FirstFrame, first_frame, means, unit_in
 
 MOST_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
 
@@ -103,7 +103,8 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         beside, size = given[i].strokes, 1
         if len(beside):
             beside = (beside - points[i]) @ axes[row] / radii[row]
-            beside, size = means(beside[_over(curves.at(row), local[row], beside)])
+            along = unit_in(axes[row], curves.tangents[row, 0])
+            beside, size = means(beside[_over(curves.at(row), local[row], beside)], along)
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
@@ -133,21 +134,21 @@ def strokes_start(
     points: Array, given: Sequence[Given], outward: Array, noise: float | None, radius: float | None
 ) -> Started:
     """What `curves_start` gives, of strokes alone."""
-    found = [
+    frames = [
         first_frame(touch.strokes - point, up, radius)
         for point, touch, up in zip(points, given, outward, strict=True)
     ]
     for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
-        first = found[i]
+        first = frames[i]
         if isinstance(first, FirstFrame) and gap > MOST_ROUNDING * first.radius:
-            found[i] = _coarse(gap, first.radius)
-    errors = [None if isinstance(first, FirstFrame) else first for first in found]
-    firsts = {i: first for i, first in enumerate(found) if isinstance(first, FirstFrame)}
+            frames[i] = _coarse(gap, first.radius)
+    errors = [None if isinstance(first, FirstFrame) else first for first in frames]
+    firsts = {i: first for i, first in enumerate(frames) if isinstance(first, FirstFrame)}
     none: list[list[Contour]] = [[] for _ in given]
     if not firsts:
         return None, none, errors
     good = list(firsts)
-    thin = [means(first.contacts) for first in firsts.values()]
+    thin = [means(first.contacts, first.along) for first in firsts.values()]
     stds = [
         _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
     ]
