@@ -6,6 +6,10 @@ Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the calle
 convex body has negative curvatures under its outward normal.
 """
 
+from .atlas.boundaries import Edge
+from .atlas.meshing import Mesh
+from .atlas.object_atlas import Atlas
+from .atlas.touching import Progress, explore_object, touch_all_over
 from .contours.common_point import common_point, in_running_order
 from .contours.contour import (
     CREASE,
@@ -42,14 +46,18 @@ __all__ = [
     "NO_CONTACT",
     "SOLVERS",
     "UNEXPLAINED",
+    "Atlas",
     "Contour",
     "DegenerateCurvesError",
     "Domain",
+    "Edge",
     "Exploration",
     "Frame",
     "Geometry",
+    "Mesh",
     "MongePatch",
     "Pose",
+    "Progress",
     "Reconstruction",
     "SamplingPlane",
     "Surface",
@@ -58,6 +66,7 @@ __all__ = [
     "distances",
     "explore",
     "explore_many",
+    "explore_object",
     "fit_error",
     "from_dict",
     "height_error",
@@ -73,6 +82,7 @@ __all__ = [
     "spaced_count",
     "suggest_plane",
     "to_dict",
+    "touch_all_over",
     "track",
     "verify",
     "with_height_stds",

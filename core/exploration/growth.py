@@ -39,11 +39,15 @@ Feel = Callable[[float], list[Contour]]  # contours of an extent
 
 @dataclass(frozen=True, eq=False)
 class Felt:
-    """Contours as they were tracked with a step between contacts; `partial`: not as far as may be."""
+    """Contours as they were tracked with a step between contacts; `partial`: not as far as may be.
+
+    largest_std : a length, that the mean deviation of the height may be at most
+    """
 
     contours: list[Contour]
     point: Array
     step: float
+    largest_std: float
     partial: bool = False
 
     @cached_property
@@ -114,10 +118,10 @@ class Grown(NamedTuple):
         return self.result.status == "ok"
 
 
-def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
+def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: float) -> Fits:
     """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
     first = SEEDS[0] * step
-    felt = Felt(feel(min(first, farthest)), point, step, partial=first < farthest)
+    felt = Felt(feel(min(first, farthest)), point, step, largest_std, partial=first < farthest)
     known: dict[bytes, Grown] = {}
     found = yield from _seed(felt, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
@@ -127,7 +131,7 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
         if (felt.open & (longer > felt.whole)).any():
-            felt = Felt(feel(farthest), point, step)
+            felt = Felt(feel(farthest), point, step, largest_std)
         longer = np.minimum(longer, felt.whole)
         try:
             trial = known.get(longer.tobytes()) or (yield from tried(felt, longer))
@@ -168,7 +172,7 @@ def tried(felt: Felt, counts: Counts) -> Fits:
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
-    spread = r.mean_height_std / (GROWN_STD * r.radius)
+    spread = r.mean_height_std / min(GROWN_STD * r.radius, felt.largest_std)
     return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
 
 

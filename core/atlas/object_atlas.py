@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A whole object as what it was felt to be: the paper's graph of patches, and one surface of all of them."""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from functools import cached_property
+
+from numpy.typing import ArrayLike
+
+from ..arguments import LARGEST, Array, finite_array, number
+from ..reconstruction.result import Reconstruction
+from .boundaries import Edge, edges_of
+from .charts import Charts
+from .field import blended
+from .meshing import Mesh, meshed
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """Patches that overlap, nodes of a graph whose edges are the curves where one takes over from another.
+
+    patches : of n nodes
+    charts : the same as tables
+    tolerance : that they were felt to, a length; None where there was none
+    uncovered : places of rims that the touches have left
+    """
+
+    patches: tuple[Reconstruction, ...]
+    charts: Charts
+    tolerance: float | None = None
+    uncovered: int = 0
+
+    @cached_property
+    def edges(self) -> list[Edge]:
+        """Pairs of patches that share a boundary, with it."""
+        return edges_of(self.charts)
+
+    def distance(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Signed distances (n,) of points (n, 3), negative inside, and their standard deviations (n,).
+
+        Beyond the patches' reach the distance is that of the nearest felt place, and the deviation inf where
+        something unfelt might be nearer.
+        """
+        p = finite_array("points", points, (None, 3), LARGEST)
+        field = blended(self.charts, p)
+        return field.distance, field.std
+
+    def mesh(self, edge: float) -> Mesh:
+        """The surface as triangles whose edges are about as long as asked.
+
+        Watertight where the object was felt all round, open where it was not.
+        """
+        steps = self.meshing(edge)
+        try:
+            while True:
+                next(steps)
+        except StopIteration as end:
+            mesh: Mesh = end.value
+            return mesh
+
+    def meshing(self, edge: float) -> Generator[float, None, Mesh]:
+        """What `mesh` does, in steps: yields the share that is done, and returns the mesh."""
+        return meshed(self.charts, number("edge", edge, above=0.0))
