@@ -161,7 +161,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300, help="of changes (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="of those drawn, to go on with (%(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the draw (%(default)s)")
-    parser.add_argument("--seconds", type=float, default=120.0, help="of the processor, for a module's tests (%(default)g)")
+    parser.add_argument(
+        "--seconds", type=float, default=120.0, help="of the processor, for a module's tests (%(default)g)"
+    )
     options = parser.parse_args()
     every = [place for module in options.modules or TESTS for place in places_of(module)]
     drawn = random.Random(options.seed).sample(every, min(options.count, len(every)))[options.first :]

@@ -48,8 +48,8 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     point: FloatVectorProperty(
         name="Reference Point",
         subtype="TRANSLATION",
-        description="Where the curves meet, exact, or a place among strokes; until it is set that of the file, "
-        "or the point nearest to all curves",
+        description="Where the curves meet, exact, or a place among strokes; until it is set "
+        "that of the file, or the point nearest to all curves",
         options={"SKIP_SAVE", "SKIP_PRESET"},
     )
     strokes: BoolProperty(

@@ -208,7 +208,7 @@ class _Plane:
     """An ideal surface."""
 
     def ray_cast(self, origin, direction, distance):
-        """As a Surface of core has it."""
+        """What core asks of a Surface."""
         if direction[2] == 0.0 or not 0.0 <= -origin[2] / direction[2] <= distance:
             return None
         gone = -origin[2] / direction[2]

@@ -81,7 +81,7 @@ def papers_solution(angles, kappas):
     beta, gamma = (i for i in range(3) if i != alpha)
     t1, t2 = angles[beta] - angles[alpha], angles[gamma] - angles[alpha]
     ratio = (kappas[alpha] - kappas[beta]) / (kappas[alpha] - kappas[gamma])
-    # As atan2 the formula needs no care where its denominator vanishes.
+    # With atan2 the formula needs no care where its denominator vanishes.
     above, below = np.sin(t1 - t2) * np.sin(t1), ratio * np.sin(t2) - np.cos(t1 - t2) * np.sin(t1)
     theta = 0.5 * (np.arctan2(above, below) - t2)
     at = theta + np.array([0.0, t1])
