@@ -18,6 +18,7 @@ TURN, SHIFT = Rotation.from_euler("xyz", (0.7, -1.1, 2.3)).as_matrix(), np.array
 WAVES = ((1.0, (0.27, 0.08, -0.14), 0.4), (0.8, (-0.1, 0.3, 0.19), 1.9), (0.9, (0.16, -0.19, 0.24), 3.0))
 
 
+@cache
 def ball(count=10000):
     """Points all over the unit sphere (n, 3), and counterclockwise triangles."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
@@ -58,6 +59,7 @@ def bumpy():
     return surface, vertices, faces
 
 
+@cache
 def touch(surface, *, side=1.0, factor=1.0, noise=0.0):
     """A reconstruction of `surface`, scaled by `factor`, moved to where TURN and SHIFT bring it back."""
     lengths = {"extent": 10.0, "step": 0.8, "noise": noise, "rng": 3}
