@@ -24,9 +24,9 @@ test test-core: export OPENBLAS_NUM_THREADS = 1
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
-	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
+	$(shell find core presets tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo test test-core fuzz chart paper stability site film zip zip-nowheels clean
+.PHONY: help demo test test-core fuzz chart paper stability site film lesson sample zip zip-nowheels clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
@@ -38,6 +38,8 @@ help:
 	@echo 'make stability         lead everything to where it fails, and count who says so'
 	@echo 'make site              make the documentation'"'"'s site, in build/site/html'
 	@echo 'make film              draw the moving picture of the README anew'
+	@echo 'make lesson            draw the pictures of docs/lesson.md anew'
+	@echo 'make sample            make examples/sample.blend anew, in Blender 4.5'
 	@echo 'make zip               build the zip files of a release, one for each platform, in build/dist'
 	@echo 'make zip-nowheels      build the zip for a Blender whose own Python has scipy, in build/dist'
 	@echo 'make clean             remove build; the downloaded wheels stay'
@@ -78,6 +80,12 @@ site: $(SITE)/.ready
 
 film: $(ZIP) $(PEERS)
 	$(VENV_PY) -m tools.film --zip $(ZIP)
+
+lesson: $(READY) $(PEERS)
+	$(VENV_PY) -m tools.lesson
+
+sample: $(ZIP)
+	$(VENV_PY) -m tools.sample --zip $(ZIP)
 
 zip: $(READY)
 	$(VENV_PY) tools/build.py --wheels all

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a folder of HTML holds together: every link leads somewhere, and nothing is loaded from elsewhere."""
+"""Whether a folder of HTML holds together: each link leads somewhere, nothing is loaded from other hosts."""
 
 import re
 import sys
@@ -64,9 +64,8 @@ def main():
     found = list(problems(folder))
     if found or not any(folder.rglob("*.html")):
         sys.exit("\n".join(found) or f"check_site: there are no pages in {folder}")
-    print(
-        f"{len(list(folder.rglob('*.html')))} pages in {folder}: all links lead somewhere, nothing is from elsewhere"
-    )
+    count = len(list(folder.rglob("*.html")))
+    print(f"{count} pages in {folder}: all links lead somewhere, nothing is loaded from other hosts")
 
 
 if __name__ == "__main__":
