@@ -41,10 +41,9 @@ def test_the_preset_is_the_papers_method_in_blenders_own_list(extension, empty, 
     folder = path.parent.relative_to(ROOT / "presets")
     found = [Path(each) / path.name for each in empty.utils.preset_paths(str(folder))]
     assert any(each.is_file() and "tactile_patch" in each.parts for each in found)
+    known = {"radians": math.radians}
     settings = {
-        node.targets[0].attr: eval(
-            compile(ast.Expression(node.value), path.name, "eval"), {"radians": math.radians}
-        )
+        node.targets[0].attr: eval(compile(ast.Expression(node.value), path.name, "eval"), known)
         for node in ast.parse(path.read_text()).body
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Attribute)
     }
