@@ -101,7 +101,7 @@ def _add(settings, suggested):
 
 
 class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
-    """Feel along one plane less"""
+    """Remove this sampling plane"""
 
     bl_idname = "tactile.remove_plane"
     bl_label = "Remove Plane"
