@@ -8,7 +8,7 @@ import bpy
 
 from . import command_line
 from .comparison import register_operator, verify_operator
-from .files import contact_operators
+from .files import contact_operators, export_operators
 from .probes import change_handlers, operators, probe, probe_operators
 from .scene import color_range
 from .sidebar import panel, preferences, rows
@@ -25,12 +25,13 @@ CLASSES = (
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,
+    *export_operators.CLASSES,
     rows.TACTILE_OT_copy_value,
     *panel.PANELS,
     preferences.VIEW3D_MT_tactile,
     preferences.TactilePreferences,
 )
-MENUS = (*preferences.MENUS, *contact_operators.MENUS)
+MENUS = (*preferences.MENUS, *contact_operators.MENUS, *export_operators.MENUS)
 _commands, _drawings = [], []
 TOP = str(Path(__file__).resolve().parents[1])  # where presets/ is
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c tactile reconstruct|fit|map FILE`: a patch or a stability map from the shell."""
+"""`blender -c tactile reconstruct|fit|map|table FILE`: patches or a stability map from the shell."""
 
 import argparse
 import sys
@@ -38,9 +38,10 @@ def _parser():
         ("reconstruct", _add_reconstruct, "touch a mesh and rebuild the patch around a point"),
         ("fit", _add_fit, "rebuild the patch that measured contacts show"),
         ("map", _add_map, "touch a mesh all over and paint a copy by how well it goes"),
+        ("table", _add_table, "write what the patches of a scene have found, a row each"),
     ):
         add_arguments(commands.add_parser(name, help=help))
-    parser.set_defaults(**dict.fromkeys(("file", "contacts", "onto", "verify", "normal_std")))
+    parser.set_defaults(**dict.fromkeys(("file", "contacts", "json", "onto", "verify", "normal_std")))
     return parser
 
 
@@ -78,6 +79,11 @@ def _add_map(command):
     help = "distance between the points that are touched (a quarter of the extent)"
     add("--spacing", type=float, help=help)
     _add_inputs(add)
+
+
+def _add_table(command):
+    command.add_argument("file", nargs="?", type=Path, metavar="FILE", help=".blend; without, the open scene")
+    command.add_argument("--output", type=Path, metavar="OUT", required=True, help="the table, .csv")
 
 
 def _add_verify(add):

@@ -35,7 +35,8 @@ def verify_patch(patch, target, depsgraph):
     patch_object.recolor(patch)
     record["verification"] = {"target": target.name, **found}
     if record["status"] != "outdated":
-        record.update(judgment(r, found.get("vertex_distance_mean", 0.0), record["ended"]))
+        mean = found.get("vertex_distance_mean", 0.0)
+        record.update(judgment(r, mean, record["ended"], found["vertices"]))
 
 
 def _vertices(mesh, r, scale):

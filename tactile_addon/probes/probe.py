@@ -21,7 +21,7 @@ from bpy.props import (
 from ..scene import patch_object, patch_record
 from ..scene.family import children_of
 from ..touch.settings import OVERRIDABLE, TouchSettings, changed, is_silent
-from . import anchor
+from . import anchor, number_fields
 
 DIGEST = "tactile_digest"
 
@@ -46,9 +46,16 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     )
     live: BoolProperty(
         name="Live",
-        description="Touch again whenever the probe, its target or a number changes",
+        description="Touch again whenever the probe, its target or a number changes. Off, the patch is "
+        "frozen: it stays as it is until Touch Again, the button beside this",
         default=True,
         update=changed,
+        override=OVERRIDABLE,
+    )
+    show_handles: BoolProperty(
+        name="Handles",
+        description="Show what is dragged: the point, the sampling planes and the extent",
+        default=True,
         override=OVERRIDABLE,
     )
     active_plane: IntProperty(
@@ -204,6 +211,7 @@ def _show(obj):
 
 
 def register():
+    TactileProbe.__annotations__.update(number_fields.annotations())
     bpy.utils.register_class(TactileProbe)
     bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
     bpy.types.Object.tactile_colors = EnumProperty(

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..probes import probe
-from ..probes.operators import make_active, report_error, target_object
+from ..probes.operators import has_target, make_active, report_error, target_object
 from ..scene import patch_record
 from ..touch.settings import NAMES, TouchSettings, draw_all, draw_chosen, touch_arguments
 from ..touch.wording import sentence
@@ -53,7 +53,7 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Maps are made in Object Mode: leave this mode first")
             return False
-        return True
+        return has_target(cls, context)
 
     def invoke(self, context, event):
         if bpy.app.background:

@@ -194,28 +194,32 @@ def touch_arguments(settings):
     }
 
 
-def draw_chosen(layout, settings, name, found=None):
-    """A number that the surface chooses where it is 0, which the label says, with what it has `found`."""
+def draw_chosen(layout, settings, name, found=None, fields=None):
+    """A number that the surface chooses where it is 0, which the label says, with what it has `found`.
+
+    fields : other properties by which numbers are shown, by name
+    """
+    shown = (fields or {}).get(name, name)
     if getattr(settings, name):
-        layout.prop(settings, name)
+        layout.prop(settings, shown)
     elif found and found.get(name):
         row = layout.row()
         row.use_property_split = False  # for the label, which takes the width it needs
-        row.prop(settings, name, text=f"{iface(AUTO[name])} {found[name]}", translate=False)
+        row.prop(settings, shown, text=f"{iface(AUTO[name])} {found[name]}", translate=False)
     else:
-        layout.prop(settings, name, text=AUTO[name])
+        layout.prop(settings, shown, text=AUTO[name])
 
 
-def draw_sensor(layout, settings, found=None):
-    draw_chosen(layout, settings, "step", found)
-    layout.prop(settings, "noise")
+def draw_sensor(layout, settings, found=None, fields=None):
+    draw_chosen(layout, settings, "step", found, fields)
+    layout.prop(settings, (fields or {}).get("noise", "noise"))
     if settings.noise:
         layout.prop(settings, "seed")
 
 
-def draw_solver(layout, settings, found=None):
+def draw_solver(layout, settings, found=None, fields=None):
     layout.prop(settings, "method")
-    draw_chosen(layout, settings, "degree", found)
+    draw_chosen(layout, settings, "degree", found, fields)
     if settings.method in ("tagc", "quadratic-variation"):
         layout.prop(settings, "weight")
 

@@ -137,6 +137,12 @@ class MeshSurface(PlacedMesh):
         )
         return float(max(world, scale * local))
 
+    def facet(self, point):
+        """The longest edge of the face nearest to a world point."""
+        _, _, _, number = self._object.closest_point_on_mesh(self._to_local(point), depsgraph=self._depsgraph)
+        corners = self._co[list(self._mesh.polygons[number].vertices)] @ self._linear.T
+        return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max())
+
     def _nearest(self, local):
         """(point, normal) in object coordinates."""
         found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)

@@ -27,6 +27,7 @@ FARTHEST_SHARE = 1.0 / 2.0  # Share of the object's size: a half contour that en
 AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where no extent is given.
 FINEST_STEP = 1.0 / 128.0  # Share of it: the step where neither is given.
 LEAST_STEPS = 12  # Least steps of a half contour, where no step is given.
+LARGE_FACET = 4.0  # Steps: the finger feels facets that are longer, and creases between them.
 MOST_ROUNDING = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
 
 
@@ -89,7 +90,10 @@ def touch(
         "step": step or "auto",
     }
     sensor = {"noise": noise, "rng": seed, "tangent": axes[:, 0]}
-    found = core.explore(surface, point, outward, planes, **size, **sensor, **fit)
+    try:
+        found = core.explore(surface, point, outward, planes, **size, **sensor, **fit)
+    except core.DegenerateCurvesError as error:
+        raise _with_facets(error, surface, point, step or extent / LEAST_STEPS) from error
     clock.append(perf_counter())
     require_single(found.result)
     report = {
@@ -102,6 +106,17 @@ def touch(
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
     return Touched(surface, found.result, report)
+
+
+def _with_facets(error, surface, point, step):
+    """The error, which says so where the facets at the point are large; step : 0 where it is not given."""
+    facet = surface.facet(point)
+    if facet < LARGE_FACET * (step or FINEST_STEP * surface.size):
+        return error
+    return ValueError(
+        f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier, if the mesh stands "
+        "for a smooth shape"
+    )
 
 
 def _exploration_report(found, given, ended):
@@ -130,7 +145,7 @@ def completed(touched, most=None):
     found = _verification_report(touched.surface, result, most)
     # Where faces are large a pocket between the curves may have no vertex that lies over the patch.
     offs = found.get("vertex_distance_mean"), core.height_error(result, touched.surface)
-    found |= judgment(result, max(off or 0.0 for off in offs), report["ended"])
+    found |= judgment(result, max(off or 0.0 for off in offs), report["ended"], found["vertices"])
     clock.append(perf_counter())
     plane = suggestion_report(result, np.array(report["axes"]))
     clock.append(perf_counter())
