@@ -14,12 +14,14 @@ from .scene import color_range
 from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick
+from .whole_object import object_operator
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
     verify_operator.TACTILE_OT_verify,
     register_operator.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,
+    object_operator.TACTILE_OT_touch_all_over,
     pick.TACTILE_OT_pick,
     drag.TACTILE_OT_drag,
     gizmos.TACTILE_GGT_handles,

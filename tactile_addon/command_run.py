@@ -20,6 +20,7 @@ from .scene import patch_record
 from .stability_map.map_report import map_readable
 from .touch.units import ADAPTIVE, METERS
 from .touch.wording import readable
+from .whole_object.object_report import object_readable
 
 
 class Misuse(ValueError):
@@ -42,18 +43,21 @@ COMMANDS = {
     "reconstruct": Command("reconstruct", patch_record.RECORD, readable, {}),
     "fit": Command("import_contacts", patch_record.RECORD, readable, {}),
     "table": Command("", "", lambda report: f"{report['rows']} rows written", {}),
+    "object": Command("touch_all_over", patch_record.ATLAS_RECORD, object_readable, {"progress": True}),
     "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
 }
 # What the operators take as it is given.
 PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
-PLAIN |= {"tolerance", "unit", "point", "flip", "radius"}
+PLAIN |= {"edge", "most", "tolerance", "unit", "point", "flip", "radius"}
 # Operators would take the nearest number they can have for others.
 NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
 
 
 # What --output may be.
 PATCH_FILES = (".blend", ".ply", ".json")
-KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "map": (".blend", ".ply"), "table": (".csv",)}
+MESH_FILES = (".blend", ".ply")
+KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
+KINDS |= {"object": MESH_FILES, "map": MESH_FILES}
 
 
 def _require_numbers(options):

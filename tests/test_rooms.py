@@ -24,7 +24,8 @@ ROOMS = {
         "scan",
     ),
     "tactile_addon": (
-        *("touch", "scene", "probes", "stability_map", "files", "comparison", "viewport", "sidebar"),
+        *("touch", "scene", "probes", "stability_map", "whole_object", "files", "comparison"),
+        *("viewport", "sidebar"),
     ),
 }
 MOST_FILES, MOST_LINES = 9, 250

@@ -6,6 +6,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number
@@ -58,6 +59,17 @@ class Atlas:
         except StopIteration as end:
             mesh: Mesh = end.value
             return mesh
+
+    def suggested_edge(self) -> float:
+        """An edge at which triangles are off the surface by half its deviation, in the median of the patches.
+
+        A chord e of a circle of curvature k is off it by k e^2 / 8; an edge is no longer than half a radius.
+        """
+        bends = np.array([max(abs(r.patch.k1), abs(r.patch.k2)) for r in self.patches])
+        stds = np.array([r.mean_height_std for r in self.patches])
+        radii = np.array([r.radius for r in self.patches])
+        chords = np.sqrt(4.0 * stds / np.maximum(bends, stds / radii**2))
+        return float(np.median(np.minimum(chords, 0.5 * radii)))
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """What `mesh` does, in steps: yields the share that is done, and returns the mesh."""

@@ -118,8 +118,9 @@ def is_probe(obj):
 
 
 def is_result(obj):
-    """Whether it is a patch, the contours of one, or a map."""
-    return any(key in obj for key in (patch_record.RECORD, patch_record.CONTOURS, patch_record.MAP_RECORD))
+    """Whether it is a patch, the contours of one, a map or a whole object that was touched."""
+    keys = patch_record.RECORD, patch_record.CONTOURS, patch_record.MAP_RECORD, patch_record.ATLAS_RECORD
+    return any(key in obj for key in keys)
 
 
 def patch_of(probe):
@@ -201,13 +202,8 @@ def make(context, target):
 def _show(obj):
     """Colors a patch by what it is set to show now; the range of what it showed is none of that."""
     obj.pop(patch_record.RANGE, None)
-    if patch_record.RECORD not in obj or not obj.is_editable:
-        return
-    try:
-        patch_record.require_whole(obj)
-    except ValueError:  # Verifying and exporting it say so.
-        return
-    patch_object.recolor(obj)
+    if obj.is_editable and patch_record.is_colored(obj):  # else verifying and exporting it say so
+        patch_object.recolor(obj)
 
 
 def register():

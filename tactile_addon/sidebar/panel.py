@@ -25,6 +25,8 @@ from ..touch import units
 from ..touch.settings import draw_chosen, draw_sensor, draw_solver
 from ..touch.wording import registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
+from ..whole_object.object_operator import TACTILE_OT_touch_all_over
+from ..whole_object.object_report import object_rows
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
@@ -140,6 +142,20 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
 
 
+class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
+    bl_idname = "TACTILE_PT_object"
+    bl_label = "Whole Object"
+
+    def draw_active(self, context, layout, obj):
+        layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
+        if obj is None or patch_record.ATLAS_RECORD not in obj:
+            return
+        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on It", icon="EYEDROPPER").new = True
+        _draw_colors(context, layout, obj, "tactile_colors")
+        record = obj[patch_record.ATLAS_RECORD]
+        draw_rows(context, layout.box(), object_rows(record, units.unit_of(context.scene, record["radius"])))
+
+
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_map"
     bl_label = "Stability Map"
@@ -213,4 +229,4 @@ def _draw_verification(context, layout, found, unit):
     draw_rows(context, layout, verification_rows(found, unit))
 
 
-PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_map)
+PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map)
