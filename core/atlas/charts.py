@@ -18,7 +18,7 @@ from ..arguments import Array
 SIDE = 33  # knots of a table along each axis
 MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
 AZIMUTHS = 96  # samples of a domain's radius
-REACH = 0.5  # of the radius, that a place may be above or below its patch
+REACH = 0.5  # of the radius, that a place may be off its patch
 CHUNK = 200_000  # pairs at once
 
 
@@ -26,8 +26,8 @@ class Pairs(NamedTuple):
     """What patches say of places near by, m pairs sorted by place.
 
     place, node : (m,), indices
-    share : (m,), of the domain's radius there, below MARGIN
-    distance : (m,), signed, of first order
+    share : (m,), of the domain's radius at its foot, below MARGIN
+    distance : (m,), signed
     normal : (m, 3), of the patch below the place
     std : (m,), of the distance
     """
@@ -72,7 +72,7 @@ class Charts:
     def reaches(self) -> Array:
         """How far from its origin a patch is asked, (n,)."""
         flat: Array = MARGIN * self.rims.max(axis=1)
-        return self.radii * np.hypot(flat, np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5) + 0.2)
+        return self.radii * np.hypot(flat, np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5) + REACH)
 
     def pairs(self, points: Array, nodes: NDArray[np.intp] | None = None) -> Pairs:
         """What patches say of places (k, 3); with `nodes` (k,), only that one of each."""
@@ -117,24 +117,29 @@ class Charts:
         return np.hypot(x, y) / np.maximum(radius, 1e-6)
 
     def _pairs_at(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
+        """Distances to the tangent plane at the foot, which is where the share and the deviation are of."""
         x, y, z = self.local(points, place, node).T
-        share = self.shares(x, y, node)
-        inside = (share < MARGIN) & (np.abs(z) < 2.0)
-        place, node, share, x, y, z = (values[inside] for values in (place, node, share, x, y, z))
-        h, hx, hy, std = self._heights(x, y, node)
-        steep = 1.0 / np.sqrt(1.0 + hx**2 + hy**2)
-        distance = (z - h) * steep
-        near = np.abs(distance) < REACH
-        normal = np.stack([-hx * steep, -hy * steep, steep], axis=1)[near]
-        node = node[near]
-        radius = self.radii[node]
+        inside = (self.shares(x, y, node) < MARGIN + REACH) & (np.abs(z) < 2.0)
+        place, node, x, y, z = (values[inside] for values in (place, node, x, y, z))
+        h, hx, hy, _ = self._heights(x, y, node)
+        off = (z - h) / (1.0 + hx**2 + hy**2)
+        foot_x, foot_y = x + off * hx, y + off * hy
+        share = self.shares(foot_x, foot_y, node)
+        inside = (share < MARGIN) & (np.abs(off) < REACH)
+        place, node, x, y, z, foot_x, foot_y, share = (
+            values[inside] for values in (place, node, x, y, z, foot_x, foot_y, share)
+        )
+        h, hx, hy, std = self._heights(foot_x, foot_y, node)
+        steep, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[node]
+        distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * steep
+        normal = np.stack([-hx * steep, -hy * steep, steep], axis=1)
         return Pairs(
-            place[near],
+            place,
             node,
-            share[near],
-            distance[near] * radius,
+            share,
+            distance * radius,
             np.einsum("mij,mj->mi", self.axes[node], normal),
-            (std * steep)[near] * radius,
+            std * steep * radius,
         )
 
     def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
@@ -151,10 +156,8 @@ class Charts:
             h += by_x[:, i] * across
             hx += by_dx[:, i] * across
             hy += by_x[:, i] * np.einsum("mk,mk->m", taps, by_dy)
-        std = self.stds.reshape(-1)[
-            (node * SIDE + np.rint(x / pitch + 0.5 * (SIDE - 1)).astype(np.intp)) * SIDE
-            + np.rint(y / pitch + 0.5 * (SIDE - 1)).astype(np.intp)
-        ]
+        nearest = np.clip(np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp), 0, SIDE - 1)
+        std = self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]]
         return h, hx / pitch, hy / pitch, std
 
     def joined(self, others: "Charts") -> "Charts":

@@ -90,26 +90,37 @@ class Frontier:
 
     def take(self, count: int) -> list[Next]:
         """The touches that bring most, at most so many, far from each other; none where all is covered."""
+        self._forget_covered()
         found: list[Next] = []
-        aside: list[Next] = []
+        aside: list[tuple[float, int, Place]] = []
         while self.queue and len(found) < count:
-            _, _, place = heapq.heappop(self.queue)
+            entry = heapq.heappop(self.queue)
+            place = entry[2]
+            if any(_is_near(place, other) for other in found):
+                aside.append(entry)
+                continue
             touch = self.beyond(place)
             if touch is None:
                 continue
             if self.queue and touch.gain < -self.queue[0][0]:
                 self.push(place, touch.gain)
-            elif any(_is_near(touch, other) for other in found):
-                aside.append(touch)
             else:
                 found.append(touch)
-        for touch in aside:
-            self.push(touch.place, touch.gain)
+        for entry in aside:
+            heapq.heappush(self.queue, entry)
         return found
+
+    def _forget_covered(self) -> None:
+        """Places that patches have come to cover, all at once."""
+        places = [place for _, _, place in self.queue]
+        points, normals = (np.array([getattr(p, name) for p in places]) for name in ("point", "normal"))
+        covered = self.is_covered(points.reshape(-1, 3), normals.reshape(-1, 3)).tolist()
+        self.queue = [entry for entry, gone in zip(self.queue, covered, strict=True) if not gone]
+        heapq.heapify(self.queue)
 
     def beyond(self, place: Place) -> Next | None:
         """The touch that goes on from a place; None where it would bring nothing."""
-        if place.tries >= TRIES or self.covered(place.point, place.normal):
+        if place.tries >= TRIES:
             return None
         for share in REACHES:
             contact = contact_ahead(self.surface, place, share * place.radius)
@@ -163,9 +174,9 @@ class Frontier:
         return 1.0 if hit is None else math.copysign(1.0, dot(vector_of(np.asarray(hit[1])), normal))
 
 
-def _is_near(touch: Next, other: Next) -> bool:
-    room = APART * max(touch.place.radius, other.place.radius)
-    return bool(np.linalg.norm(touch.point - other.point) < room)
+def _is_near(place: Place, touch: Next) -> bool:
+    room = APART * max(place.radius, touch.place.radius)
+    return math.dist(place.point, touch.point) < room
 
 
 def _disk(normal: Vector, ahead: Vector) -> Array:

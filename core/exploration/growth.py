@@ -41,13 +41,13 @@ Feel = Callable[[float], list[Contour]]  # contours of an extent
 class Felt:
     """Contours as they were tracked with a step between contacts; `partial`: not as far as may be.
 
-    largest_std : a length, that the mean deviation of the height may be at most
+    largest_std : a length, that the mean deviation of the height may be at most; None for a share of the radius
     """
 
     contours: list[Contour]
     point: Array
     step: float
-    largest_std: float
+    largest_std: float | None
     partial: bool = False
 
     @cached_property
@@ -90,7 +90,7 @@ class Felt:
         starts = np.cumsum(sizes) - sizes.ravel()
         squares = np.append((z - r.height(x, y)) ** 2, 0.0)
         sums = np.add.reduceat(squares, starts).reshape(-1, 3)[:, ::2]
-        limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
+        limit = max(EXPLAINED * max(r.accuracy, MISFIT) * r.radius, self.largest_std or 0.0)
         return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0) / limit
 
 
@@ -118,7 +118,7 @@ class Grown(NamedTuple):
         return self.result.status == "ok"
 
 
-def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: float) -> Fits:
+def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: float | None) -> Fits:
     """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
     first = SEEDS[0] * step
     felt = Felt(feel(min(first, farthest)), point, step, largest_std, partial=first < farthest)
@@ -172,7 +172,7 @@ def tried(felt: Felt, counts: Counts) -> Fits:
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
-    spread = r.mean_height_std / min(GROWN_STD * r.radius, felt.largest_std)
+    spread = r.mean_height_std / (felt.largest_std or GROWN_STD * r.radius)
     return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
 
 

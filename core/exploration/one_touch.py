@@ -66,7 +66,7 @@ class Touch:
 
     Lengths are None where they are to be chosen, the tolerance where no planes are to be added.
     reference : columns e1, n and e1 x n, which azimuths are measured by
-    largest_std : that curves may grow to
+    largest_std : a length, that curves may grow to
     is_grown : whether what makes curves grow is the fit that is asked for
     """
 
@@ -79,7 +79,7 @@ class Touch:
     farthest: float
     tolerance: float | None
     most_planes: float
-    largest_std: float
+    largest_std: float | None
     is_grown: bool
 
     def steps(self) -> Steps:

@@ -52,8 +52,8 @@ def explore(
 
     planes : as in `track`, or how many, k: then their azimuths are pi i / k
     farthest : the longest that a half curve may become; None for as long as curves go on before they end
-    largest_std : mean deviation of the height at which half curves grow no longer; None for 1.2 % of the
-        radius, which is so always
+    largest_std : mean deviation of the height until which half curves grow, and until which they count as
+        explained; None for shares of the radius
     tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
         added, up to `most_planes`, as long as one takes a tenth off. None for the given planes only
     extent : of each half curve, as in `track`; "auto" has each grow until the default fit no longer
@@ -137,7 +137,7 @@ def explore_many(
         "extent": length,
         "step": _given("step", step),
         "farthest": length or (None if farthest is None else number("farthest", farthest, above=0.0)),
-        "largest_std": math.inf if largest_std is None else number("largest_std", largest_std, above=0.0),
+        "largest_std": None if largest_std is None else number("largest_std", largest_std, above=0.0),
         "tolerance": None if tolerance is None else number("tolerance", tolerance, least=0.0),
         "most_planes": number("most_planes", most_planes, least=3.0),
         "is_grown": method == "bayes",
