@@ -50,7 +50,9 @@ def object_rows(record, unit):
 def _surface(record):
     if record["is_closed"]:
         return "closed all round"
-    return f"open, with {record['uncovered']} places on rims that were not covered"
+    if record["uncovered"]:
+        return f"open, with {record['uncovered']} places from which it could go on"
+    return "open where no patch could be felt"
 
 
 def _off(record, what, unit):

@@ -20,8 +20,8 @@ class ObjectTouches:
     surface : the mesh as it was, from its object's origin
     found : core.Reconstructions of the touches so far; uncovered : places known to be uncovered
     words, share : what is going on, and the share of it that is done, None where nobody knows
-    atlas, mesh, deviation : a core.Atlas, a core.Mesh, signed distances (n,) of its vertices to the target,
-        once the steps are done
+    atlas, mesh : core.Atlas and core.Mesh, once the steps are done
+    curvatures, deviation : as of Atlas.curvatures; signed distances (n,) of the mesh's vertices to the target
     """
 
     def __init__(self, obj, depsgraph, *, location, tolerance, noise, seed, most, edge):
@@ -88,7 +88,7 @@ class ObjectTouches:
     def _note(self, state):
         self.found += [exploration.result for exploration in state.found]
         self.uncovered = state.uncovered
-        self.words = f"{state.done} touches, {state.uncovered} places on their rims are open"
+        self.words = f"{state.done} touches, {state.uncovered} places to go on from"
         if state.joining is not None:
             self.words, self.share = f"Joining {state.done} patches", 0.5 * state.joining
 
@@ -102,6 +102,8 @@ class ObjectTouches:
                 self.mesh = end.value
                 break
             yield
+        self.curvatures = self.atlas.curvatures(self.mesh)
+        yield
         self.deviation, normals = np.zeros(len(self.mesh.vertices)), self.mesh.normals
         for start in range(0, len(self.deviation), AT_ONCE):
             some = slice(start, start + AT_ONCE)

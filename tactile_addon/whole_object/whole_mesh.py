@@ -11,7 +11,6 @@ from ..scene.mesh_data import emission, fill
 from ..scene.viewports import show_colors
 
 RINGS, SPOKES = (0.5, 1.0), 24  # of a patch while it is one of many
-CURVATURES = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness")
 
 
 class GrowingPatches:
@@ -77,7 +76,7 @@ def insert(context, name, touches):
     mesh.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
     found = touches.mesh
     attributes = [
-        *((key, "FLOAT", _shown(key, touches.atlas.patches, found)) for key in CURVATURES),
+        *((key, "FLOAT", values) for key, values in touches.curvatures.items()),
         ("height_std", "FLOAT", found.std),
         ("deviation", "FLOAT", touches.deviation),
         ("patch", "INT", found.patch.astype(np.int32)),
@@ -89,13 +88,3 @@ def insert(context, name, touches):
     patch_object.recolor(obj)
     show_colors()
     return obj
-
-
-def _shown(name, patches, mesh):
-    """A quantity at the vertices (n,), that of the patch that has most to say there."""
-    values = np.zeros(len(mesh.vertices))
-    for i in np.unique(mesh.patch):
-        there = mesh.patch == i
-        x, y, _ = patches[i].frame.to_local(mesh.vertices[there]).T
-        values[there] = getattr(patches[i].patch, name)(x, y)
-    return values
