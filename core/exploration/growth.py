@@ -41,7 +41,7 @@ Feel = Callable[[float], list[Contour]]  # contours of an extent
 class Felt:
     """Contours as they were tracked with a step between contacts; `partial`: not as far as may be.
 
-    largest_std : a length, that the mean deviation of the height may be at most; None for a share of the radius
+    largest_std : a length, that the mean deviation of the height may be at most; None for a share of L
     """
 
     contours: list[Contour]
