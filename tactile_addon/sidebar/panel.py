@@ -152,8 +152,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
             return
         layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on It", icon="EYEDROPPER").new = True
         _draw_colors(context, layout, obj, "tactile_colors")
-        record = obj[patch_record.ATLAS_RECORD]
-        draw_rows(context, layout.box(), object_rows(record, units.unit_of(context.scene, record["radius"])))
+        draw_rows(context, layout.box(), object_rows(obj[patch_record.ATLAS_RECORD]))
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):

@@ -12,6 +12,7 @@ from ..probes import probe
 from ..probes.in_slices import InSlices
 from ..probes.operators import make_active, report_error, target_object
 from ..scene import patch_record
+from ..touch.settings import draw_chosen
 from . import whole_mesh
 from .object_report import object_summary
 from .object_touches import ObjectTouches
@@ -161,9 +162,8 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")
-        for name in ("tolerance", "edge"):
-            text = f"{self.bl_rna.properties[name].name} (Auto)"
-            layout.prop(self, name, **({} if getattr(self, name) else {"text": text}))
+        draw_chosen(layout, self, "tolerance")
+        draw_chosen(layout, self, "edge")
         layout.prop(self, "most")
         layout.prop(self, "noise")
         layout.prop(self, "seed")

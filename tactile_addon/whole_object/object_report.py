@@ -8,9 +8,14 @@ from ..touch import units
 from ..touch.wording import table
 
 
+def unit_of(record):
+    """The unit for what there is to say, which is about as large as the tolerance."""
+    return units.unit_of(bpy.context.scene, record["tolerance"])
+
+
 def object_readable(record):
     """Lines of label and value; lengths in the unit of the scene or file."""
-    unit = units.unit_of(bpy.context.scene, record["radius"])
+    unit = unit_of(record)
     return table(
         [
             ("touched", f"{record['source']}, {record['touches']} times"),
@@ -27,16 +32,17 @@ def object_readable(record):
 
 def object_summary(record):
     """What touches all over an object have found, in a sentence."""
-    unit = units.unit_of(bpy.context.scene, record["radius"])
+    unit = unit_of(record)
     return f"{record['touches']} touches; {_surface(record)}; {_off(record, 'mean', unit)} off in the mean"
 
 
-def object_rows(record, unit):
+def object_rows(record):
     """(label, value) for the panel."""
+    unit = unit_of(record)
     return [
         ("Touches", str(record["touches"])),
         ("Surface", "Closed" if record["is_closed"] else "Open"),
-        ("Open Places", str(record["uncovered"])),
+        ("Rims Left", str(record["uncovered"])),
         ("Tolerance", units.say(record["tolerance"], 1, unit)),
         ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
         ("Off Mesh", _off(record, "mean", unit)),

@@ -29,6 +29,10 @@ class ObjectTouches:
 
         Raises ValueError, with a sentence, for what cannot be touched.
         """
+        import scipy.linalg
+        import scipy.sparse  # takes half a second once: not between two redraws
+        import scipy.spatial  # noqa: F401
+
         for name, value in (("tolerance", tolerance), ("noise", noise), ("edge", edge)):
             if not value >= 0.0:  # NaN is none
                 raise ValueError(f"The {name} is a length of 0 or more, got {length(value)}")

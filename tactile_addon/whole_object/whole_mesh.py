@@ -20,7 +20,7 @@ class GrowingPatches:
         self._mesh = bpy.data.meshes.new(f"{name} Touches")
         obj = bpy.data.objects.new(self._mesh.name, self._mesh)
         obj.show_in_front, obj.matrix_world = True, Matrix.Translation(origin)
-        patch_object.collection(scene).objects.link(obj)
+        scene.collection.objects.link(obj)  # in none of its own, which might be left empty
         obj.data.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
         self._uid, self._patches = obj.session_uid, []
         show_colors()

@@ -47,9 +47,9 @@ def test_colors_show_what_is_chosen(empty, ball):
 @pytest.mark.parametrize(
     ("inputs", "message"),
     [
-        ({"tolerance": -1.0}, "The tolerance is a length of 0 or more"),
-        ({"tolerance": 0.01, "noise": 0.02}, "is below the noise"),
-        ({"edge": float("nan")}, "The edge is a length of 0 or more"),
+        ({"tolerance": -1.0}, "The tolerance is a length of 0 or more, got"),
+        ({"tolerance": 0.01, "noise": 0.02}, r"The tolerance 0.01 m is below the noise 0.02 m: take a larger one"),
+        ({"edge": float("nan")}, "The edge is a length of 0 or more, got"),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_is_left(empty, ball, inputs, message):
@@ -64,3 +64,19 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball):
     assert record["touches"] == 3
     assert not record["is_closed"]
     assert record["uncovered"] > 0
+
+
+def test_nothing_begins_on_a_sheet_of_creases(empty):
+    empty.ops.mesh.primitive_cube_add(size=2.0)
+    before = datablocks(empty)
+    with pytest.raises(RuntimeError, match="No touch could begin: choose another location"):
+        empty.ops.tactile.touch_all_over(tolerance=1e-3)  # its vertices are its corners
+    assert datablocks(empty) == before
+
+
+def test_a_probe_or_a_place_says_where_to_begin(empty, ball):
+    surface, _ = touched(empty, location=(0.0, 0.0, 2.0), tolerance=0.01, most=1)
+    assert np.abs(positions(surface.data)[:, 2]).min() > 0.5
+    empty.ops.tactile.pick(target=ball.name, location=(0.0, 2.0, 0.0))
+    surface, _ = touched(empty, tolerance=0.01, most=1)
+    assert np.abs(positions(surface.data)[:, 1]).min() > 0.5
