@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Dask: workers here or elsewhere, and orders that are carried out by them whatever happens to them."""
 
+import logging
 import math
 from collections.abc import Iterable, Iterator
 from concurrent.futures import CancelledError
@@ -17,6 +18,8 @@ from distributed.scheduler import KilledWorker
 from .worker import task
 from .worker.process import FAILED
 
+# Ctrl+C goes to all processes of a terminal, and is for the one that ends the others.
+DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 AHEAD = 3  # orders that are out at once, for each thread of a worker
 LEAST_AHEAD = 16
 EVERY = 5.0  # seconds between looks at how many threads there are
@@ -55,7 +58,9 @@ def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Ite
                 threads_per_worker=1,
                 processes=True,
                 memory_limit=0,
-                dashboard_address=dashboard,
+                silence_logs=logging.ERROR,
+                preload=[DEAF],
+                dashboard_address=dashboard or "127.0.0.1:0",
             ) as cluster,
             Client(cluster) as client,
         ):

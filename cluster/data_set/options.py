@@ -67,7 +67,9 @@ class Options:
             if getattr(self, name) < least:
                 raise ValueError(f"{name}: wanted a number of {least} or more, got {getattr(self, name)}")
         if len(self.tilts) != len(self.azimuths):
-            raise ValueError("tilts: wanted as many as there are planes")
+            raise ValueError(
+                f"tilts: wanted as many as there are planes, {len(self.azimuths)}, got {len(self.tilts)}"
+            )
         self._rehearse()
 
     @classmethod

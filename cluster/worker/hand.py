@@ -20,6 +20,7 @@ from typing import Any
 from ..data_set import manifest
 from ..data_set.folder import write_block
 from ..data_set.options import Options
+from . import objects, touches
 from .process import DONE, FAILED, STOP
 
 
@@ -39,8 +40,6 @@ class Hand:
 
     def survey(self, path: str, versions: dict[str, str]) -> list[dict[str, Any]]:
         """Facts of the objects in a file. Raises HopelessError where rows made here would not be the same."""
-        from . import objects
-
         here = manifest.versions()
         if here != versions:
             name = next(name for name in {**here, **versions} if here.get(name) != versions.get(name))
@@ -53,8 +52,6 @@ class Hand:
 
     def touch(self, facts: dict[str, Any], options: dict[str, Any], block: int, path: str) -> dict[str, Any]:
         """Touches an object, and writes the rows of that block to the file `path`; their summary."""
-        from . import touches
-
         rows, seconds = touches.touched(self._object(facts), Options.from_dict(options), block)
         try:
             return write_block(Path(path), rows, facts, seconds)
@@ -62,8 +59,6 @@ class Hand:
             raise HopelessError(str(error)) from error
 
     def _object(self, facts: dict[str, Any]) -> Any:
-        from . import objects
-
         if self._target is None or self._target.facts != facts:
             self._target = None
             self.opened += 1
