@@ -54,8 +54,8 @@ def require_same_objects(old: dict[str, Any], files: dict[str, Any]) -> None:
         had = old["files"].get(path, {})
         if any(known is not None and hashes.get(name) != known for name, known in had.items()):
             raise ValueError(
-                f'"{path}" has changed since this data set was begun, or cannot be read any more: put the old '
-                "file back, or take another folder"
+                f'"{path}" has changed since this data set was begun, or cannot be read any more: put the '
+                "old file back, or take another folder"
             )
 
 
