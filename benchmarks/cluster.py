@@ -6,8 +6,8 @@
 It prints Markdown tables:
 
 (a) touches a second by one worker and by two, beside plain loops over the same touches (plain_loop.py), one
-    and two side by side; in turns, medians. `processor` is the plain loops' processor time over that of all the
-    processes of the cluster: what else a machine does hardly changes it;
+    and two side by side; in turns, medians. `processor` is the plain loops' processor time over that of all
+    the processes of the cluster: what else a machine does hardly changes it;
 (b) what a block costs beside its touches, on the worker and at the scheduler;
 (c) the memory of all processes while 1000 objects are touched, by processes that never give way to new ones;
 (d) on paper, from (a) and (b): the share of the workers' time that goes into touches.
@@ -134,20 +134,15 @@ def overhead(path, count):
     with connected(None, 1, None) as client:
         engine = Engine(client, LIMIT)
         made(engine, [path], options(2, 1, seed=99, **fixed))
-        many, few = (
-            made(engine, [path], options(count, block, **fixed)) for block in (1, count)
-        )  # the same touches but for their batches
-    alone = options(1, 1, **fixed)
-    one_by_one = looped([path], {"touches": count, "block": 1, **fixed}, 1)[1]
-    del alone
-    worker = (many[1] - many[2] - one_by_one) / count
-    center = (many[2] - few[2]) / (count - 1)
-    latency = max(many[0] - many[1], 0.0) / count
+        seconds, work, central = made(engine, [path], options(count, 1, **fixed))
+    touches = looped([path], {"touches": count, "block": 1, **fixed}, 1)[1]
+    worker, center = (work - central - touches) / count, central / count
+    idle = max(seconds - work, 0.0) / count
     print(f"(b) A block, out of {count} of one touch.\n")
     rows = [["worker, processor time", worker], ["client and scheduler, processor time", center]]
-    rows.append(["nobody works", latency])
+    rows.append(["beyond the processor time of all, as where other programs have it", idle])
     table(["", "ms"], [[name, f"{1e3 * value:.1f}"] for name, value in rows])
-    return worker + latency, center
+    return worker, center
 
 
 def write_ball(path, radii, rings=32):
@@ -225,7 +220,7 @@ def main():
     files = [SCANS_FOLDER / name for name in SCANS[: 2 if quick else None]]
     if not files[0].is_file():
         sys.exit(f"cluster: there are no scans in {SCANS_FOLDER}")
-    touches = {"automatic": 200, "fixed": 500} if quick else {"automatic": 500, "fixed": 1000}
+    touches = {"automatic": 100, "fixed": 300} if quick else {"automatic": 500, "fixed": 1000}
     seconds = rates(files, 3 if quick else 5, touches)
     worker, center = overhead(files[0], 100 if quick else 300)
     memory(100 if quick else 1000)
