@@ -15,6 +15,7 @@ VENV := build/venv-$(PYTHON_VERSION)
 VENV_PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
 PEERS := $(VENV)/.peers
+SITE := build/site
 # Tests run beside each other, one process a processor, each with one thread.
 BESIDE := -n auto --dist worksteal
 test test-core: export OMP_NUM_THREADS = 1
@@ -23,9 +24,9 @@ test test-core: export OPENBLAS_NUM_THREADS = 1
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
-	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
+	$(shell find core presets tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo test test-core fuzz chart paper stability zip zip-nowheels clean
+.PHONY: help demo test test-core fuzz chart paper stability site film lesson sample zip zip-nowheels clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
@@ -35,6 +36,10 @@ help:
 	@echo 'make chart [QUICK=1]   draw speed against accuracy, beside what else one could take, in build/charts'
 	@echo 'make paper             repeat the experiments of the paper, beside its figures'
 	@echo 'make stability         lead everything to where it fails, and count who says so'
+	@echo 'make site              make the documentation'"'"'s site, in build/site/html'
+	@echo 'make film              draw the moving picture of the README anew'
+	@echo 'make lesson            draw the pictures of docs/lesson.md anew'
+	@echo 'make sample            make examples/sample.blend anew, in Blender 4.5'
 	@echo 'make zip               build the zip files of a release, one for each platform, in build/dist'
 	@echo 'make zip-nowheels      build the zip for a Blender whose own Python has scipy, in build/dist'
 	@echo 'make clean             remove build; the downloaded wheels stay'
@@ -69,6 +74,19 @@ stability: $(ZIP) $(PEERS)
 	$(VENV_PY) -m benchmarks.stability
 	$(VENV_PY) -m benchmarks.refusals $(ZIP)
 
+site: $(SITE)/.ready
+	@NO_MKDOCS_2_WARNING=1 $(SITE)/bin/mkdocs build --quiet --strict
+	@$(SITE)/bin/python tools/check_site.py $(SITE)/html
+
+film: $(ZIP) $(PEERS)
+	$(VENV_PY) -m tools.film --zip $(ZIP)
+
+lesson: $(READY) $(PEERS)
+	$(VENV_PY) -m tools.lesson
+
+sample: $(ZIP)
+	$(VENV_PY) -m tools.sample --zip $(ZIP)
+
 zip: $(READY)
 	$(VENV_PY) tools/build.py --wheels all
 
@@ -81,6 +99,12 @@ clean:
 # The environment has to be there to build, but a new one is no reason to build again.
 $(ZIP): $(SOURCES) | $(READY)
 	@zip=$$($(VENV_PY) tools/build.py --output build) && mv "$$zip" $@
+
+$(SITE)/.ready: tools/site_requirements.txt | $(READY)
+	@echo 'Installing what the site is made with, in $(SITE): once.'
+	@'$(PYTHON)' -m venv $(SITE)
+	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
+	@touch $@
 
 # One by one: a chart goes without a peer that is not made for this Python or system.
 $(PEERS): benchmarks/requirements.txt $(READY)

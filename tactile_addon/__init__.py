@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What knows Blender: surfaces to touch, probes, operators, panel, handles, patches and command line."""
 
+from pathlib import Path
+
 import bpy
 
 from . import command_line
@@ -30,6 +32,7 @@ CLASSES = (
 )
 MENUS = (*preferences.MENUS, *contact_operators.MENUS)
 _commands, _drawings = [], []
+TOP = str(Path(__file__).resolve().parents[1])  # where presets/ is
 
 
 def register():
@@ -42,6 +45,7 @@ def register():
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
     bpy.utils.register_manual_map(preferences.manual_map)
+    bpy.utils.register_preset_path(TOP)
     change_handlers.register()
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
     _drawings.extend(overlay.draw_handlers())
@@ -52,6 +56,7 @@ def unregister():
         bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
     change_handlers.unregister()
     bpy.utils.unregister_cli_command(_commands.pop())
+    bpy.utils.unregister_preset_path(TOP)
     bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MANIFEST = ROOT / "blender_manifest.toml"
 # Blender's pattern list can only exclude, so what ships is named: nothing else lying in a checkout,
 # an environment or a scan, can get into a release.
-SHIPPED = ("__init__.py", "LICENSE", "core", "tactile_addon")
+SHIPPED = ("__init__.py", "LICENSE", "core", "presets", "tactile_addon")
 # The page that Blender's Online Manual opens, made into HTML, and its pictures.
 MANUAL = ROOT / "docs" / "viewport.md"
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Tactile Patch</title>
