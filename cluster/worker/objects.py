@@ -12,7 +12,7 @@ from ..data_set.folder import hash_of
 from ..extension import addon, core
 
 detached_mesh, evaluated_mesh = addon("touch.detached_mesh"), addon("touch.evaluated_mesh")
-mesh_file, surface = addon("files.mesh_file"), addon("touch.surface")
+mesh_file = addon("files.mesh_file")
 SCENES = (".blend", ".obj")  # files of several objects, which have names of their own
 
 
@@ -28,10 +28,9 @@ class Touchable:
     def __init__(self, obj: Any, path: str) -> None:
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        self.surface = detached_mesh.MeshSnapshot(obj, depsgraph)
-        self.points = self.surface.points
-        self.offset = np.array(self.surface.matrix.translation)
-        _, self.triangles = surface.MeshSurface(obj, depsgraph).triangles()
+        evaluated, linear, self.offset = evaluated_mesh.evaluated_object(obj, depsgraph)
+        self.surface = detached_mesh.DetachedMesh(obj, depsgraph)
+        self.points, self.triangles = self.surface.points, _triangles(evaluated.data, linear)
         shape = (self.points, self.triangles, self.offset)
         self.facts = {
             "name": _name_of(obj, path),
@@ -80,6 +79,14 @@ def _facts(obj: Any, path: str) -> dict[str, Any]:
 
 def _name_of(obj: Any, path: str) -> str:
     return obj.name if Path(path).suffix.lower() in SCENES else Path(path).stem
+
+
+def _triangles(mesh: Any, linear: Any) -> Any:
+    """Indices of a mesh's vertices, (m, 3), counterclockwise from outside after that transform."""
+    mesh.calc_loop_triangles()
+    found = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", found.ravel())
+    return found[:, ::-1] if np.linalg.det(linear) < 0.0 else found
 
 
 def _unit() -> float | None:

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -126,25 +126,26 @@ def scheduler(port):
         )
         for name, *more in words
     ]
-    try:
-        yield address
-    finally:
+
+    def end():
         for process in running:
             process.kill()
             process.wait()
 
+    try:
+        yield address, end
+    finally:
+        end()
+
 
 def test_a_scheduler_that_is_started_again_goes_on(command, objects, plain, tmp_path, in_the_middle):
-    from contextlib import ExitStack
-
     port = free_port()
-    with ExitStack() as second:
-        first = ExitStack()
-        address = first.enter_context(scheduler(port))
+    with ExitStack() as running:
+        address, end = running.enter_context(scheduler(port))
 
         def restart():
-            first.close()
-            second.enter_context(scheduler(port))
+            end()
+            running.enter_context(scheduler(port))
 
         in_the_middle(tmp_path, restart)
         assert command(objects, *FEW, "--output", tmp_path, scheduler=address)[0] == 0
@@ -158,6 +159,18 @@ def test_no_scheduler_there_is_said(command, objects, tmp_path, monkeypatch):
     address = f"tcp://127.0.0.1:{free_port()}"
     code, _, error = command(objects, *FEW, "--output", tmp_path, scheduler=address)
     assert code == 1 and f'no scheduler answers at "{address}"' in error
+
+
+def test_a_scheduler_that_stays_away_ends_the_run(command, objects, tmp_path, in_the_middle, monkeypatch):
+    from cluster import engine
+
+    monkeypatch.setattr(engine, "CONNECT", 8.0)
+    with scheduler(free_port()) as (address, end):
+        in_the_middle(tmp_path, end)
+        code, _, error = command(objects, *FEW, "--output", tmp_path, scheduler=address)
+    assert code == 1
+    assert error.endswith("cluster: the scheduler is gone: start it again, and then this command\n")
+    assert blocks_of(tmp_path) and nothing_is_aside(tmp_path)
 
 
 def test_broken_and_empty_files_and_one_that_blender_dies_of_are_error_rows(command, objects, tmp_path):
