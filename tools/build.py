@@ -18,6 +18,7 @@ import sys
 import tempfile
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import markdown
 
@@ -38,6 +39,8 @@ pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
 LEAD = """<!doctype html><meta charset="utf-8"><title>Tactile Patch</title>
 <meta http-equiv="refresh" content="0; url=viewport.html#{}">
 """
+# By the Python of the wheels, the first Blender that has it, and the first that has it no more.
+SERIES = {"311": ("4.5.0", "5.1.0"), "313": ("5.1.0",)}
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}
 
 
@@ -49,6 +52,9 @@ def main() -> None:
         default="host",
         help="all: a zip for every platform; host (default): one for this platform; "
         "none: one without scipy, for a Blender whose Python has it",
+    )
+    parser.add_argument(
+        "--each-series", action="store_true", help="a zip for each series of Blender too, of half the size"
     )
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "dist", metavar="DIR")
     args = parser.parse_args()
@@ -67,18 +73,39 @@ def main() -> None:
     for wheel in wheels:
         download(ROOT / wheel)
     args.output.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=args.output) as folder:
-        source, output = Path(folder, "source"), Path(folder, "zip")
+    if not args.each_series:
+        build(tool, manifest, platforms, wheels, args.output)
+        return
+    for python, series in SERIES.items():
+        of_python = [wheel for wheel in wheels if f"-cp{python}-" in wheel]
+        supported = {wheel_platform(wheel) for wheel in of_python}
+        chosen = [name for name in platforms if name in supported]
+        if chosen:
+            build(tool, manifest, chosen, of_python, args.output, series)
+
+
+def build(
+    tool: Path,
+    manifest: dict[str, Any],
+    platforms: list[str],
+    wheels: list[str],
+    folder: Path,
+    series: tuple[str, ...] = (),
+) -> None:
+    """Make a zip for each platform, for a series of Blender or all; for no platform one without wheels."""
+    with tempfile.TemporaryDirectory(dir=folder) as temporary:
+        source, output = Path(temporary, "source"), Path(temporary, "zip")
         output.mkdir()
-        stage(source, platforms, wheels)
+        stage(source, platforms, wheels, series)
         run(tool, "validate", source)
         if platforms:
             run(tool, "build", "--source-dir", source, "--output-dir", output, "--split-platforms")
         else:
             name = f"{manifest['id']}-{manifest['version']}-nowheels.zip"
             run(tool, "build", "--source-dir", source, "--output-filepath", output / name)
+        mark = f"-blender{series[0].removesuffix('.0')}" if series else ""
         for path in sorted(output.iterdir()):
-            print(shutil.move(path, args.output / path.name))
+            print(shutil.move(path, folder / f"{path.stem}{mark}.zip"))
 
 
 def host_platform() -> str:
@@ -125,8 +152,8 @@ def download(wheel: Path) -> None:
         Path(folder, wheel.name).replace(wheel)
 
 
-def stage(folder: Path, platforms: list[str], wheels: list[str]) -> None:
-    """Lay out what ships in `folder`, its manifest cut down to these platforms and wheels."""
+def stage(folder: Path, platforms: list[str], wheels: list[str], series: tuple[str, ...] = ()) -> None:
+    """Lay out what ships in `folder`, its manifest cut down to these platforms, wheels and Blenders."""
     for name in SHIPPED:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name)
@@ -144,6 +171,11 @@ def stage(folder: Path, platforms: list[str], wheels: list[str]) -> None:
         array = f"{key} = {json.dumps(values)}\n" if values else ""
         text = re.sub(rf"^{key} = \[[^]]*\]\n", array, text, flags=re.MULTILINE)
         expected[key] = values
+    limits = dict(zip(("blender_version_min", "blender_version_max"), series, strict=False))
+    if limits:
+        lines = "".join(f'{key} = "{value}"\n' for key, value in limits.items())
+        text = re.sub(r"^blender_version_min = .*\n", lines, text, flags=re.MULTILINE)
+        expected |= limits
     # The text is edited to keep all the rest as it is written; this notices if it was written so
     # that the edit missed.
     if tomllib.loads(text) != {key: value for key, value in expected.items() if value}:
