@@ -93,7 +93,7 @@ zip: $(READY)
 
 release: $(READY)
 	@$(VENV_PY) -m tools.release
-	@$(VENV_PY) -m tools.try_release build/release/*
+	@$(VENV_PY) -m tools.try_release
 
 zip-nowheels: $(READY)
 	$(VENV_PY) tools/build.py --wheels none

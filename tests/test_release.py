@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import build, release
+from tools import build, check_site, release
 
 ROOT = Path(__file__).resolve().parents[1]
 CHANGES = "# Changelog\n\n## [1.2.0] - {}\n\n### Added\n\n- More.\n\n## [1.1.0] - 2026-01-02\n\n- Less.\n"
@@ -75,6 +75,14 @@ def test_checksums_are_those_of_the_zips(tmp_path):
     lines = (tmp_path / "SHA256SUMS").read_text().splitlines()
     wanted = [("a.zip", b"a"), ("repository/b.zip", b"b")]
     assert lines == [f"{hashlib.sha256(data).hexdigest()}  {name}" for name, data in wanted]
+
+
+def test_the_manual_that_ships_leads_nowhere_else(tmp_path):
+    build.write_manual(tmp_path / "manual")
+    assert list(check_site.problems(tmp_path / "manual")) == []
+    text = (tmp_path / "manual" / "viewport.html").read_text(encoding="utf-8")
+    assert 'href="messages.html"' in text
+    assert ".md" not in text
 
 
 def test_a_zip_of_a_series_has_its_wheels_and_its_blenders_and_no_other(tmp_path, monkeypatch):

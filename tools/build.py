@@ -27,8 +27,9 @@ MANIFEST = ROOT / "blender_manifest.toml"
 # Blender's pattern list can only exclude, so what ships is named: nothing else lying in a checkout,
 # an environment or a scan, can get into a release.
 SHIPPED = ("__init__.py", "LICENSE", "core", "presets", "tactile_addon")
-# The page that Blender's Online Manual opens, made into HTML, and its pictures.
-MANUAL = ROOT / "docs" / "viewport.md"
+# The page that Blender's Online Manual opens, and those that it leads to, made into HTML with their pictures.
+DOCS = ROOT / "docs"
+MANUAL = ("viewport", "lesson", "messages")
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Tactile Patch</title>
 <style>body {{ max-width: 50em; margin: 2em auto; padding: 0 1em; font: 1rem/1.5 sans-serif; }}
 img {{ max-width: 100%; }} td, th {{ padding: 0.2em 1em 0.2em 0; text-align: left; }}
@@ -184,16 +185,27 @@ def stage(folder: Path, platforms: list[str], wheels: list[str], series: tuple[s
 
 
 def write_manual(folder: Path) -> None:
-    """The manual as a page of HTML, with the pictures it shows."""
+    """The manual as pages of HTML, with the pictures they show."""
     folder.mkdir()
-    text = MANUAL.read_text(encoding="utf-8")
-    body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
-    (folder / "viewport.html").write_text(PAGE.format(body), encoding="utf-8")
-    # Windows opens files without what stands behind the "#", so each section has a page that leads to it.
-    for section in re.findall(r'<h[23] id="(.+?)"', body):
-        (folder / f"{section}.html").write_text(LEAD.format(section), encoding="utf-8")
-    for picture in re.findall(r"!\[.*?\]\((.+?)\)", text):
-        shutil.copy2(MANUAL.parent / picture, folder)
+    for name in MANUAL:
+        text = shipped_links((DOCS / f"{name}.md").read_text(encoding="utf-8"))
+        body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
+        (folder / f"{name}.html").write_text(PAGE.format(body), encoding="utf-8")
+        for picture in re.findall(r"!\[.*?\]\((.+?)\)", text):
+            shutil.copy2(DOCS / picture, folder)
+        # Windows opens files without what stands behind the "#", so each section has a page that leads to it.
+        for section in re.findall(r'<h[23] id="(.+?)"', body) if name == MANUAL[0] else []:
+            (folder / f"{section}.html").write_text(LEAD.format(section), encoding="utf-8")
+
+
+def shipped_links(text: str) -> str:
+    """Markdown whose links to other pages of the docs lead to HTML, or are words where those do not ship."""
+
+    def lead(found: re.Match[str]) -> str:
+        words, name, anchor = found.groups()
+        return f"[{words}]({name}.html{anchor})" if name in MANUAL else words
+
+    return re.sub(r"(?<!!)\[([^\]]+)\]\((\w+)\.md(#[\w-]+|)\)", lead, text)
 
 
 def run(tool: Path, *arguments: str | Path) -> None:

@@ -31,7 +31,7 @@ def main() -> None:
     if reasons:
         sys.exit("\n".join(f"release: {reason}" for reason in reasons))
     version = manifest_version(ROOT)
-    folder = ROOT / "build" / "release" / version
+    folder = folder_of_version()
     shutil.rmtree(folder, ignore_errors=True)
     run("tools/build.py", "--wheels", "all", "--output", folder)
     run("tools/build.py", "--wheels", "none", "--output", folder)
@@ -42,6 +42,11 @@ def main() -> None:
     write_checksums(folder)
     for path in sorted(folder.rglob("*.*")):
         print(f"{path.stat().st_size / 1e6:7.1f} MB  {path.relative_to(ROOT)}")
+
+
+def folder_of_version() -> Path:
+    """Where the release of this checkout's version is, or will be."""
+    return ROOT / "build" / "release" / manifest_version(ROOT)
 
 
 def manifest_version(root: Path) -> str:

@@ -11,24 +11,25 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tools import blender, build
+from tools import blender, build, release
 
 REPOSITORY = "tried"
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("release", type=Path, help="the folder that make release has written")
-    release = parser.parse_args().release.resolve()
+    help = "the folder that make release has written (that of this version)"
+    parser.add_argument("release", nargs="?", type=Path, default=release.folder_of_version(), help=help)
+    folder = parser.parse_args().release.resolve()
     with tempfile.TemporaryDirectory() as user:
         os.environ["BLENDER_USER_RESOURCES"] = user  # read on import of bpy
         import bpy
 
         print(f"Blender {bpy.app.version_string}, Python {sys.version.split()[0]}")
         with blender.quiet():
-            install_from(bpy, (release / "repository" / "index.json").as_uri())
+            install_from(bpy, (folder / "repository" / "index.json").as_uri())
         touch(bpy, f"bl_ext.{REPOSITORY}.tactile_patch", "the repository")
-        (path,) = release.glob(f"*-{build.host_platform().replace('-', '_')}.zip")
+        (path,) = folder.glob(f"*-{build.host_platform().replace('-', '_')}.zip")
         with blender.quiet():
             bpy.ops.extensions.package_uninstall(repo_index=index_of(bpy), pkg_id="tactile_patch")
             bpy.ops.extensions.package_install_files(
