@@ -157,7 +157,7 @@ def _section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float
             return None
         try:
             (x, y, z), (nx, ny, nz) = hit
-            # Of NaN nothing is true.
+            # NaN fails every comparison, so it is refused too.
             sound = abs(x) + abs(y) + abs(z) <= LARGEST and abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-2
         except (TypeError, ValueError, OverflowError):
             sound = False

@@ -10,7 +10,6 @@ from ..comparison.verify_operator import TACTILE_OT_verify
 from ..probes import probe
 from ..probes.probe_operators import (
     TACTILE_OT_add_plane,
-    TACTILE_OT_add_planes,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
     TACTILE_OT_share_range,
@@ -77,7 +76,7 @@ def _draw_planes(layout, settings):
     heading = column.row(align=True)
     for text in ("Azimuth", "Tilt"):
         heading.label(text=text)
-    heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
+    heading.label(icon="BLANK1")  # above the buttons of the rows
     for i in range(settings.plane_count):
         row = column.row(align=True)
         row.use_property_split = False
@@ -127,7 +126,6 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if found is not None:
             draw_rows(layout, plane_rows(record, unit), active=not is_outdated)
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
-            layout.operator(TACTILE_OT_add_planes.bl_idname, icon="PLUS")
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):

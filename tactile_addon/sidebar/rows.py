@@ -78,7 +78,7 @@ def draw_rows(layout, rows, active=True):
 
 
 def draw_sentence(context, layout, sentence, icon):
-    """As many lines as the sidebar's width needs."""
+    """Draws a sentence in as many lines as the sidebar's width needs."""
     letters = context.region.width / (6.5 * context.preferences.system.ui_scale) - 8.0
     column = layout.column(align=True)
     column.scale_y = 0.8

@@ -20,7 +20,7 @@ from core import (
 from core.bayes import residual_evidence
 from core.bayes.evidence import USUAL_WAVINESS, prior_variances
 from core.bayes.posterior import DISK, FREE, nodes
-from core.bayes.residual_evidence import FREE_VARIANCE, Touch, fitted, system_of
+from core.bayes.residual_evidence import FREE_VARIANCE, Observations, fitted, system_of
 from core.bayes.rough_fit import QUARTIC_SHARE
 from core.patch import residual
 from core.patch.monge import TERMS, exponents, monomials
@@ -80,7 +80,7 @@ def test_the_mean_alone_is_that_of_the_posterior(weight):
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     contacts = np.column_stack([flat, rough(3)(flat)])
     weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
-    touch = Touch(contacts, weights, 1e-3, 4e-3, None)
+    touch = Observations(contacts, weights, 1e-3, 4e-3, None)
     system = system_of(touch)
     size = residual_evidence.sizes(touch, system)
     mean = residual_evidence.mean_given(touch, system, size)
@@ -120,7 +120,7 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     _, r = touched(noise=noise)
     contacts, (x, y, z) = r.contacts / r.radius, r.contacts.T / r.radius
     sizes = np.array([4e-4, 9e-4])
-    touch = Touch(contacts, np.ones(len(x)), noise, noise, None)
+    touch = Observations(contacts, np.ones(len(x)), noise, noise, None)
     residual = fitted(touch, system_of(touch), sizes, noise)
     variances = np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(USUAL_WAVINESS))])
     places, points = contacts[:, :2], over(r) / r.radius
@@ -181,7 +181,7 @@ def test_the_point_is_a_contact_like_the_others():
 
 
 def test_a_point_above_its_surroundings_bends_no_curvature():
-    """As where a vertex of facets is touched: all contacts but the point are lower by a noticeable length."""
+    """All contacts but the point are noticeably lower, as where a vertex of facets is touched."""
     for seed in range(4):
         _, r = touched(seed)
         lower = []

@@ -297,7 +297,7 @@ def test_whether_contacts_are_enough_is_no_matter_of_the_unit(noise):
 
 
 def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
-    """By another fit: the deviation with as many contacts more, between those there are."""
+    """The deviation, by another fit, with as many contacts more, between those there are."""
     surface = surfaces.torus(40, 20, 0.6)
     for step, noise in ((0.5, 0.05), (2.0, 0.05), (3.0, 0.2), (1.0, 0.01)):
         planes = surfaces.planes((0, 60, 120))

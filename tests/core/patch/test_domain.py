@@ -107,7 +107,7 @@ def test_lengths_scale():
 
 @pytest.mark.parametrize("others", [[(-1.0, 0.2), (-0.9, -0.3)], [(0.9, 0.1), (0.8, -0.1)]])
 def test_two_ends_in_one_direction_bound_what_the_farther_does(others):
-    """As where a curve comes back over itself; the spline through both would turn back."""
+    """A curve comes back over itself; the spline through both ends would turn back."""
     domain = closed_spline_domain([(1.0, 0.5), (0.02, 0.01), (0.5, 0.25), *others], 1.0)
     azimuths, radii = domain._polar
     assert np.isfinite(radii).all()

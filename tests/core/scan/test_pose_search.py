@@ -18,6 +18,7 @@ TURN, SHIFT = Rotation.from_euler("xyz", (0.7, -1.1, 2.3)).as_matrix(), np.array
 WAVES = ((1.0, (0.27, 0.08, -0.14), 0.4), (0.8, (-0.1, 0.3, 0.19), 1.9), (0.9, (0.16, -0.19, 0.24), 3.0))
 
 
+@cache
 def ball(count=10000):
     """Points all over the unit sphere (n, 3), and counterclockwise triangles."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
@@ -58,8 +59,9 @@ def bumpy():
     return surface, vertices, faces
 
 
+@cache
 def touch(surface, *, side=1.0, factor=1.0, noise=0.0):
-    """Of `surface`, scaled by `factor`, moved to where TURN and SHIFT bring it back; reconstructed."""
+    """A reconstruction of `surface`, scaled by `factor`, moved to where TURN and SHIFT bring it back."""
     lengths = {"extent": 10.0, "step": 0.8, "noise": noise, "rng": 3}
     contours = surface.track(PLANES, **lengths)
     moved = [Contour((factor * c.points - SHIFT) @ TURN, noise=factor * noise) for c in contours]
@@ -67,7 +69,7 @@ def touch(surface, *, side=1.0, factor=1.0, noise=0.0):
 
 
 def off(pose, r, point, turn=TURN):
-    """By how much a pose misses: in place, and in degrees."""
+    """How far a pose misses: in place, and in degrees."""
     place = pose.rotation @ r.frame.origin + pose.translation
     angle = np.arccos(np.clip((np.sum(turn * pose.rotation) - 1.0) / 2.0, -1.0, 1.0))
     return np.linalg.norm(place - point), np.degrees(angle)
@@ -101,7 +103,7 @@ def test_the_residual_is_the_distance_of_the_contacts_to_the_mesh():
     corners = 26.0 * directions[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    # Of a convex body, nearly, for contacts that are nearly on it.
+    # The distance to a convex body is that of its farthest plane, for contacts that are nearly on it.
     heights = np.max(np.einsum("nfi,fi->nf", contacts[:, None] - corners[None, :, 0], normals), axis=1)
     assert pose.residual == pytest.approx(np.sqrt(np.mean(heights**2)), rel=0.02)
 
@@ -248,7 +250,7 @@ def test_few_triangles_are_enough():
 def test_noise_shifts_a_pose_by_a_20th_of_the_radius_or_turns_it_by_2_degrees(
     monkeypatch, turning, shifting, slides
 ):
-    """Of contacts whose distances grow by so many times three least residuals then."""
+    """Distances grow by so many times three least residuals where contacts turn or shift."""
     growth = np.repeat([turning / np.radians(2.0), shifting / 0.05], 3) * 3e-3
     monkeypatch.setattr(
         pose_search, "mesh_distances", lambda *_: (np.zeros((1, 6, 1)), np.diag(growth)[None])

@@ -58,7 +58,7 @@ def seen(r, surface, vertices, normals):
 
 
 class Cut:
-    """Of a surface, what is on one side of a plane; with `roof`, something over the rest as well."""
+    """What is of a surface on one side of a plane; with `roof`, something over the rest as well."""
 
     def __init__(self, surface, origin, direction, roof=None):
         self.surface, self.origin, self.direction, self.roof = surface, origin, direction, roof
@@ -244,7 +244,7 @@ def test_bad_vertices_are_refused():
 
 
 def test_overlap_is_a_share_of_the_area_which_is_more_where_the_patch_is_steep():
-    """Of a cap of a sphere, the ring that is below a plane across its normal."""
+    """The surface is the ring of a sphere's cap that is below a plane across its normal."""
     surface, extent = surfaces.sphere(30), 27.0
     contours = surface.track(surfaces.planes((0, 60, 120)), extent=extent, step=1.5)
     r = surface.fit(contours, degree=6)
