@@ -143,6 +143,8 @@ def _add_method(add):
 def _add_output(add, help):
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
     add("--output", type=Path, metavar="OUT", help=help)
+    help = "write a page for a browser: pictures, deviations, tolerance bands, settings, versions"
+    add("--report", type=Path, metavar="HTML", help=help)
 
 
 def _is_number(text):

@@ -48,7 +48,10 @@ def test_colors_show_what_is_chosen(empty, ball):
     ("inputs", "message"),
     [
         ({"tolerance": -1.0}, "The tolerance is a length of 0 or more, got"),
-        ({"tolerance": 0.01, "noise": 0.02}, r"The tolerance 0.01 m is below the noise 0.02 m: take a larger one"),
+        (
+            {"tolerance": 0.01, "noise": 0.02},
+            r"The tolerance 0.01 m is below the noise 0.02 m: take a larger one",
+        ),
         ({"edge": float("nan")}, "The edge is a length of 0 or more, got"),
     ],
 )
@@ -66,11 +69,11 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball):
     assert record["uncovered"] > 0
 
 
-def test_nothing_begins_on_a_sheet_of_creases(empty):
-    empty.ops.mesh.primitive_cube_add(size=2.0)
+def test_nothing_begins_at_the_corners_of_a_sheet(empty):
+    empty.ops.mesh.primitive_plane_add(size=2.0)
     before = datablocks(empty)
     with pytest.raises(RuntimeError, match="No touch could begin: choose another location"):
-        empty.ops.tactile.touch_all_over(tolerance=1e-3)  # its vertices are its corners
+        empty.ops.tactile.touch_all_over(tolerance=1e-3)  # it has no other vertices
     assert datablocks(empty) == before
 
 
