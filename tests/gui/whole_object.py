@@ -77,7 +77,7 @@ def by_dialog():
     before = data_blocks()
     yield from start(target="Target")
     check("the dialog starts it", running())
-    yield from until(lambda: any("Touches" in name for name in bpy.data.objects.keys()), 20)
+    yield from until(lambda: any("Touches" in obj.name for obj in bpy.data.objects), 20)
     yield 1
     picture("whole_growing")
     yield from until(lambda: not running(), 120)
@@ -87,7 +87,7 @@ def by_dialog():
     record = surface["tactile_object"].to_dict()
     check("... that covers the object", record["uncovered"] == 0, record)
     check("... and is near it", record["deviation_mean"] < 2e-3 * record["size"], record)
-    left = [name for name in bpy.data.objects.keys() if name.endswith("Touches")]
+    left = [obj.name for obj in bpy.data.objects if obj.name.endswith("Touches")]
     check("... and the growing patches are gone", not left, left)
     slowest = max(range(len(SLICES)), key=SLICES.__getitem__)
     print(f"a redraw waits {1e3 * SLICES[slowest]:.0f} ms at most, at {slowest} of {len(SLICES)}", flush=True)
