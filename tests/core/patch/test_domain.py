@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from core.patch.domain import closed_spline_domain
+from core.patch.domain import closed_spline_domain, hull_domain
 
 
 def circle(angles, radius=1.0):
@@ -114,3 +114,13 @@ def test_two_ends_in_one_direction_bound_what_the_farther_does(others):
     assert (np.diff(azimuths) > 0.0).all()
     assert np.isfinite(domain.area)
     assert domain.contains(0.5, 0.25)
+
+
+def test_the_domain_of_scattered_contacts_is_their_hull():
+    rng = np.random.default_rng(0)
+    points = np.vstack([circle(np.arange(0, 360, 5), 2.0), rng.uniform(-1.0, 1.0, (50, 2))])
+    domain = hull_domain(points, 2.0)
+    assert domain.area == pytest.approx(4.0 * np.pi, rel=0.01)
+    assert np.hypot(*domain.boundary(100).T) == pytest.approx(2.0, rel=0.01)
+    with pytest.raises(ValueError, match="points: wanted the origin among them"):
+        hull_domain(points + np.array([1.95, 0.0]), 2.0)

@@ -133,6 +133,15 @@ def test_a_covariance_that_is_none_is_refused(sign):
         from_dict(d)
 
 
+def test_a_covariance_that_is_hardly_skew_is_refused():
+    d = to_dict(touched(noise=0.0))
+    covariance = np.array(d["posterior"]["covariance"])
+    covariance[20, 3] += 1e-6 * np.abs(covariance).max()
+    d["posterior"]["covariance"] = covariance.tolist()
+    with pytest.raises(ValueError, match="covariance: wanted a symmetric matrix"):
+        from_dict(d)
+
+
 def rough():
     """A dict with a residual, of contacts on waves that no sextic follows."""
     t, contours = np.linspace(-1.0, 1.0, 31), []
