@@ -32,7 +32,7 @@ from .reconstruction.serialization import from_dict, to_dict
 from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
 from .scan.sampling import spaced, spaced_count
-from .scan.verification import reachable, verify
+from .scan.verification import reachable, verify, verifying
 
 __all__ = [
     "CREASE",
@@ -75,5 +75,6 @@ __all__ = [
     "to_dict",
     "track",
     "verify",
+    "verifying",
     "with_height_stds",
 ]

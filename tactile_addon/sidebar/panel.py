@@ -114,6 +114,8 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_range(context, layout, patch, record)
+        if is_outdated:  # of these numbers
+            layout.label(text="Last Touch")
         draw_rows(layout, main_rows(record, unit), active=not is_outdated)
         _draw_details(context, layout, record, unit)
         layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
@@ -123,7 +125,9 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if "registration" in record:
             draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
         if "verification" in record:
-            _draw_verification(layout, record["verification"], unit)
+            column = layout.column()
+            column.active = not is_outdated
+            _draw_verification(column, record["verification"], unit)
         if found is not None:
             draw_rows(layout, plane_rows(record, unit), active=not is_outdated)
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
