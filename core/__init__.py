@@ -36,7 +36,7 @@ from .reconstruction.serialization import from_dict, to_dict
 from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
-from .scan.verification import reachable, verify
+from .scan.verification import reachable, verify, verifying
 
 __all__ = [
     "CREASE",
@@ -86,5 +86,6 @@ __all__ = [
     "touch_all_over",
     "track",
     "verify",
+    "verifying",
     "with_height_stds",
 ]

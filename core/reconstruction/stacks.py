@@ -16,7 +16,7 @@ from ..contours.contour import Contour
 from ..contours.curves import Curves, misses
 from ..contours.local_geometry import DegenerateCurvesError, Frame
 from ..paper.by_method import coefficients
-from ..patch.domain import Domain, hull_domain
+from ..patch.domain import hull_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import DEGREE, MongePatch
 from ..patch.residual import Residual
@@ -184,7 +184,7 @@ def _result(
     touch: _Parts, contours: Sequence[Contour], options: Options
 ) -> Reconstruction | DegenerateCurvesError:
     try:
-        domain = domain_of(touch.curves) if contours else hull_domain(touch.strokes[:, :2], 1.0)
+        domain = domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)
     except ValueError:
         return DegenerateCurvesError(
             "the curves end in fewer than three places apart from each other, so they bound no patch: "
@@ -201,7 +201,7 @@ def _result(
         patch = touch.posterior.patch(touch.degree)
     scale = touch.radius
     surface = patch if touch.posterior is None else touch.posterior.patch(DEGREE)
-    domain = Domain(domain.ends * scale)
+    domain = domain.scaled(scale)
     return Reconstruction(
         Geometry(touch.frame, scale, surface.scaled(scale), domain, touch.residual),
         patch.scaled(scale),

@@ -127,6 +127,8 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_range(context, layout, patch, record)
         _draw_shown(layout, found, patch)
+        if is_outdated:  # of these numbers
+            layout.label(text="Last Touch")
         draw_rows(context, layout, main_rows(record, unit), active=not is_outdated)
         _draw_details(context, layout, record, unit)
         layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
@@ -136,7 +138,9 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if "registration" in record:
             draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
         if "verification" in record:
-            _draw_verification(context, layout, record["verification"], unit)
+            column = layout.column()
+            column.active = not is_outdated
+            _draw_verification(context, column, record["verification"], unit)
         if found is not None:
             draw_rows(context, layout, plane_rows(record, unit), active=not is_outdated)
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
