@@ -68,9 +68,9 @@ def _wall(
 ) -> tuple[_Wall, NDArray[np.bool_]]:
     """The blend of the active pairs that face the way of the nearest at each place, and which they are."""
     which = np.flatnonzero(active)
-    place, node, share, distance, normal, std = pairs.chosen(which)
+    place, node, out, distance, normal, std = pairs.chosen(which)
     radius = charts.radii[node]
-    nearest = _first(place, np.abs(distance) + 0.5 * LAYER * radius * share**2, count)
+    nearest = _first(place, np.abs(distance) + 0.5 * LAYER * radius * out**2, count)
     r = nearest[place]
     cosine = np.einsum("mi,mi->m", normal, normal[r])
     agree = np.clip((cosine - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)

@@ -9,6 +9,7 @@ down, back and up, each from where the last one ended: so it bumps into walls an
 
 import heapq
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -32,7 +33,7 @@ DISK = 36  # places around it that tell how much
 SLIVER = 0.03  # of the disk: less is bridged by what blends patches
 TRIES = 3  # touches that a place of a rim is worth
 APART = 2.2  # radii between touches that are made side by side
-GRAZING = 0.2  # cosine between ray and normal, below which its sign is none
+LOW = 0.1  # of the radius, that the finger is above a place when it comes down
 ABOVE = 0.6  # of the radius, that the finger is above what it feels around
 HAIR = 0.02  # of a reach, that the finger is above the surface
 
@@ -64,10 +65,13 @@ class Next(NamedTuple):
 class Frontier:
     """What was felt, and the places of its rims, by an area that touches there bring at most.
 
+    side : 1 where the surface's normals are on the side of the finger, -1 where they are on the other
+
     What a touch brings only becomes less, so that no other need be asked anew before it is the first.
     """
 
     surface: Surface
+    side: float
     charts: Charts | None = None
     queue: list[tuple[float, int, Place]] = field(default_factory=list)
     pushed: int = 0
@@ -123,7 +127,7 @@ class Frontier:
         if place.tries >= TRIES:
             return None
         for share in REACHES:
-            contact = contact_ahead(self.surface, place, share * place.radius)
+            contact = self.ahead(place, share * place.radius)
             if contact is None or self.covered(*contact):
                 continue
             radius = min(1.0, DISK_REACHES * share) * place.radius
@@ -131,6 +135,35 @@ class Frontier:
             if gain > SLIVER * math.pi * radius**2:
                 return Next(np.array(middle[0]), np.array(middle[1]), gain, place)
         return None
+
+    def felt(self, hit: tuple[Sequence[float], Sequence[float]]) -> Contact:
+        """A hit with the normal on the side of the finger."""
+        return vector_of(np.asarray(hit[0])), scaled(vector_of(np.asarray(hit[1])), self.side)
+
+    def ahead(self, place: Place, s: float) -> Contact | None:
+        """The first contact of a finger that goes s ahead from a place, then down, back and up."""
+        up, down, t = place.normal, scaled(place.normal, -1.0), place.ahead
+        height = min(s, LOW * place.radius)
+        for start in (0.0, -0.5 * s):  # the patch may end a little beyond its surface
+            found = self.toward(along(along(place.point, up, height), t, start), down, 2.0 * height)
+            if found is not None:
+                break
+        else:
+            return None
+        at = along(found[0], up, HAIR * place.radius)
+        for way, length in ((t, s), (down, 1.5 * s), (scaled(t, -1.0), 2.5 * s), (up, 1.5 * s)):
+            hit = self.surface.ray_cast(at, way, length)
+            if hit is not None:
+                contact = self.felt(hit)
+                return contact if dot(contact[1], way) < 0.0 else None
+            at = along(at, way, length)
+        return None
+
+    def toward(self, start: Vector, way: Vector, length: float) -> Contact | None:
+        """The first contact on a ray; none at the back of a surface: there the finger would be inside."""
+        hit = self.surface.ray_cast(start, way, length)
+        contact = None if hit is None else self.felt(hit)
+        return contact if contact is not None and dot(contact[1], way) < 0.0 else None
 
     def covered(self, point: Vector, normal: Vector) -> bool:
         """Whether a place lies inside a patch that faces its way."""
@@ -155,23 +188,25 @@ class Frontier:
         down = scaled(normal, -1.0)
         above = self.surface.ray_cast(along(point, normal, HAIR * radius), normal, ABOVE * radius)
         height = ABOVE * radius if above is None else 0.5 * math.dist(point, above[0])
-        side = self.side(point, normal, height)
         hits = [contact]
         for offset in _disk(normal, place.ahead) * radius:
             start = along(along(point, normal, height), vector_of(offset), 1.0)
             hit = self.surface.ray_cast(start, down, height + ABOVE * radius)
-            if hit is not None and side * dot(vector_of(np.asarray(hit[1])), normal) > FACING:
-                hits.append((vector_of(np.asarray(hit[0])), scaled(vector_of(np.asarray(hit[1])), side)))
+            felt = None if hit is None else self.felt(hit)
+            if felt is not None and dot(felt[1], normal) > FACING:
+                hits.append(felt)
         points, normals = np.array([h[0] for h in hits]), np.array([h[1] for h in hits])
         new = np.flatnonzero(~self.is_covered(points, normals))
         off = points[new] - points[new].mean(axis=0)
         middle = hits[new[np.argmin((off**2).sum(axis=1))]]
         return len(new) / (DISK + 1) * math.pi * radius**2, middle
 
-    def side(self, point: Vector, normal: Vector, height: float) -> float:
-        """1 where the surface's normals are on the side of the finger, -1 where they are on the other."""
-        hit = self.surface.ray_cast(along(point, normal, height), scaled(normal, -1.0), 2.0 * height)
-        return 1.0 if hit is None else math.copysign(1.0, dot(vector_of(np.asarray(hit[1])), normal))
+
+def side_of(surface: Surface, point: Array, outward: Array, reach: float) -> float:
+    """1 where the surface's normals at a point are on the side of `outward`, -1 where on the other."""
+    up = vector_of(outward)
+    hit = surface.ray_cast(along(vector_of(point), up, reach), scaled(up, -1.0), 2.0 * reach)
+    return 1.0 if hit is None else math.copysign(1.0, dot(vector_of(np.asarray(hit[1])), up))
 
 
 def _is_near(place: Place, touch: Next) -> bool:
@@ -204,26 +239,3 @@ def rim_of(chart: Charts, r: Reconstruction) -> list[Place]:
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
     each = zip(points, normals, ahead, strict=True)
     return [Place(vector_of(p), vector_of(n), vector_of(t), r.radius) for p, n, t in each]
-
-
-def contact_ahead(surface: Surface, place: Place, s: float) -> Contact | None:
-    """The first contact of a finger that goes s ahead from a place, then down, back and up."""
-    up, down, t = place.normal, scaled(place.normal, -1.0), place.ahead
-    for start in (0.0, -0.5):  # the patch may end a little beyond its surface
-        found = surface.ray_cast(along(along(place.point, up, s), t, start * s), down, 2.0 * s)
-        if found is not None:
-            break
-    else:
-        return None
-    at = along(vector_of(np.asarray(found[0])), up, HAIR * s)
-    side = math.copysign(1.0, dot(vector_of(np.asarray(found[1])), up))
-    for way, length in ((t, s), (down, 1.5 * s), (scaled(t, -1.0), 2.5 * s), (up, 1.5 * s)):
-        hit = surface.ray_cast(at, way, length)
-        if hit is not None:
-            normal = vector_of(np.asarray(hit[1]))
-            against = dot(normal, way)
-            if abs(against) > GRAZING:  # the finger comes from outside
-                side = -math.copysign(1.0, against)
-            return vector_of(np.asarray(hit[0])), scaled(normal, side)
-        at = along(at, way, length)
-    return None

@@ -12,7 +12,7 @@ from ..arguments import LARGEST, finite_array, number, unit_vector
 from ..contours.tracking import Surface, generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.touches import explore, explore_many
-from .frontier import Frontier, Next
+from .frontier import Frontier, Next, side_of
 from .join import joined
 from .object_atlas import Atlas
 
@@ -60,7 +60,7 @@ def touch_all_over(
         raise ValueError(f"tolerance: wanted the noise {noise:g} or more, got {tolerance:g}")
     wanted = {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance}
     found = [explore(surface, p, up, **wanted)]  # type: ignore[arg-type]
-    frontier = Frontier(surface)
+    frontier = Frontier(surface, side_of(surface, p, up, found[0].step))
     frontier.add(found[0].result)
     more = yield Progress(1, len(frontier.queue), tuple(found))
     while more is not False and len(found) < most:
