@@ -47,6 +47,28 @@ def spaced_count(area: float, spacing: float) -> int:
     return max(1, round(JAMMED * area / spacing**2))
 
 
+def scattered(
+    points: Array, triangles: NDArray[np.intp], count: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """`count` random points of a mesh, evenly by area, and its unit normals there, (count, 3) each.
+
+    points : (n, 3); triangles : (m, 3), counterclockwise from outside
+
+    Raises ValueError for a mesh without area.
+    """
+    corner, *others = (points[triangles[:, i]] for i in range(3))
+    sides = [other - corner for other in others]
+    normals = np.cross(*sides)
+    areas = np.linalg.norm(normals, axis=1)
+    if not areas.sum() > 0.0:
+        raise ValueError("triangles: wanted some with an area, got none")
+    chosen = rng.choice(len(areas), count, p=areas / areas.sum())
+    shares = rng.random((count, 2))
+    shares = np.where(shares.sum(axis=1, keepdims=True) > 1.0, 1.0 - shares, shares)
+    along = (share[:, None] * side[chosen] for share, side in zip(shares.T, sides, strict=True))
+    return sum(along, corner[chosen]), normals[chosen] / areas[chosen, None]
+
+
 def _one_a_cell(points: Array, size: float) -> NDArray[np.intp]:
     """The first of the points (n, 3) in each cell of a grid."""
     cells = np.floor(points / size)

@@ -20,7 +20,7 @@ from bpy.props import (
 
 from ..scene import patch_object, patch_record
 from ..scene.family import children_of
-from ..touch.settings import OVERRIDABLE, TouchSettings, changed
+from ..touch.settings import OVERRIDABLE, TouchSettings, changed, is_silent
 from . import anchor
 
 DIGEST = "tactile_digest"
@@ -92,11 +92,17 @@ def _appointed(settings, context):
 
 def _chosen(settings, context):
     """A probe that was a child of its target is one of the new target."""
+    if is_silent():  # it is the one that it was, come back, or under another roof
+        forget_targets()
+        return
     settings.lost, probe, record = "", settings.id_data, record_of(settings.id_data)
     before = None if record is None else bpy.data.objects.get(record["source"])
     if settings.target not in (None, before) and before is not None and probe.parent == before:
         anchor.attach(probe, settings.target)
     settings.digest = ""  # Nothing has been felt of this one.
+    patch = patch_of(probe)
+    if patch is not None and patch.is_editable and settings.target != before:
+        anchor.let_go(patch)
     _appointed(settings, context)
 
 

@@ -53,7 +53,7 @@ def evaluated_object(obj, depsgraph):
         evaluated.to_mesh()
         evaluated.to_mesh_clear()
     matrix = np.array(evaluated.matrix_world, dtype=float)
-    _require_invertible(obj.name, matrix[:3, :3])
+    require_invertible(obj.name, matrix[:3, :3])
     if not len(evaluated.data.polygons):
         raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
     return evaluated, matrix[:3, :3], matrix[:3, 3]
@@ -91,7 +91,8 @@ def _coordinates(mesh):
     return co
 
 
-def _require_invertible(name, linear):
+def require_invertible(name, linear):
+    """Raises ValueError, with a sentence, where the linear part (3, 3) of a transform has no inverse."""
     lengths = np.linalg.norm(linear, axis=0)
     if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
         raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')

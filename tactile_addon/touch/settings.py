@@ -62,6 +62,10 @@ def silent():
         _is_silent = False
 
 
+def is_silent():
+    return _is_silent
+
+
 def changed(settings, context):
     """Has the handler look at a probe at once, so that the patch is part of the same undo step."""
     if not _is_silent and isinstance(settings.id_data, Object) and settings.is_probe:
