@@ -372,3 +372,8 @@ def test_the_factor_of_places_is_that_of_their_covariance():
     factor = residual.places_factor(within.copy())
     assert factor @ factor.T == pytest.approx(within, abs=1e-11)
     assert np.array_equal(factor, np.tril(factor))
+
+
+def test_contacts_beside_a_residual_are_known_to_seven_ten_thousandths_of_the_radius_at_best():
+    noises = [float(touched(seed)[1].residual.noise) for seed in range(6)]
+    assert 7e-4 <= min(noises) < 1e-3

@@ -88,6 +88,14 @@ def test_beside_a_short_end_the_boundary_turns_back_nowhere(short):
     assert domain.area == pytest.approx(shoelace, rel=1e-3)
 
 
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_the_area_is_that_within_the_spline(ends):
+    domain = closed_spline_domain(ends, 1.0)
+    x, y = domain.boundary(200_000).T
+    shoelace = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+    assert domain.area == pytest.approx(shoelace, rel=2e-6)
+
+
 def test_a_curve_that_ends_at_the_point_is_no_end():
     domain = closed_spline_domain(np.vstack([circle(SIXTH), [[1e-5, 0.0]], circle([0])]), 1.0)
     assert len(domain.ends) == 6

@@ -16,6 +16,7 @@ X, Y = RNG.uniform(-0.8, 0.8, (2, 50))
 
 
 def test_the_terms_stand_in_the_order_of_equation_1():
+    assert not exponents(3, 4).flags.writeable
     names = ["".join(map(str, term)) for term in exponents(3, 4)]
     assert names == ["30", "21", "12", "03", "40", "31", "22", "13", "04"]
     patch = MongePatch(2.0, 6.0, np.array([0, 0, 0, 0, 0, 0, 0, 5.0, 0]))
