@@ -31,7 +31,7 @@ from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
-from .scan.sampling import spaced, spaced_count
+from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify
 
 __all__ = [
@@ -69,6 +69,7 @@ __all__ = [
     "reconstruct",
     "reconstruct_many",
     "register",
+    "scattered",
     "spaced",
     "spaced_count",
     "suggest_plane",

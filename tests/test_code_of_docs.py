@@ -26,7 +26,10 @@ PAGES = {
 }
 # Other commands: make and benchmarks are looked up by test_docs.py, examples/ is run by test_demo.py.
 ELSEWHERE = ("make ", "sudo apt install ", "git clone ", "python -m benchmarks.", "python examples/")
-ELSEWHERE += ("blender --background scene.blend --python examples/",)
+ELSEWHERE += (
+    "python -m cluster ",
+    "blender --background scene.blend --python examples/",
+)
 RADIUS, TOP = 20.0, np.array([0.0, 0.0, 20.0])  # of the ball that contacts are of
 
 
