@@ -42,7 +42,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     )
     progress: BoolProperty(
         name="Progress",
-        description="Say on standard error how far it is, where there is no window to show it",
+        description="Print progress to stderr, where there is no window to show it",
         options={"HIDDEN", *UNSAVED},
     )
 

@@ -68,6 +68,8 @@ GUI_ARGS="$out/scene.blend" step "the contacts' checks" \
   $gui shot tests/gui/contacts.py "$out/contacts.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the endurance checks" \
   $gui shot tests/gui/endurance.py "$out/endurance.png" 640 480
+GUI_ARGS=examples/sample.blend step "the sample's checks" \
+  $gui shot tests/gui/sample.py "$out/sample.png"
 BLENDER_USER_RESOURCES=build/gui-user-repository GUI_TIMEOUT=240 step "the repository's checks" \
   $gui shot tests/gui/repository.py "$out/repository.png"
 [ -e "$pear" ] || echo "skipped: the scan of a pear, there is no ../shared/data."
