@@ -27,7 +27,8 @@ ZIP := build/tactile_patch.zip
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
 	$(shell find core presets tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo dataset test test-core test-cluster fuzz chart paper stability site film lesson sample zip zip-nowheels clean
+.PHONY: help demo dataset test test-core test-cluster fuzz chart paper stability site film lesson sample zip zip-nowheels \
+	release clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
@@ -45,6 +46,7 @@ help:
 	@echo 'make sample            make examples/sample.blend anew, in Blender 4.5'
 	@echo 'make zip               build the zip files of a release, one for each platform, in build/dist'
 	@echo 'make zip-nowheels      build the zip for a Blender whose own Python has scipy, in build/dist'
+	@echo 'make release           all files of a release, in build/release, if version, changelog and tag agree'
 	@echo 'make clean             remove build; the downloaded wheels stay'
 	@echo 'All take PYTHON=...: 3.11 (tests in Blender 4.5) or 3.13 (Blender 5.2).'
 
@@ -98,6 +100,10 @@ sample: $(ZIP)
 
 zip: $(READY)
 	$(VENV_PY) tools/build.py --wheels all
+
+release: $(READY)
+	@$(VENV_PY) -m tools.release
+	@$(VENV_PY) -m tools.try_release
 
 zip-nowheels: $(READY)
 	$(VENV_PY) tools/build.py --wheels none

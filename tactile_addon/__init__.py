@@ -10,6 +10,7 @@ from . import command_line
 from .comparison import register_operator, verify_operator
 from .files import contact_operators
 from .probes import change_handlers, operators, probe, probe_operators
+from .report import report_operator
 from .scene import color_range
 from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
@@ -25,12 +26,13 @@ CLASSES = (
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,
+    report_operator.TACTILE_OT_export_report,
     rows.TACTILE_OT_copy_value,
     *panel.PANELS,
     preferences.VIEW3D_MT_tactile,
     preferences.TactilePreferences,
 )
-MENUS = (*preferences.MENUS, *contact_operators.MENUS)
+MENUS = (*preferences.MENUS, *contact_operators.MENUS, *report_operator.MENUS)
 _commands, _drawings = [], []
 TOP = str(Path(__file__).resolve().parents[1])  # where presets/ is
 

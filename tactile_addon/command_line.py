@@ -111,6 +111,8 @@ def _add_method(add):
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
     help = "save the scene with the result, .blend; the result alone as .ply; a patch also as .json"
     add("--output", type=Path, metavar="OUT", help=help)
+    help = "write a page for a browser: pictures, deviations, tolerance bands, settings, versions"
+    add("--report", type=Path, metavar="HTML", help=help)
 
 
 def _is_number(text):

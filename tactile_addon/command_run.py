@@ -16,6 +16,7 @@ from .comparison.register_operator import register_patch
 from .comparison.verification_wording import verification_columns
 from .comparison.verify_operator import verify_patch
 from .files import contact_file, measured, mesh_file, whole_file
+from .report import report_operator
 from .scene import patch_record
 from .stability_map.map_report import map_readable
 from .touch.units import ADAPTIVE, METERS
@@ -103,6 +104,8 @@ def run(options):
     if options.contacts is not None:
         r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
+    if options.report is not None:
+        report_operator.write(options.report, made)
     if options.output is not None:
         _save(options.output, made)
     return report
@@ -110,7 +113,7 @@ def run(options):
 
 def _require_outputs(options):
     """Ends the command where a file to write is one to read, or cannot be one, before anything is done."""
-    given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify")}
+    given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify", "report")}
     outputs = {name: Path(path) for name, path in given.items() if path not in (None, "-")}
     scene = bpy.data.filepath and Path(bpy.data.filepath)
     inputs = [*vars(options).get("files", []), *filter(None, (options.file, options.onto, scene))]
@@ -126,6 +129,8 @@ def _require_outputs(options):
     kinds = [".blend", ".ply", *([".json"] if options.command != "map" else [])]
     if "output" in outputs and options.output.suffix.lower() not in kinds:
         raise Misuse(f"--output: wanted a file {' or '.join(kinds)}, got {options.output}")
+    if "report" in outputs and options.report.suffix.lower() != ".html":
+        raise Misuse(f"--report: wanted a file .html, got {options.report}")
 
 
 def _compare(patch, options):

@@ -17,6 +17,7 @@ def planes(azimuths, tilts=0.0):
     return [core.SamplingPlane(azimuth, tilt) for azimuth, tilt in pairs]
 
 
+SHARES = np.linspace(0.0, 1.0, 41)
 UPRIGHT, TILTED = planes((13, 73, 133)), planes((13, 73, 133), (12, -18, 8))
 
 
@@ -51,19 +52,19 @@ class Exact:
 
     def ray_cast(self, origin, direction, distance):
         """First crossing along the ray: bracketed on 40 samples, then bisected by regula falsi (Illinois)."""
-        origin, direction = np.asarray(origin), np.asarray(direction)
-        t = np.linspace(0.0, distance, 41)
-        f = self.level(*(origin[:, None] + direction[:, None] * t))
+        (x, y, z), (u, v, w) = map(float, origin), map(float, direction)
+        t = float(distance) * SHARES
+        f = self.level(x + u * t, y + v * t, z + w * t)
         crossing = np.flatnonzero(np.sign(f[:-1]) * np.sign(f[1:]) <= 0)
         if not len(crossing):
             return None
-        a, b = t[crossing[0]], t[crossing[0] + 1]
-        fa, fb = f[crossing[0]], f[crossing[0] + 1]
+        a, b = t[crossing[0] : crossing[0] + 2].tolist()
+        fa, fb = f[crossing[0] : crossing[0] + 2].tolist()
         for _ in range(60):
             if fa == fb or abs(b - a) < 1e-15 * distance:
                 break
             c = b - fb * (b - a) / (fb - fa)
-            fc = self.level(*(origin + c * direction))
+            fc = float(self.level(x + u * c, y + v * c, z + w * c))
             if fc * fb < 0:
                 a, fa = b, fb
             else:
@@ -71,9 +72,9 @@ class Exact:
             b, fb = c, fc
             if fc == 0:
                 break
-        hit = origin + b * direction
+        hit = np.array([x + u * b, y + v * b, z + w * b])
         g = self.gradient(hit)
-        return hit, g / np.linalg.norm(g)
+        return hit, g / math.sqrt(g @ g)
 
 
 def plane():

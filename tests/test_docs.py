@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Links between the pages lead somewhere, what commands name is there, and the site can be searched."""
 
-import importlib.util
 import re
 import shutil
 import subprocess
@@ -10,6 +9,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
+
+from tools import check_site
 
 ROOT = Path(__file__).parent.parent
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
@@ -69,9 +70,6 @@ def test_the_citation_has_the_version():
 
 
 def test_the_checker_of_the_site_finds_what_is_broken(tmp_path):
-    spec = importlib.util.spec_from_file_location("check_site", ROOT / "tools" / "check_site.py")
-    check_site = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(check_site)
     (tmp_path / "a.html").write_text(
         '<h1 id="top"></h1><a href="b.html#here">b</a><a href="#top">t</a><a href="https://elsewhere.org">e</a>'
     )

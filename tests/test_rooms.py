@@ -14,7 +14,17 @@ ROOT = Path(__file__).parents[1]
 ROOMS = {
     "core": ("arguments", "contours", "patch", "paper", "bayes", "reconstruction", "exploration", "scan"),
     "tactile_addon": (
-        *("touch", "scene", "probes", "stability_map", "files", "comparison", "viewport", "sidebar"),
+        *(
+            "touch",
+            "scene",
+            "probes",
+            "stability_map",
+            "files",
+            "comparison",
+            "report",
+            "viewport",
+            "sidebar",
+        ),
     ),
     "cluster": ("extension", "data_set", "worker"),
 }

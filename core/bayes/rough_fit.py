@@ -31,7 +31,7 @@ from .residual_evidence import (
     system_of,
 )
 
-QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.
+QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's (benchmarks.real).
 
 
 class RoughFit(NamedTuple):

@@ -33,6 +33,7 @@ from .contour import (
     vector_of,
 )
 
+# What a crease is, and what is too steep: benchmarks.refusals counts what they refuse.
 MAX_TURN = math.cos(math.radians(45.0))  # between contacts; a sharper turn is a crease to a finger
 MAX_TILT = math.cos(math.radians(75.0))  # against the normal at the point; beyond, slopes exceed 3.7
 LEAST_IN_PLANE = 1e-3  # Least share of a surface normal in the sampling plane.

@@ -21,6 +21,7 @@ from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_STD
 
+# benchmarks.amount judges the numbers of contacts, benchmarks.extents how far curves grow.
 # Numbers of contacts of the longest half curve: the first that is enough is taken.
 CONTACT_COUNTS = (12, 24, 48)
 LEAST = 4  # contacts of the shortest half curve

@@ -20,7 +20,7 @@ from ..contours.contour import Contour, cross
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.monge import exponents, monomials
 
-# Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot).
+# Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot, for all).
 STRIPS = 10
 SOME = 2000  # contacts that the quartic is fitted to
 NEAR = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one

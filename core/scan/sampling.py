@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 
-SORTED_AT_ONCE = 100_000  # points that are sorted at once
+SORTED_AT_ONCE = 100_000  # points that are sorted at once (benchmarks.stability_map)
 JAMMED = 0.575  # points in a square of the spacing, once no more have room
 CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
 

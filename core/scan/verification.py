@@ -16,6 +16,7 @@ from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 
 EXTRA = 9  # contours, as in the paper's Fig. 3
+# benchmarks.scans prints what is found with these.
 STEPS_A_RADIUS = 12  # Steps of such a contour in a radius.
 REACHES = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
 HAIR = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.

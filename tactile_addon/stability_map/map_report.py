@@ -10,18 +10,21 @@ from .stability import REASONS
 
 def map_readable(record):
     """Lines of label and value; lengths in the unit of the scene or file."""
+    return table(map_table_rows(record))
+
+
+def map_table_rows(record):
+    """(label, value) of all that a map has to say."""
     refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
     names = [key for key in record if key.endswith("_median")]
-    return table(
-        [
-            ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
-            ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
-            ("refused", refused),
-            ("fit", f"{record['method']}, degree {record['degree']}"),
-            ("spacing, extent, step", ", ".join(f"{record[k]:.4g}" for k in ("spacing", "extent", "step"))),
-            *((f"median {name.removesuffix('_median')}", f"{record[name]:.4g}") for name in names),
-        ]
-    )
+    return [
+        ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
+        ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
+        ("refused", refused),
+        ("fit", f"{record['method']}, degree {record['degree']}"),
+        ("spacing, extent, step", ", ".join(f"{record[k]:.4g}" for k in ("spacing", "extent", "step"))),
+        *((f"median {name.removesuffix('_median')}", f"{record[name]:.4g}") for name in names),
+    ]
 
 
 def map_summary(record):

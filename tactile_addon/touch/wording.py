@@ -11,9 +11,14 @@ SPREAD = ("mean", "median", "max", "rms")
 
 def readable(report):
     """Lines of label and value; lengths in the unit of the scene or file."""
+    return table(readable_rows(report))
+
+
+def readable_rows(report):
+    """(label, value) of all that a patch has to say."""
     seconds = report["seconds"]
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
-    rows = [
+    return [
         ("touched", report["source"]),
         ("status", f"{report['status']}: {report['message']}"),
         ("fit", f"{report['method']}, degree {report['degree']}"),
@@ -39,7 +44,6 @@ def readable(report):
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
-    return table(rows)
 
 
 def added_planes(report, unit):

@@ -4,7 +4,7 @@
 
 # run.sh ZIP: what only a real Blender can show, with the zip without wheels installed in it: the
 # command line, the example script, the menu entry, probes, verification and stability maps by mouse and
-# keyboard in a window, and what hundreds of touches leave behind. The pictures are in build/gui, to be looked at.
+# keyboard in a window, what hundreds of touches leave behind, and installing from a repository. The pictures are in build/gui, to be looked at.
 set -euo pipefail
 [ $# = 1 ] || { echo "usage: run.sh ZIP" >&2; exit 2; }
 zip=$(readlink -f "$1")
@@ -15,7 +15,7 @@ gui=../shared/blender/gui.sh
 out=build/gui
 log=$out/log.txt
 export BLENDER_USER_RESOURCES=build/gui-user
-rm -rf "$out" "$BLENDER_USER_RESOURCES"
+rm -rf "$out" "$BLENDER_USER_RESOURCES" build/gui-user-repository
 mkdir -p "$out"
 cp "$zip" "$out/tactile_patch.zip"
 
@@ -65,6 +65,8 @@ GUI_ARGS="$out/scene.blend" step "the contacts' checks" \
   $gui shot tests/gui/contacts.py "$out/contacts.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the endurance checks" \
   $gui shot tests/gui/endurance.py "$out/endurance.png" 640 480
+BLENDER_USER_RESOURCES=build/gui-user-repository GUI_TIMEOUT=240 step "the repository's checks" \
+  $gui shot tests/gui/repository.py "$out/repository.png"
 [ -e "$pear" ] || echo "skipped: the scan of a pear, there is no ../shared/data."
 
 passed=$(grep -c '^ok: ' "$log" || true)
