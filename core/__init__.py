@@ -7,8 +7,9 @@ convex body has negative curvatures under its outward normal.
 """
 
 from .atlas.boundaries import Edge
+from .atlas.measured import atlas_of
 from .atlas.meshing import Mesh
-from .atlas.object_atlas import Atlas
+from .atlas.object_atlas import Atlas, NextTouch
 from .atlas.touching import Progress, explore_object, touch_all_over
 from .contours.common_point import common_point, in_running_order
 from .contours.contour import (
@@ -56,11 +57,13 @@ __all__ = [
     "Geometry",
     "Mesh",
     "MongePatch",
+    "NextTouch",
     "Pose",
     "Progress",
     "Reconstruction",
     "SamplingPlane",
     "Surface",
+    "atlas_of",
     "azimuth_of",
     "common_point",
     "distances",

@@ -106,7 +106,7 @@ def _mean(
     """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
 
     def total(values: Array) -> Array:
-        found: Array = np.bincount(place, w * values, count)
+        found: Array = np.bincount(place, w * values, count)  # type: ignore[assignment]
         return found
 
     some = total(np.ones(len(w)))

@@ -21,7 +21,7 @@ from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.tracking import Surface
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, Charts
-from .tables import charts_of
+from .join import charts_of
 
 RIM = 24  # places of a rim
 INSIDE = 1.0  # of a domain's radius: farther out a place is not covered
@@ -53,7 +53,7 @@ class Place:
 
 
 class Next(NamedTuple):
-    """Where to touch, (3,) each, what it would bring, an area, and from which place of a rim."""
+    """Where to touch, (3,) each, the area that it would bring, and from which place of a rim."""
 
     point: Array
     outward: Array
@@ -75,6 +75,7 @@ class Frontier:
     charts: Charts | None = None
     queue: list[tuple[float, int, Place]] = field(default_factory=list)
     pushed: int = 0
+    left: list[Place] = field(default_factory=list)
 
     def add(self, r: Reconstruction) -> None:
         """A patch that was felt."""
@@ -114,17 +115,28 @@ class Frontier:
             heapq.heappush(self.queue, entry)
         return found
 
-    def _forget_covered(self) -> None:
-        """Places that patches have come to cover, all at once."""
-        places = [place for _, _, place in self.queue]
+    def uncovered(self) -> list[Place]:
+        """Places where a touch would bring something, but there was none, or it brought nothing."""
+        self._forget_covered()
+        given_up = self._still_open(self.left)
+        return [place for _, _, place in sorted(self.queue)] + given_up
+
+    def _still_open(self, places: list[Place]) -> list[Place]:
+        """Those of places that no patch has come to cover."""
         points, normals = (np.array([getattr(p, name) for p in places]) for name in ("point", "normal"))
         covered = self.is_covered(points.reshape(-1, 3), normals.reshape(-1, 3)).tolist()
-        self.queue = [entry for entry, gone in zip(self.queue, covered, strict=True) if not gone]
+        return [place for place, gone in zip(places, covered, strict=True) if not gone]
+
+    def _forget_covered(self) -> None:
+        """Places that patches have come to cover, all at once."""
+        still = {id(place) for place in self._still_open([place for _, _, place in self.queue])}
+        self.queue = [entry for entry in self.queue if id(entry[2]) in still]
         heapq.heapify(self.queue)
 
     def beyond(self, place: Place) -> Next | None:
         """The touch that goes on from a place; None where it would bring nothing."""
         if place.tries >= TRIES:
+            self.left.append(place)
             return None
         for share in REACHES:
             contact = self.ahead(place, share * place.radius)

@@ -17,6 +17,7 @@ from .join import joined
 from .object_atlas import Atlas
 
 MOST = 1000
+FIRST = 300.0  # times the tolerance, that half curves of the first touch may become
 SIZE = 1.5  # times the tolerance, that a patch may be uncertain in the mean before its neighbors are known
 LEAST = 5.0  # times it, that a patch is wide at least
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
@@ -59,18 +60,20 @@ def touch_all_over(
     if tolerance < noise:
         raise ValueError(f"tolerance: wanted the noise {noise:g} or more, got {tolerance:g}")
     wanted = {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance}
-    found = [explore(surface, p, up, **wanted)]  # type: ignore[arg-type]
+    found = [explore(surface, p, up, farthest=FIRST * tolerance, **wanted)]  # type: ignore[arg-type]
     frontier = Frontier(surface, side_of(surface, p, up, found[0].step))
     frontier.add(found[0].result)
     more = yield Progress(1, len(frontier.queue), tuple(found))
-    while more is not False and len(found) < most:
-        chosen = frontier.take(min(SIDE_BY_SIDE, most - len(found)))
+    done = 1
+    while more is not False and done < most:
+        chosen = frontier.take(min(SIDE_BY_SIDE, most - done))
         if not chosen:
             break
+        done += len(chosen)
         new = _touched(surface, frontier, chosen, LEAST * tolerance, wanted)
         found += new
-        more = yield Progress(len(found), len(frontier.queue), tuple(new))
-    return (yield from _joined(found, frontier, tolerance, noise))
+        more = yield Progress(done, len(frontier.queue), tuple(new))
+    return (yield from _joined(found, done, frontier, tolerance, noise))
 
 
 def _touched(
@@ -89,13 +92,13 @@ def _touched(
     return found
 
 
-def _joined(found: list[Exploration], frontier: Frontier, tolerance: float, noise: float) -> Steps:
+def _joined(found: list[Exploration], done: int, frontier: Frontier, tolerance: float, noise: float) -> Steps:
     assert frontier.charts is not None
     steps = joined([e.contours for e in found], [e.result for e in found], frontier.charts, noise)
-    uncovered = len(frontier.queue)
+    uncovered = tuple(frontier.uncovered())
     while True:
         try:
-            yield Progress(len(found), uncovered, joining=next(steps))
+            yield Progress(done, len(uncovered), joining=next(steps))
         except StopIteration as end:
             patches, charts = end.value
             return Atlas(tuple(patches), charts, tolerance, uncovered)

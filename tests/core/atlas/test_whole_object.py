@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches all over exact objects: what is found of them, where it is closed, and how far it is off."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,7 +34,9 @@ def test_a_ball_is_closed_and_as_near_as_asked(ball):
     mesh = ball.mesh(0.08)
     assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
     assert np.abs(solids.ball().distances(mesh.vertices)).mean() < 1e-3
-    assert ball.uncovered == 0
+    assert ball.status == "ok"
+    assert ball.message == "The object was felt wherever a finger could go on."
+    assert ball.next_touch() is None
     assert len(ball.patches) < 30
 
 
@@ -99,6 +103,38 @@ def test_progress_can_end_it_with_what_is_there():
     assert solids.topology(atlas.mesh(0.1).triangles).open > 0
 
 
+def test_a_small_budget_leaves_places_uncovered_and_says_where_to_go_on():
+    solid = solids.ball()
+    atlas = explored(solid, most=4)
+    assert len(atlas.patches) <= 4
+    assert atlas.status == "uncertain"
+    assert "places where the object goes on: allow more touches" in atlas.message
+    touch = atlas.next_touch()
+    assert abs(solid.distance(*touch.point)) < 0.05
+    assert touch.outward @ touch.point > 0.9
+    assert touch.gain > 0.0
+    far = np.array([-3.0 * touch.outward, 3.0 * touch.outward])
+    distance, std = atlas.distance(far)
+    assert np.isfinite(distance).all()
+    assert np.isinf(std).any()
+
+
+def test_patches_that_are_less_certain_than_the_tolerance_are_said(ball):
+    strict = replace(ball, tolerance=1e-9)
+    assert strict.status == "uncertain"
+    assert "patches are less certain than the tolerance" in strict.message
+    assert abs(np.linalg.norm(strict.next_touch().point) - 1.0) < 5e-3
+
+
+def test_far_away_the_nearest_place_counts(ball):
+    directions = np.random.default_rng(2).normal(size=(50, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    distance, std = ball.distance(np.vstack([3.0 * directions, 0.1 * directions]))
+    assert distance[:50] == pytest.approx(2.0, rel=0.03)
+    assert distance[50:] == pytest.approx(-0.9, rel=0.05)
+    assert np.isfinite(std).all()
+
+
 def test_steps_tell_what_was_found():
     solid = solids.ball()
     steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=4e-3, rng=0)
@@ -110,7 +146,7 @@ def test_steps_tell_what_was_found():
             joining.append(progress.joining)
     except StopIteration as end:
         atlas = end.value
-    assert len(found) == len(atlas.patches) == progress.done
+    assert len(found) == len(atlas.patches) <= progress.done
     assert joining[0] is None
     assert joining[-1] == 1.0
 
