@@ -11,7 +11,7 @@ from .probes import change_handlers, operators, probe, probe_operators
 from .scene import color_range
 from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
-from .viewport import drag, gizmos, overlay, pick
+from .viewport import drag, gizmos, overlay, pick, tool
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
@@ -39,6 +39,7 @@ def register():
     map_object.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    tool.register()
     preferences.restore_tab()
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
@@ -56,6 +57,7 @@ def unregister():
     bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
+    tool.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     map_object.unregister()
