@@ -14,7 +14,7 @@ from .report import report_operator
 from .scene import color_range
 from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
-from .viewport import drag, gizmos, overlay, pick
+from .viewport import drag, gizmos, overlay, pick, tool
 from .whole_object import object_operator
 
 CLASSES = (
@@ -51,6 +51,7 @@ def register():
     map_object.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    tool.register()
     preferences.restore_tab()
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
@@ -70,6 +71,7 @@ def unregister():
     bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
+    tool.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     map_object.unregister()

@@ -89,7 +89,7 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):
             patch_table.write(self.filepath, patches, context.scene)
         except (OSError, ValueError) as error:
             return report_error(self, error)
-        self.report({"INFO"}, f'Wrote {len(patches)} rows to "{Path(self.filepath).name}"')
+        self.report({"INFO"}, f'Wrote a table of {len(patches)} patches: "{Path(self.filepath).name}"')
         return {"FINISHED"}
 
 

@@ -206,8 +206,14 @@ def _show(obj):
         patch_object.recolor(obj)
 
 
+def _found(probe, name):
+    """What the last touch had in the place of a length that is 0."""
+    record = record_of(probe)
+    return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
+
+
 def register():
-    TactileProbe.__annotations__.update(number_fields.annotations())
+    TactileProbe.__annotations__.update(number_fields.annotations(_found))
     bpy.utils.register_class(TactileProbe)
     bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
     bpy.types.Object.tactile_colors = EnumProperty(

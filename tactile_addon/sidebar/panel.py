@@ -3,7 +3,6 @@
 """The panels of the sidebar's tab."""
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface
 
 from ..comparison.register_operator import TACTILE_OT_register
 from ..comparison.verification_wording import verification_rows, verification_table
@@ -17,7 +16,7 @@ from ..probes.probe_operators import (
     TACTILE_OT_show_colors,
     TACTILE_OT_update,
 )
-from ..scene import color_range, patch_record
+from ..scene import patch_record
 from ..scene.viewports import shows_colors
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import map_rows, median_rows
@@ -53,7 +52,8 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         found = probe.probe_of(obj)
         if found is None:
             layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
-            draw_sentence(context, layout, HELP, "INFO")
+            if obj is None or not probe.is_result(obj):
+                draw_sentence(context, layout, HELP, "INFO")
             return
         row = layout.row(align=True)
         move = row.row(align=True)
@@ -65,7 +65,9 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         layout.prop(settings, "target")
         record = probe.record_of(found)
         chosen = found_values(record, context.scene)
-        fields = number_fields.fields(_size_of(settings.target, record))
+        fields = {}  # The override of a library's probe keeps numbers, not ways to show them.
+        if found.override_library is None:
+            fields = number_fields.fields(_size_of(settings.target, record))
         draw_chosen(layout, settings, "extent", chosen, fields)
         _draw_planes(layout, settings)
         row = layout.row()
@@ -125,7 +127,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if is_outdated and found is not None:
             layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
         _draw_colors(context, layout, patch, "tactile_colors")
-        _draw_range(context, layout, patch, record)
+        _draw_range(layout, patch)
         _draw_shown(layout, found, patch)
         if is_outdated:  # of these numbers
             layout.label(text="Last Touch")
@@ -197,15 +199,11 @@ def _draw_colors(context, layout, obj, name):
         layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
 
 
-def _draw_range(context, layout, patch, record):
+def _draw_range(layout, patch):
     """Where the colors end, and a button for one range on all patches."""
-    power, unit = color_range.unit_of_range(patch, context.scene)
     row = layout.row(align=True)
     row.use_property_split = False
-    text = f"Range ({units.symbol(power, unit)})".replace(" ()", "")
-    if patch_record.RANGE not in patch:
-        text = f"{iface('Auto')} {units.say(record['color_limit'], power, unit)}"
-    row.prop(patch, "tactile_range", text=text, translate=False)
+    row.prop(patch, "tactile_range", text="Range" if patch_record.RANGE in patch else "Range (Auto)")
     row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
 
 

@@ -19,7 +19,7 @@ def main_rows(record, unit):
         ("κ1", _measured(record, "k1", -1, unit)),
         ("κ2", _measured(record, "k2", -1, unit)),
         ("Height", "± " + units.say(record["height_std"], 1, unit)),
-        ("Off Mesh", mesh),
+        ("Misfit", mesh),
     ]
 
 

@@ -12,7 +12,7 @@ TIPS = {
     "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
     "κ2": "The larger principal curvature at the point; below 0 the surface bulges outward",
     "Height": "Standard deviation of the patch's height: how well the contacts determine it",
-    "Off Mesh": "Mean distance of the mesh's vertices over the patch from it; … until you let go",
+    "Misfit": "Mean distance of the mesh's vertices over the patch from it; … until you let go",
     "1/κ1": "Radius of the circle that bends like the surface along the first principal direction",
     "1/κ2": "Radius of the circle that bends like the surface along the second principal direction",
     "K Gaussian": "Gaussian curvature, κ1 times κ2: above 0 on domes and bowls, below 0 on saddles",
@@ -71,8 +71,8 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
 
 def draw_rows(context, layout, rows, active=True):
     """Labels and values side by side, gray where they are not active; a heading has no value."""
-    longest = max(len(label) for label, value in rows if value)
-    share = min(max((longest + 1) / _letters(context), 0.3), 0.65)
+    longest = max((len(label) for label, value in rows if value), default=0)
+    share = min(max((longest + 4) / _letters(context), 0.34), 0.66)
     column = layout.column(align=True)
     column.active = active
     for label, value in rows:
@@ -81,8 +81,8 @@ def draw_rows(context, layout, rows, active=True):
             continue
         split = column.split(factor=share, align=True)
         left = split.row(align=True)
-        left.emboss = "PULLDOWN_MENU"  # text begins at the left there
-        copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, translate=False)
+        left.alignment = "LEFT"
+        copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
         copy.label, copy.value = label, value
         split.label(text=value, translate=False)
 

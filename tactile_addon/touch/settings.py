@@ -199,17 +199,19 @@ def touch_arguments(settings):
 def draw_chosen(layout, settings, name, found=None, fields=None):
     """A number that the surface chooses where it is 0, which the label says, with what it has `found`.
 
-    fields : other properties by which numbers are shown, by name
+    fields : other properties by which lengths are shown, by name, with what was found for their value
     """
     shown = (fields or {}).get(name, name)
     if getattr(settings, name):
         layout.prop(settings, shown)
+    elif shown != name:  # its value is what was found
+        layout.prop(settings, shown, text=AUTO[name])
     elif found and found.get(name):
         row = layout.row()
         row.use_property_split = False  # for the label, which takes the width it needs
-        row.prop(settings, shown, text=f"{iface(AUTO[name])} {found[name]}", translate=False)
+        row.prop(settings, name, text=f"{iface(AUTO[name])} {found[name]}", translate=False)
     else:
-        layout.prop(settings, shown, text=AUTO[name])
+        layout.prop(settings, name, text=AUTO[name])
 
 
 def draw_sensor(layout, settings, found=None, fields=None):

@@ -4,8 +4,6 @@
 
 import numpy as np
 
-from .units import length
-
 LARGEST_SINGLE, SMALLEST_SINGLE = (
     1e15,
     1e-15,
@@ -16,8 +14,7 @@ def require_single(result):
     """Raises ValueError for a patch too large, too small or too far away for Blender's numbers."""
     reach = result.radius + float(np.abs(result.frame.origin).max())
     if not (result.radius >= SMALLEST_SINGLE and reach <= LARGEST_SINGLE):
-        least, most = length(SMALLEST_SINGLE), length(LARGEST_SINGLE)
         raise ValueError(
-            f"The patch has a radius of {length(result.radius)} and reaches to {length(reach)}, and "
-            f"Blender's numbers are good from {least} to {most}: take another unit of length"
+            f"The patch has a radius of {result.radius:.3g} and reaches to {reach:.3g}, and Blender's "
+            f"numbers are good from {SMALLEST_SINGLE:g} to {LARGEST_SINGLE:g}: take another unit of length"
         )

@@ -90,10 +90,7 @@ def touch(
         "step": step or "auto",
     }
     sensor = {"noise": noise, "rng": seed, "tangent": axes[:, 0]}
-    try:
-        found = core.explore(surface, point, outward, planes, **size, **sensor, **fit)
-    except core.DegenerateCurvesError as error:
-        raise _with_facets(error, surface, point, step or extent / LEAST_STEPS) from error
+    found = _explored(surface, point, outward, planes, **size, **sensor, **fit)
     clock.append(perf_counter())
     require_single(found.result)
     report = {
@@ -108,15 +105,19 @@ def touch(
     return Touched(surface, found.result, report)
 
 
-def _with_facets(error, surface, point, step):
-    """The error, which says so where the facets at the point are large; step : 0 where it is not given."""
-    facet = surface.facet(point)
-    if facet < LARGE_FACET * (step or FINEST_STEP * surface.size):
-        return error
-    return ValueError(
-        f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier, if the mesh stands "
-        "for a smooth shape"
-    )
+def _explored(surface, point, outward, planes, **given):
+    """What core.explore finds; where facets longer than some steps may be why it fails, the error says so."""
+    try:
+        return core.explore(surface, point, outward, planes, **given)
+    except core.DegenerateCurvesError as error:
+        step = {"auto": FINEST_STEP * surface.size}.get(given["step"], given["step"])
+        facet = surface.facet(point)
+        if given["noise"] or facet < LARGE_FACET * step:
+            raise
+        raise ValueError(
+            f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier, if the mesh "
+            "stands for a smooth shape"
+        ) from error
 
 
 def _exploration_report(found, given, ended):

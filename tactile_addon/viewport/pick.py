@@ -58,6 +58,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         options=UNSAVED,
     )
 
+    at_once: BoolProperty(
+        name="At Once",
+        description="Touch where the mouse is, without asking for a click",
+        options={"HIDDEN", *UNSAVED},
+    )
     parent: BoolProperty(
         name="Move With Target",
         description="Make a new probe a child of the object touched, so that it goes where that goes",
@@ -75,18 +80,20 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         if context.area is None or context.area.type != "VIEW_3D":
             self.report({"ERROR"}, "Points are picked in a 3D viewport: start it there")
             return {"CANCELLED"}
+        self._area, self._unread = context.area, large_meshes(context)
         for name in NAMES:  # those of the last pick are remembered, but suited another object
             self.properties.property_unset(name)
         try:
             self._inherit(context)
         except ValueError as error:
             return report_error(self, error)
+        if self.at_once:
+            return self._click(context, event)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
-        self._seen, self._unread = {"touched": None}, large_meshes(context)
+        self._seen = {"touched": None}
         self._drawing = bpy.types.SpaceView3D.draw_handler_add(
             overlay.draw_preview, (self._seen,), "WINDOW", "POST_VIEW"
         )
-        self._area = context.area
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         context.window_manager.modal_handler_add(self)
@@ -103,14 +110,27 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             self._hover(context, event)
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             self._hover(context, event)
-            touched = self._seen["touched"]
-            if touched is not None:
-                self.target = touched.report["source"]
-                self.location = touched.result.frame.origin
-                self.outward = touched.result.frame.axes[:, 2]
+            if self._seen["touched"] is not None:
                 self.cancel(context)
-                return self.execute(context)
+                return self._take(context)
         return {"RUNNING_MODAL"}
+
+    def _click(self, context, event):
+        """What the tool in the toolbar does."""
+        self._seen = {"touched": None}
+        words = self._hover(context, event)
+        self._area.header_text_set(None)
+        context.window.cursor_modal_restore()
+        if self._seen["touched"] is None:
+            self.report({"WARNING"}, words)
+            return {"CANCELLED"}
+        return self._take(context)
+
+    def _take(self, context):
+        touched = self._seen["touched"]
+        self.target, self.location = touched.report["source"], touched.result.frame.origin
+        self.outward = touched.result.frame.axes[:, 2]
+        return self.execute(context)
 
     def cancel(self, context):
         """Takes away all that shows that a pick is going on."""
@@ -187,7 +207,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         return moved
 
     def _hover(self, context, event):
-        """Touches below the mouse; the preview shows it, and the header says it."""
+        """Touches below the mouse; the preview shows it, and the header says it, and it returns the words."""
         self._seen["touched"], words = None, "Move over a mesh to touch it"
         try:
             self._read(context, names_below(context, event, self._unread))
@@ -204,6 +224,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             words = sentence(error)
         self._area.header_text_set(f"Pick Reference Point     {words}")
         _redraw(context)
+        return words
 
     def _read(self, context, names):
         """Says that it takes a while to touch large meshes for the first time, and does what takes it."""

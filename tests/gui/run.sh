@@ -44,7 +44,7 @@ pear=../shared/data/meshes/pear.ply
 [ ! -e "$pear" ] || cp "$pear" "$out/"
 GUI_ARGS="$out/scene.blend" step "the window's checks" \
   $gui shot tests/gui/window.py "$out/window.png"
-GUI_ARGS="$out/scene.blend" step "the panel's checks" \
+GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the panel's checks" \
   $gui shot tests/gui/panel.py "$out/panel.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the viewport's checks" \
   $gui shot tests/gui/viewport.py "$out/viewport.png"

@@ -25,9 +25,10 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
-def test_a_row_a_probe_with_the_unit_in_the_header(empty, probes, tmp_path):
+def test_a_row_a_probe_with_the_unit_in_the_header(empty, probes, tmp_path, capfd):
     path = tmp_path / "probes.csv"
     assert empty.ops.tactile.export_table(filepath=str(path)) == {"FINISHED"}
+    assert 'Wrote a table of 2 patches: "probes.csv"' in capfd.readouterr().out
     rows = rows_of(path)
     assert sorted(row["probe"] for row in rows) == sorted(probe.name for probe in probes)
     for row in rows:
