@@ -125,6 +125,17 @@ def cholesky(matrix: Array) -> Array:
     return lower
 
 
+def solved_definite(matrix: Array, right: Array) -> Array:
+    """matrix^-1 @ right, of a positive definite matrix (m, m), whose lower triangle is used up, and (m,)."""
+    from scipy.linalg.lapack import dposv
+
+    _, found, failed = dposv(matrix.T, right, lower=0, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    solution: Array = found
+    return solution
+
+
 def whitened(places: Array, factor: Array, terms: Array, told: Array) -> tuple[Array, Array]:
     """Residual.whitened by the two factors, of terms (27, n) and k(places, p), (m, n), or of sums of such."""
     told = solved(places, told)
