@@ -37,9 +37,9 @@ class Restricted(NamedTuple):
 
 
 class Hyperparameters(NamedTuple):
-    """Waviness (b,), its geometric mean; prior variances (b, 22), averaged over it; and noise (b,)."""
+    """Prior variances (b, 22), of the mean waviness, typical, and averaged over it; and noise (b,)."""
 
-    waviness: Array
+    typical: Array
     variances: Array
     noise: Array
 
@@ -75,7 +75,7 @@ def prior_variances(waviness: Array) -> Array:
 
 
 VARIANCES = prior_variances(WAVINESS)
-LOG_WAVINESS = np.log(WAVINESS)
+LOG_VARIANCES = np.log(VARIANCES)
 UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior
 
 
@@ -140,7 +140,7 @@ def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
     weights = (weights / weights.sum(axis=1)[:, None]).reshape(len(noises), len(WAVINESS), -1)
     by_waviness, by_noise = weights.sum(axis=2), weights.sum(axis=1)
     return Hyperparameters(
-        np.exp(by_waviness @ LOG_WAVINESS),
+        np.exp(by_waviness @ LOG_VARIANCES),
         by_waviness @ VARIANCES,
         np.sqrt(np.einsum("bn,bn->b", by_noise, noises**2)),
     )

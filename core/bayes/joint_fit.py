@@ -108,8 +108,8 @@ def _pass(
     local, normals = touches.contacts @ touches.axes, touches.normals @ touches.axes
     system, data = linear_system(local, touches.weights, expected, normals, through), None
     if step == 0:
-        waviness = np.full(len(expected), USUAL_WAVINESS)
-        hyper = Hyperparameters(waviness, prior_variances(waviness), touches.floor)
+        usual = prior_variances(np.full(len(expected), USUAL_WAVINESS))
+        hyper = Hyperparameters(usual, usual, touches.floor)
     else:
         data = restricted(system.equations)
         hyper = hyperparameters(system, data, touches.floor)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..patch.monge import TERMS, monomials
-from ..patch.residual import solved_definite
+from ..patch.residual import inverse_definite, solved_definite
 from .evidence import (
     FREE_PRECISION,
     PRIOR_SCALE,
@@ -18,7 +18,6 @@ from .evidence import (
     evidence,
     evidence_with_slopes,
     noises,
-    prior_variances,
 )
 from .measured_slopes import slope_equations
 from .posterior import FREE, Posterior
@@ -54,13 +53,22 @@ def prior_mean(k1: Array, k2: Array) -> Array:
     a cylinder. A torus, whose parallels have k2 at the point, has k1 k2^2 / 4 for x^2 y^2: here is the
     mean of that and of the other case.
     """
+    return np.array([_going_on(*pair) for pair in zip(k1.tolist(), k2.tolist(), strict=True)])
+
+
+def _going_on(k1: float, k2: float) -> list[float]:
+    """The prior's mean of one surface; in Python floats."""
     # Where the radius of curvature is less than L no surface goes on like that.
-    k1, k2 = np.minimum(np.maximum((k1, k2), -1.0), 1.0)
+    k1, k2 = min(max(k1, -1.0), 1.0), min(max(k2, -1.0), 1.0)
     a, b = k1**2, k2**2
-    mean = np.zeros((len(k1), len(TERMS)))
-    mean[:, 9:14:2] = np.array([k1 * a, k1 * b + k2 * a, k2 * b]).T / 8.0
-    sextic = [k1 * a * a, (2.0 * k1 * b + k2 * a) * a, (k1 * b + 2.0 * k2 * a) * b, k2 * b * b]
-    mean[:, 20:27:2] = np.array(sextic).T / 16.0
+    mean = [0.0] * len(TERMS)
+    mean[9:14:2] = k1 * a / 8.0, (k1 * b + k2 * a) / 8.0, k2 * b / 8.0
+    mean[20:27:2] = (
+        k1 * a**2 / 16.0,
+        (2.0 * k1 * a * b + k2 * a**2) / 16.0,
+        (k1 * b**2 + 2.0 * k2 * a * b) / 16.0,
+        k2 * b**2 / 16.0,
+    )
     return mean
 
 
@@ -101,7 +109,7 @@ def hyperparameters(system: System, data: Restricted, floor: Array) -> Hyperpara
 def solution(system: System, hyper: Hyperparameters) -> Array:
     """The likeliest coefficients less the prior's mean, (b, 27)."""
     # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
-    precision = _precision(system, prior_variances(hyper.waviness), hyper.noise)
+    precision = _precision(system, hyper.typical, hyper.noise)
     seen = system.equations.seen / (hyper.noise**2)[:, None]
     if system.slopes is not None and system.steepness is not None:
         seen = seen + (system.steepness[:, None] @ system.slopes)[:, 0]
@@ -112,7 +120,7 @@ def posterior(
     mean: Array, system: System, data: Restricted, hyper: Hyperparameters, weights: Array
 ) -> Posterior:
     """What is left open, under the averaged prior, about the means (b, 27)."""
-    covariance = np.linalg.inv(_precision(system, hyper.variances, hyper.noise))
+    covariance = np.array([inverse_definite(each) for each in _precision(system, hyper.variances, hyper.noise)])
     visibility = data.triangle * (PRIOR_SCALE / hyper.noise)[:, None, None]
     if system.slopes is not None:
         # What the slopes show of the free terms too: the QR of all there is, each in its deviation.

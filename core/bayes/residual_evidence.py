@@ -8,6 +8,7 @@ a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
 """
 
 import math
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..patch.monge import TERMS, monomials
-from ..patch.residual import Residual, cholesky, kernels, places_factor, solved
+from ..patch.residual import Residual, cholesky, cholesky_in_place, kernels, places_factor, solved
 from .evidence import USUAL_WAVINESS, prior_variances
 from .measured_slopes import slope_equations
 from .posterior import FREE, Posterior
@@ -147,35 +148,36 @@ def _surprises(basis: Array, heights: Array, kernels_within: list[Array], noises
     terms[:m, :m] = (basis * _prior(USUAL_WAVINESS)) @ basis.T
     terms[:m, m] = terms[m, :m] = heights
     found = np.full((len(kernels_within), size, RESIDUAL_NOISES), np.inf)
+    surprise = partial(_surprise, terms, work, 2.0 * float(heights @ heights))
+    squares, noise_squares = (AMPLITUDES**2).tolist(), (noises**2).tolist()
     for within, kernel, surprises in zip(kernels_within, kernels_of, found, strict=True):
         kernel[:m, :m] = within
         for side in (range(size // 2, size), range(size // 2 - 1, -1, -1)):
             before = surprises[side.start - side.step, MIDDLE]
             for at in side:
-                surprises[at, MIDDLE] = now = _surprise(terms, kernel, work, at, noises[MIDDLE])
+                surprises[at, MIDDLE] = now = surprise(kernel, squares[at], noise_squares[MIDDLE])
                 if now > max(before, found.min() + NEGLIGIBLE):
                     break
                 before = now
     for length, at in np.argwhere(found[..., MIDDLE] < found.min() + NEGLIGIBLE).tolist():
         for i in (i for i in range(RESIDUAL_NOISES) if i != MIDDLE):
-            found[length, at, i] = _surprise(terms, kernels_of[length], work, at, noises[i])
+            found[length, at, i] = surprise(kernels_of[length], squares[at], noise_squares[i])
     return found
 
 
-def _surprise(terms: Array, kernel: Array, work: Array, amplitude: int, noise: float) -> float:
-    """-2 log likelihood by terms that the heights border, (m + 1, m + 1), as are kernel and work."""
-    from scipy.linalg.blas import daxpy
-    from scipy.linalg.lapack import dpotrf
+def _surprise(terms: Array, work: Array, twice: float, kernel: Array, variance: float, noise: float) -> float:
+    """-2 log likelihood by terms that the heights border, (m + 1, m + 1), as are kernel and work.
 
-    flat, m, heights = work.reshape(-1), len(work) - 1, terms[-1, :-1]
-    flat[:] = terms.reshape(-1)
-    daxpy(kernel.reshape(-1), flat, a=AMPLITUDES[amplitude] ** 2)  # in place
-    diagonal = flat[:: m + 2]
-    diagonal += noise**2
-    # More than heights' K^-1 heights.
-    corner = diagonal[m] = 2.0 * float(heights @ heights) / noise**2 + 1.0
-    dpotrf(work.T, lower=1, clean=0, overwrite_a=1)  # in place
-    return float(2.0 * np.log(diagonal[:m]).sum() + corner - diagonal[m] ** 2)
+    twice : what the heights' squares sum to, twice
+    variance, noise : of the residual and of a contact
+    """
+    np.multiply(kernel, variance, out=work)
+    work += terms
+    diagonal = work.reshape(-1)[:: len(work) + 1]
+    diagonal += noise
+    corner = diagonal[-1] = twice / noise + 1.0  # more than heights' K^-1 heights
+    pivots = cholesky_in_place(work)
+    return 2.0 * float(np.log(pivots[:-1]).sum()) + corner - float(pivots[-1]) ** 2
 
 
 def _surprises_alone(basis: Array, heights: Array) -> Array:
@@ -183,16 +185,22 @@ def _surprises_alone(basis: Array, heights: Array) -> Array:
 
     By the terms' precision, bordered by what the heights say of them.
     """
-    m, rows = basis.shape[1], np.column_stack([basis, heights])
-    priors = np.array([_prior(waviness) for waviness in ALONE])
-    bordered = np.tile(rows.T @ rows, (len(ALONE), 1, 1))
+    rows, (precisions, logs) = np.column_stack([basis, heights]), _priors_alone()
+    bordered = np.empty((len(ALONE), rows.shape[1], rows.shape[1]))
+    bordered[:] = rows.T @ rows
     diagonal = np.einsum("kii->ki", bordered)  # a view
-    diagonal[:, :m] += 1.0 / priors
-    diagonal[:, m] += 1.0  # lest rounding leaves less than nothing over
-    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
-    explained = 2.0 * np.log(factors[:, :m]).sum(axis=1) + np.log(priors).sum(axis=1)
-    surprises: Array = explained + factors[:, m] ** 2 - 1.0
+    diagonal += precisions
+    pivots = np.einsum("kii->ki", np.linalg.cholesky(bordered))
+    surprises: Array = 2.0 * np.log(pivots[:, :-1]).sum(axis=1) + logs + pivots[:, -1] ** 2 - 1.0
     return surprises
+
+
+@cache
+def _priors_alone() -> tuple[Array, Array]:
+    """Precisions of the terms for each of ALONE, and of the heights that border them; sums of logarithms."""
+    priors = np.array([_prior(waviness) for waviness in ALONE])
+    # One more, lest rounding leaves less than nothing over.
+    return np.column_stack([1.0 / priors, np.ones(len(ALONE))]), np.log(priors).sum(axis=1)
 
 
 def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:

@@ -33,19 +33,19 @@ class Domain:
 
         Its slopes at the ends follow from the continuity of its second derivative.
         """
-        chords = np.roll(self.ends, -1, axis=0) - self.ends
-        lengths = np.sqrt(chords[:, 0] ** 2 + chords[:, 1] ** 2)
-        m, before = len(lengths), np.roll(lengths, 1)
-        rise, rows = chords / lengths[:, None], np.arange(m)
-        system = np.zeros((m, m))
+        rows = np.arange(len(self.ends))
+        last, following = rows - 1, rows + 1 - len(rows)  # of them, in a circle
+        chords = self.ends[following] - self.ends
+        lengths = np.sqrt(np.einsum("mi,mi->m", chords, chords))
+        over, before = lengths[:, None], lengths[last]
+        rise = chords / over
+        system = np.zeros((len(rows), len(rows)))
         system[rows, rows] = 2.0 * (lengths + before)
-        system[rows, rows - 1], system[rows, rows + 1 - m] = lengths, before
-        right = lengths[:, None] * np.roll(rise, 1, axis=0) + before[:, None] * rise
+        system[rows, last], system[rows, following] = lengths, before
+        right = over * rise[last] + before[:, None] * rise
         slopes = np.linalg.solve(system, 3.0 * right)
-        bend = (slopes + np.roll(slopes, -1, axis=0) - 2.0 * rise) / lengths[:, None]
-        return lengths, np.array(
-            [self.ends, slopes, (rise - slopes) / lengths[:, None] - bend, bend / lengths[:, None]]
-        )
+        bend = (slopes + slopes[following] - 2.0 * rise) / over
+        return lengths, np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
 
     @cached_property
     def _polar(self) -> tuple[Array, Array]:
