@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
+from ..bayes.roughness import roughness
 from ..contours.contour import EXTENT, UNEXPLAINED, Contour
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.result import Reconstruction
@@ -30,6 +31,7 @@ GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underest
 STRETCH = 1.5  # A half curve grows by this factor at once.
 NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
+TOO_ROUGH = 0.0085  # Roughness of contacts whose fit ends growth, in all but one of a hundred
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
@@ -72,6 +74,12 @@ class Felt:
             first, last = (UNEXPLAINED if e else s for e, s in zip(end, contour.stops, strict=True))
             found.append(contour.part(which, (first, last)))
         return found
+
+    def is_rough(self, counts: Counts) -> bool:
+        """Whether so many contacts are so far off any sextic that their fit would be in doubt."""
+        contours = self.shortened(counts, stride_of(counts))
+        off = roughness(np.vstack([contour.points for contour in contours]) - self.point)
+        return off > TOO_ROUGH
 
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
         """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
@@ -147,6 +155,8 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
     error, seeds = None, list(SEEDS)
     while seeds:
         counts = np.minimum(seeds.pop(0), felt.whole)
+        if seeds and felt.is_rough(counts):
+            continue
         try:
             trial = yield from tried(felt, counts)
         except DegenerateCurvesError as why:
@@ -164,12 +174,17 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
 
 def tried(felt: Felt, counts: Counts) -> Fits:
     """The fit of so many contacts, of which as few are fitted as most often are enough."""
-    stride = max(1, int(spacing(counts, CONTACT_COUNTS[0])))
+    stride = stride_of(counts)
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
     spread = r.mean_height_std / (GROWN_STD * r.radius)
     return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
+
+
+def stride_of(counts: Counts) -> int:
+    """One contact of so many is fitted."""
+    return max(1, int(spacing(counts, CONTACT_COUNTS[0])))
 
 
 def spacing(reaches: Array | Counts, count: int) -> float:
