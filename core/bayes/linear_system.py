@@ -120,7 +120,9 @@ def posterior(
     mean: Array, system: System, data: Restricted, hyper: Hyperparameters, weights: Array
 ) -> Posterior:
     """What is left open, under the averaged prior, about the means (b, 27)."""
-    covariance = np.array([inverse_definite(each) for each in _precision(system, hyper.variances, hyper.noise)])
+    covariance = np.array(
+        [inverse_definite(each) for each in _precision(system, hyper.variances, hyper.noise)]
+    )
     visibility = data.triangle * (PRIOR_SCALE / hyper.noise)[:, None, None]
     if system.slopes is not None:
         # What the slopes show of the free terms too: the QR of all there is, each in its deviation.

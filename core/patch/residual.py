@@ -126,7 +126,7 @@ def cholesky(matrix: Array) -> Array:
 
 
 def cholesky_in_place(matrix: Array) -> Array:
-    """The diagonal of the triangular factor that takes the place of a matrix (m, m), whose upper triangle is used."""
+    """The diagonal of a triangular factor, which takes the place of the matrix (m, m): its upper triangle."""
     from scipy.linalg.lapack import dpotrf
 
     dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
