@@ -10,10 +10,11 @@ import math
 import numpy as np
 
 from ..arguments import Array
+from ..patch.monge import TERMS
 from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances
 from .joint_fit import MISFIT
 from .linear_system import linear_system, solution
-from .posterior import TERMS
+
 
 EXPLAINED_TERMS = 15  # of the 27, that three curves show: so many contacts a sextic goes through by itself
 

@@ -92,8 +92,18 @@ class Domain:
         weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 
+    @cached_property
+    def _around(self) -> tuple[Array, Array]:
+        """`_polar`, and its ends once more at the other end: for azimuths from -pi to pi."""
+        azimuths, radii = self._polar
+        whole = 2.0 * np.pi
+        return (
+            np.concatenate([azimuths[-1:] - whole, azimuths, azimuths[:1] + whole]),
+            np.concatenate([radii[-1:], radii, radii[:1]]),
+        )
+
     def _radius(self, azimuth: Array) -> Array:
-        return np.interp(azimuth, *self._polar, period=2.0 * np.pi)
+        return np.interp(azimuth, *self._around)
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether each (x, y) lies inside or on the boundary; booleans of the shape of x and y."""

@@ -147,7 +147,7 @@ def may_be_outdated(probe, there):
 
 def is_outdated(probe, depsgraph):
     """Whether its patch is another than its inputs ask for, by the probe or by what it is made of."""
-    digest = _digest(probe, depsgraph)
+    digest = _digest(probe, depsgraph, anchor.seat(probe, _extent_of(probe)))
     stored = [probe.tactile_probe.digest, *(block.get(DIGEST) for block in _made(probe))]
     return any(other != digest for other in stored)
 
@@ -161,19 +161,21 @@ def _made(probe):
 def _sign(probe, depsgraph):
     measure_shape(probe.tactile_probe, depsgraph)
     probe.tactile_probe.seat = anchor.seat(probe, _extent_of(probe))
-    digest = _digest(probe, depsgraph)
+    digest = _digest(probe, depsgraph, list(probe.tactile_probe.seat))
     probe.tactile_probe.digest = digest
     for block in _made(probe):
         block[DIGEST] = digest
 
 
-def _digest(probe, depsgraph):
+def _digest(probe, depsgraph, seat):
     """The digest of all inputs of a touch, and of the probe's name, which a copy does not share.
+
+    seat : where it is on its target, see anchor.seat
 
     The checksum of the target's vertices is dear, so it is kept, and taken anew where they may have changed.
     """
     settings, target = probe.tactile_probe, probe.tactile_probe.target
-    inputs = [probe.name, *anchor.seat(probe, _extent_of(probe)), touch_arguments(settings)]
+    inputs = [probe.name, *seat, touch_arguments(settings)]
     if target is not None:
         inputs += [_is_there(target, depsgraph), is_disabled(target), settings.shape]
     return hashlib.sha1(repr(inputs).encode()).hexdigest()
