@@ -169,10 +169,10 @@ def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
 
 def domain_of(curves: Curves) -> Domain:
     """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing."""
-    last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
-    rows = np.arange(len(last))
-    before, after = curves.present[:, 0] & (curves.along[:, 0] < 0.0), curves.along[rows, last] > 0.0
-    ends = np.vstack([curves.points[before, 0], curves.points[rows, last][after & curves.present[:, 0]]])
+    rows, last = np.arange(len(curves.present)), np.maximum(curves.present.sum(axis=1) - 1, 0)
+    before, after = curves.along[:, 0] < 0.0, curves.along[rows, last] > 0.0
+    there = curves.present[:, 0]
+    ends = np.concatenate([curves.points[before & there, 0], curves.points[rows, last][after & there]])
     return closed_spline_domain(ends[:, :2], 1.0)
 
 
