@@ -108,7 +108,7 @@ def main():
     addon, touches, clock = extension.tactile_addon, extension.core.exploration.touches, Clock()
     clock.wrap(addon.touch.surface.MeshSurface, "ray_cast", "ray casts")
     clock.wrap(touches, "track", "tracking")
-    clock.wrap(touches, "reconstruct_many", "fit")
+    clock.wrap(touches, "fitted", "fit")
     clock.wrap(addon.touch.touch_object, "reconstruction_report", "fit")
     clock.wrap(addon.scene.patch_object, "rewrite", "mesh write")
     update = as_in_a_window(addon)

@@ -15,7 +15,6 @@ from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances
 from .joint_fit import MISFIT
 from .linear_system import linear_system, solution
 
-
 EXPLAINED_TERMS = 15  # of the 27, that three curves show: so many contacts a sextic goes through by itself
 
 

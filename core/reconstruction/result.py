@@ -18,7 +18,7 @@ from ..contours.curves import besides_point, has_measured_normals
 from ..contours.local_geometry import Frame
 from ..paper import least_squares
 from ..patch.domain import Domain
-from ..patch.geometry import Geometry, fit_error, similarity, total_absolute_curvature
+from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.residual import Residual
 from .status import doubt
@@ -168,15 +168,20 @@ class Reconstruction:
         return self.blind / terms_to(self.patch.degree)
 
     @cached_property
+    def _departures(self) -> Array:
+        """|dz| of the contacts, (n,)."""
+        x, y, z = self.contacts.T
+        return np.abs(self.height(x, y) - z)
+
+    @property
     def fit_error(self) -> float:
         """(6), the mean of |dz| over the contacts."""
-        return fit_error(self.geometry, self.contacts)
+        return float(self._departures.mean())
 
     @property
     def typical_miss(self) -> float:
         """The median of |dz| over the contacts, which outlying ones do not change."""
-        x, y, z = self.contacts.T
-        return float(np.median(np.abs(self.height(x, y) - z)))
+        return float(np.median(self._departures))
 
     @cached_property
     def total_absolute_curvature(self) -> float:
