@@ -16,16 +16,21 @@ from .joint_fit import MISFIT
 from .linear_system import linear_system, solution
 
 EXPLAINED_TERMS = 15  # of the 27, that three curves show: so many contacts a sextic goes through by itself
+NOISY = 1.5  # times their noise, that contacts are off for no other reason
 
 
-def roughness(contacts: Array) -> float:
+def roughness(contacts: Array, noise: float) -> float:
     """The deviation of contacts (n, 3), relative to the reference point, from a sextic, as a share of L.
 
-    In the plane through the point that is nearest to them.
+    In the plane through the point that is nearest to them; less what noise, their deviation, explains of it.
     """
     local = contacts @ np.linalg.eigh(contacts.T @ contacts)[1][:, ::-1]
-    local /= math.sqrt((local[:, :2] ** 2).sum(axis=1).max())
+    radius = math.sqrt((local[:, :2] ** 2).sum(axis=1).max())
+    if radius == 0.0:
+        return 0.0
+    local /= radius
     nothing, usual = np.zeros((1, len(TERMS))), prior_variances(np.array([USUAL_WAVINESS]))
     system = linear_system(local[None], np.ones((1, len(local))), nothing, local[None, :0])
     off = system.residuals(solution(system, Hyperparameters(usual, usual, np.array([MISFIT]))))[0]
-    return math.sqrt(float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1))
+    variance = float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1)
+    return math.sqrt(max(variance - (NOISY * noise / radius) ** 2, 0.0))

@@ -75,11 +75,12 @@ class Felt:
             found.append(contour.part(which, (first, last)))
         return found
 
-    def is_rough(self, counts: Counts) -> bool:
-        """Whether so many contacts are so far off any sextic that their fit would be in doubt."""
+    def roughness(self, counts: Counts) -> float:
+        """How far so many contacts are off any sextic: above 1 their fit would be in doubt."""
         contours = self.shortened(counts, stride_of(counts))
-        off = roughness(np.vstack([contour.points for contour in contours]) - self.point)
-        return off > TOO_ROUGH
+        points = np.vstack([contour.points for contour in contours])
+        noise = max(contour.noise or 0.0 for contour in contours)
+        return roughness(points - self.point, noise) / TOO_ROUGH
 
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
         """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
@@ -155,17 +156,18 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
     error, seeds = None, list(SEEDS)
     while seeds:
         counts = np.minimum(seeds.pop(0), felt.whole)
-        if seeds and felt.is_rough(counts):
-            continue
-        try:
-            trial = yield from tried(felt, counts)
-        except DegenerateCurvesError as why:
-            error = why
-            continue
-        known[counts.tobytes()] = trial
-        if trial.doubt <= 1.0:
-            break
-        if trial.spread > HOPELESS and len(seeds) > 1:
+        doubt = felt.roughness(counts) if seeds else 0.0  # the shortest are fitted however rough they are
+        if doubt <= 1.0:
+            try:
+                trial = yield from tried(felt, counts)
+            except DegenerateCurvesError as why:
+                error = why
+                continue
+            known[counts.tobytes()] = trial
+            if trial.doubt <= 1.0:
+                break
+            doubt = trial.spread
+        if doubt > HOPELESS and len(seeds) > 1:
             seeds.pop(0)
     if not known and error is not None:
         raise error
