@@ -37,7 +37,7 @@ MISFIT = 2e-3  # Share of the radius: no surface is a polynomial, so the noise i
 PASSES = 8  # At most: two passes turn the frame to what they found, and more are for outliers.
 SETTLED_WEIGHT = 0.1  # Change of a weight between passes that counts as none.
 ALIKE_CURVATURES = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
-LEVEL = 1e-2  # slope left over; it changes heights by its product with a slope and a height
+LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
 OUTLYING = 5.0  # standard deviations
 STUDENT = 4.0  # degrees of freedom
 

@@ -42,6 +42,8 @@ class Curves:
 
     def at(self, index: int | list[int]) -> "Curves":
         """The curves of one touch, without the leading dimension, or of several."""
+        if index == [0] and len(self.points) == 1:
+            return self
         parts: list[Any] = [part if part is None else part[index] for part in vars(self).values()]
         return Curves(*parts)
 
