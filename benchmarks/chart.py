@@ -444,9 +444,9 @@ def captions(methods, quick):
         f"sets ({sets}) and seeds of the noise ({seeds}); all methods in turns, after a warm-up. "
     )
     heights = (
-        f"Error: mean |dz| at some {accuracy.HOLD_OUT} points of the true surface. Time: the processor's, from "
-        "the contacts to the heights there, with the frame. Dashed: Pareto front, given three curves. Gray: "
-        "off scale. "
+        f"Error: mean |dz| at some {accuracy.HOLD_OUT} points of the true surface. Time: the processor's, "
+        "from the contacts to the heights there, with the frame. Dashed: Pareto front, given three curves. "
+        "Gray: off scale. "
     )
     frame = (
         "Time: of meshes, for all vertices, and of pymeshlab for two calls, as it gives one kappa a call; "

@@ -14,14 +14,7 @@ from ..bayes.contradiction import contradiction, measured_normals
 from ..bayes.joint_fit import posterior_of
 from ..bayes.posterior import FREE, Posterior, terms_to
 from ..contours.contour import Contour
-from ..contours.curves import (
-    Curves,
-    besides_point,
-    curves_through,
-    has_measured_normals,
-    misses,
-    stacked,
-)
+from ..contours.curves import Curves, besides_point, curves_through, has_measured_normals, misses, stacked
 from ..contours.local_geometry import Frame
 from ..paper import least_squares
 from ..patch.domain import Domain
