@@ -20,7 +20,7 @@ from .from_contours import METHODS
 from .result import Reconstruction
 
 VERSION = 2
-ORTHONORMAL = 1e-6
+ORTHONORMAL = 1e-6  # Axes of a file may be in single precision.
 LEAST_PIVOT = 1e-3  # A residual's factor has no smaller pivot; its priors leave ten times as much.
 COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Coefficients of the degrees there are.
 

@@ -35,7 +35,7 @@ class Options(NamedTuple):
     radius: float | None  # of strokes alone
 
 
-class _Touch(NamedTuple):
+class _Parts(NamedTuple):
     """What a patch follows from: the curves of one touch, in the frame; all but the radius in its unit."""
 
     frame: Frame
@@ -76,7 +76,7 @@ def fitted_stack(
     return [error or _result(next(found), c, options) for error, c in zip(errors, contours, strict=True)]
 
 
-def _fitted(start: Start, options: Options) -> list[_Touch]:
+def _fitted(start: Start, options: Options) -> list[_Parts]:
     """Touches in the Darboux frames that the method finds."""
     fit, curves, places = _fit(start, options), start.curves, start.curves.present[0].size
     along = curves.along / fit.radii[:, None, None]
@@ -85,7 +85,7 @@ def _fitted(start: Start, options: Options) -> list[_Touch]:
     curves = Curves(local, curves.present, along, fit.tangents, curvatures)
     missed = misses(curves)
     return [
-        _Touch(
+        _Parts(
             Frame(fit.points[i], fit.axes[i]),
             float(fit.radii[i]),
             curves.at(i),
@@ -181,7 +181,7 @@ def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
 
 
 def _result(
-    touch: _Touch, contours: Sequence[Contour], options: Options
+    touch: _Parts, contours: Sequence[Contour], options: Options
 ) -> Reconstruction | DegenerateCurvesError:
     try:
         domain = domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)

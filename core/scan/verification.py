@@ -17,6 +17,7 @@ from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 
 EXTRA = 9  # contours, as in the paper's Fig. 3
+# benchmarks.scans prints what is found with these.
 STEPS_A_RADIUS = 12  # Steps of such a contour in a radius.
 REACHES = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
 AT_ONCE = 5000  # vertices whose distances are found in one step, in some hundredths of a second

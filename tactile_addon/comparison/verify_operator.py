@@ -75,7 +75,8 @@ class Verification:
         patch_object.recolor(patch)
         record["verification"] = {"target": self.target, **self._found}
         if record["status"] != "outdated":
-            record.update(judgment(r, self._found.get("vertex_distance_mean", 0.0), record["ended"]))
+            mean = self._found.get("vertex_distance_mean", 0.0)
+            record.update(judgment(r, mean, record["ended"], self._found["vertices"]))
         return record.to_dict()
 
     def _objects(self):

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import make_active, report_error, target_object
+from ..probes.operators import has_target, make_active, report_error, target_object
 from ..scene import patch_record
 from ..touch.settings import NAMES, TouchSettings, draw_all, draw_chosen, touch_arguments
 from ..touch.wording import sentence
@@ -42,7 +42,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     )
     progress: BoolProperty(
         name="Progress",
-        description="Say on standard error how far it is, where there is no window to show it",
+        description="Print progress to stderr, where there is no window to show it",
         options={"HIDDEN", *UNSAVED},
     )
 
@@ -54,7 +54,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Maps are made in Object Mode: leave this mode first")
             return False
-        return True
+        return has_target(cls, context)
 
     def invoke(self, context, event):
         if bpy.app.background:

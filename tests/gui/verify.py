@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from common import FOLDER, check, data_blocks, last_report, look, open_tab, picture, picture_of_docs, until
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
-BUTTON, OBJECT_MENU, ASIDE = (893, 402), (330, 40), (300, 180)
+BUTTON, OBJECT_MENU, ASIDE = (893, 449), (330, 40), (300, 180)
 TABLE = "verification"
 
 

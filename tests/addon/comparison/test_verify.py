@@ -143,10 +143,9 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     found = verified(empty, patch)
     unit = addon.touch.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
     head, *rows, points = addon.comparison.verification_wording.verification_table(found, unit)
-    assert head == ("Distance", "Mesh", "Contacts")
+    assert head == ("in mm", "Mesh", "Contacts")
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
-    assert all(cell.endswith(" mm") for row in rows for cell in row[1:])
-    assert rows[0][1] == f"{found['vertex_distance_mean']:.3g} mm"
+    assert rows[0][1] == f"{found['vertex_distance_mean']:.3g}"
     assert points == ("Points", str(found["vertices"]), "60")
     assert dict(addon.comparison.verification_wording.verification_rows(found, unit))["Overlap"] == "100 %"
 

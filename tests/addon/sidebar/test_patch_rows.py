@@ -17,6 +17,11 @@ def said(extension):
 
 
 @pytest.fixture
+def wording(extension):
+    return extension.tactile_addon.touch.wording
+
+
+@pytest.fixture
 def ball(empty):
     """The probe of a ball of radius 1, and its report."""
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
@@ -29,34 +34,53 @@ def record(status="ok", message="The patch describes its contacts.", **more):
     return {"status": status, "message": message, "height_std": 0.0123, **more}
 
 
-def test_the_verdict_says_good_and_how_good(said):
-    assert said.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
+def test_the_verdict_says_good_and_how_good(wording):
+    assert wording.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
     blind = record(
         message="The patch describes its contacts. 3 of 28 coefficients are invisible to these planes."
     )
-    assert said.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
+    assert wording.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
 
 
-def test_the_verdict_says_what_limits_a_good_patch(said, empty):
+def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
     empty.ops.mesh.primitive_cube_add()
     empty.ops.tactile.pick(target="Cube", location=(0.9, 0.2, 1.0), extent=0.5)
     (patch,) = empty.context.object.children
-    words = said.verdict(patch["tactile"].to_dict(), UNIT)
+    words = wording.verdict(patch["tactile"].to_dict(), UNIT)
     assert words == "Good, with 3 of 6 half curves cut short at a crease"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
-def test_the_verdict_says_what_to_do_where_there_is_doubt(said, status):
+def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     message = (
         "Heights are good to 5.3 % of the radius in the mean: take a shorter extent, or add sampling planes."
         " 3 of 28 coefficients are invisible to these planes. All half curves end at a crease."
     )
-    words = said.verdict(record(status, message), UNIT)
+    words = wording.verdict(record(status, message), UNIT)
     assert words == "Doubtful: take a shorter extent, or add sampling planes"
 
 
-def test_the_verdict_on_an_earlier_patch_is_none(said):
-    assert said.verdict(record("outdated"), UNIT) == "Outdated: touch again"
+def test_the_verdict_on_an_earlier_patch_is_none(wording):
+    assert wording.verdict(record("outdated"), UNIT) == "Outdated: touch again"
+
+
+@pytest.mark.parametrize("size", [0.065, 2.0, 65.0])
+def test_a_number_is_dragged_by_the_size_of_the_object(empty, extension, size):
+    """What 20 pixels move a number by is 65 times its step, as measured in a window of Blender 5.2."""
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.5 * size)
+    empty.ops.tactile.pick(location=(0.0, 0.0, 0.5 * size))
+    settings = empty.context.object.tactile_probe
+    fields = extension.tactile_addon.probes.number_fields.fields(max(settings.target.dimensions))
+    moves = {name: 65.0 * settings.bl_rna.properties[shown].step / size for name, shown in fields.items()}
+    assert 0.01 < moves["extent"] < 0.11
+    assert 0.001 < moves["step"] < 0.011
+    assert 0.0001 < moves["noise"] < 0.0011
+    (patch,) = empty.context.object.children
+    assert getattr(settings, fields["extent"]) == pytest.approx(patch["tactile"]["extent"])  # as found
+    assert settings.extent == getattr(settings, fields["noise"]) == 0.0
+    setattr(settings, fields["extent"], 0.2 * size)
+    assert settings.extent == pytest.approx(0.2 * size)
+    assert patch["tactile"]["extent"] == pytest.approx(0.2 * size)
 
 
 def test_what_was_found_stands_beside_auto(said, empty, ball):
@@ -72,16 +96,17 @@ def test_what_was_found_stands_beside_auto(said, empty, ball):
 
 def test_rows_are_told_apart_by_how_they_begin(said, ball):
     _, report = ball
-    labels = [label for label, _ in said.main_rows(report, UNIT) + said.other_rows(report, UNIT)]
+    rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT)
+    labels = [label for label, value in rows if value]  # and no heading
     assert len({label[:5] for label in labels}) == len(labels) == len(set(labels))
-    assert max(map(len, labels)) <= 15
+    assert max(map(len, labels)) <= 11
 
 
 def test_every_row_says_what_it_is(said, extension, ball):
     _, report = ball
     addon = extension.tactile_addon
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT) + said.plane_rows(report, UNIT)
-    labels = [label for label, _ in rows] + ["Error on 9 More", "Total |K|", "Would Bring"]
+    labels = [label for label, value in rows if value] + ["Error on 9 More", "Total |K|", "Would Bring"]
     assert not [
         label for label in labels if not re.match(r"[A-Z1\d].{15,}", addon.sidebar.rows.tip_of(label))
     ]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from core.patch.domain import closed_spline_domain
+from core.patch.domain import closed_spline_domain, hull_domain
 
 
 def circle(angles, radius=1.0):
@@ -88,6 +88,14 @@ def test_beside_a_short_end_the_boundary_turns_back_nowhere(short):
     assert domain.area == pytest.approx(shoelace, rel=1e-3)
 
 
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_the_area_is_that_within_the_spline(ends):
+    domain = closed_spline_domain(ends, 1.0)
+    x, y = domain.boundary(200_000).T
+    shoelace = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+    assert domain.area == pytest.approx(shoelace, rel=2e-6)
+
+
 def test_a_curve_that_ends_at_the_point_is_no_end():
     domain = closed_spline_domain(np.vstack([circle(SIXTH), [[1e-5, 0.0]], circle([0])]), 1.0)
     assert len(domain.ends) == 6
@@ -107,13 +115,23 @@ def test_lengths_scale():
 
 @pytest.mark.parametrize("others", [[(-1.0, 0.2), (-0.9, -0.3)], [(0.9, 0.1), (0.8, -0.1)]])
 def test_two_ends_in_one_direction_bound_what_the_farther_does(others):
-    """As where a curve comes back over itself; the spline through both would turn back."""
+    """A curve comes back over itself; the spline through both ends would turn back."""
     domain = closed_spline_domain([(1.0, 0.5), (0.02, 0.01), (0.5, 0.25), *others], 1.0)
     azimuths, radii = domain._polar
     assert np.isfinite(radii).all()
     assert (np.diff(azimuths) > 0.0).all()
     assert np.isfinite(domain.area)
     assert domain.contains(0.5, 0.25)
+
+
+def test_the_domain_of_scattered_contacts_is_their_hull():
+    rng = np.random.default_rng(0)
+    points = np.vstack([circle(np.arange(0, 360, 5), 2.0), rng.uniform(-1.0, 1.0, (50, 2))])
+    domain = hull_domain(points, 2.0)
+    assert domain.area == pytest.approx(4.0 * np.pi, rel=0.01)
+    assert np.hypot(*domain.boundary(100).T) == pytest.approx(2.0, rel=0.01)
+    with pytest.raises(ValueError, match="points: wanted the origin among them"):
+        hull_domain(points + np.array([1.95, 0.0]), 2.0)
 
 
 def cut(angles, distance):
