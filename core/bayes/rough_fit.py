@@ -23,17 +23,17 @@ from .joint_fit import MISFIT, turned
 from .posterior import DISK, FREE, Posterior, nodes
 from .residual_evidence import (
     ROUGH_MISFIT,
+    Observations,
     Sizes,
     System,
-    Touch,
     fitted,
     mean_given,
     sizes,
     system_of,
 )
 
-UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
-QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.
+UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic (benchmarks.real)
+QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's (benchmarks.real).
 
 
 class RoughFit(NamedTuple):
@@ -79,7 +79,7 @@ def rough_fit(
     for i in candidates.tolist():
         there, least = weights[i] > 0.0, max(float(accuracy[i]), ROUGH_MISFIT)
         point = np.zeros((int(through), 3))  # a contact like the others: on facets it may be off as they are
-        touch = Touch(
+        touch = Observations(
             np.vstack([contacts[i][there], point]),
             np.append(weights[i][there], np.ones(len(point))),
             least,
@@ -125,7 +125,9 @@ def _is_texture(off: Array, accuracy: float) -> bool:
     return 1.4826 * float(np.median(off)) > max(UNEXPLAINED * accuracy, MISFIT)
 
 
-def _settle(found: RoughFit, place: int, touch: Touch, system: System, size: Sizes, tangent: Array) -> None:
+def _settle(
+    found: RoughFit, place: int, touch: Observations, system: System, size: Sizes, tangent: Array
+) -> None:
     """Into `found`: the fit of a touch in the frame that its first fit shows."""
     (at, weights), half = _projection(), len(nodes()[2])
     first, places = mean_given(touch, system, size), touch.contacts[system.places, :2]
@@ -154,7 +156,7 @@ def _put(found: RoughFit, place: int, residual: Residual) -> None:
     mean[:FREE] = 0.0, 0.0, k1 / 2.0, 0.0, k2 / 2.0
     residual.mean[: len(TERMS)] -= mean
     told, left = whitened(residual.places_factor, residual.factor, terms.T, told.T)
-    own = np.tensordot(residual.variances, _own(tuple(beside.LENGTHS)), axes=1)
+    own = sum(map(np.multiply, residual.variances, _own(tuple(beside.LENGTHS))))
     found.posterior.mean[place], found.posterior.noise[place] = mean, residual.noise
     found.posterior.covariance[place] = own + left.T @ left - told.T @ told
     found.residuals[place] = residual
