@@ -112,7 +112,7 @@ def large():
     """A sheet of a million faces with a patch over a good part of it, verified and put onto it again."""
     bpy.data.objects.remove(patch())
     bpy.data.objects["Suzanne"].hide_set(True)
-    bpy.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=1000, size=2.0)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=1000, size=2.0, location=(0, 0, 0))
     sheet = bpy.context.object
     co = np.empty((len(sheet.data.vertices), 3), dtype=np.float32)
     sheet.data.vertices.foreach_get("co", co.ravel())
