@@ -100,7 +100,7 @@ def main():
     clock.wrap(touches, "reconstruct_many", "fit")
     clock.wrap(addon.touch.touch_object, "reconstruction_report", "fit")
     clock.wrap(addon.scene.patch_object, "rewrite", "mesh write")
-    # As in a window, where what is dear waits for the end of the gesture.
+    # What is dear waits for the end of the gesture, as in a window.
     update = addon.probes.touch_again.update
     addon.probes.change_handlers.update = lambda probe, depsgraph, complete: update(
         probe, depsgraph, complete=False

@@ -202,7 +202,7 @@ def fixed_scores(scan, count, methods):
 
 
 def fixed_row(title, of):
-    """Of {method: Score}."""
+    """A row of the table, by {method: Score}."""
     best = min(of[peer].error for peer in PEERS)
     return [
         *title,

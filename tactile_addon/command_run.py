@@ -16,10 +16,12 @@ from .comparison.register_operator import register_patch
 from .comparison.verification_wording import verification_columns
 from .comparison.verify_operator import verify_patch
 from .files import contact_file, measured, mesh_file, patch_table, whole_file
+from .report import report_operator
 from .scene import patch_record
 from .stability_map.map_report import map_readable
 from .touch.units import ADAPTIVE, METERS
 from .touch.wording import readable
+from .whole_object.object_report import object_readable
 
 
 class Misuse(ValueError):
@@ -42,18 +44,21 @@ COMMANDS = {
     "reconstruct": Command("reconstruct", patch_record.RECORD, readable, {}),
     "fit": Command("import_contacts", patch_record.RECORD, readable, {}),
     "table": Command("", "", lambda report: f"{report['rows']} rows written", {}),
+    "object": Command("touch_all_over", patch_record.ATLAS_RECORD, object_readable, {"progress": True}),
     "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
 }
 # What the operators take as it is given.
 PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
-PLAIN |= {"tolerance", "unit", "point", "flip", "radius"}
+PLAIN |= {"edge", "most", "tolerance", "unit", "point", "flip", "radius"}
 # Operators would take the nearest number they can have for others.
 NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
 
 
 # What --output may be.
 PATCH_FILES = (".blend", ".ply", ".json")
-KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "map": (".blend", ".ply"), "table": (".csv",)}
+MESH_FILES = (".blend", ".ply")
+KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
+KINDS |= {"object": MESH_FILES, "map": MESH_FILES}
 
 
 def _require_numbers(options):
@@ -111,6 +116,8 @@ def run(options):
     if options.contacts is not None:
         r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
+    if options.report is not None:
+        report_operator.write(options.report, made)
     if options.output is not None:
         _save(options.output, made)
     return report
@@ -118,7 +125,7 @@ def run(options):
 
 def _require_outputs(options):
     """Ends the command where a file to write is one to read, or cannot be one, before anything is done."""
-    given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify")}
+    given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify", "report")}
     outputs = {name: Path(path) for name, path in given.items() if path not in (None, "-")}
     scene = bpy.data.filepath and Path(bpy.data.filepath)
     inputs = [*vars(options).get("files", []), *filter(None, (options.file, options.onto, scene))]
@@ -134,6 +141,8 @@ def _require_outputs(options):
     kinds = KINDS[options.command]
     if "output" in outputs and options.output.suffix.lower() not in kinds:
         raise Misuse(f"--output: wanted a file {' or '.join(kinds)}, got {options.output}")
+    if "report" in outputs and options.report.suffix.lower() != ".html":
+        raise Misuse(f"--report: wanted a file .html, got {options.report}")
 
 
 def _compare(patch, options):

@@ -17,7 +17,7 @@ ROWS = [
     for cell in line.split(" | ")[slice(1, 2) if STATUS.match(line) else slice(1)]
 ]
 ROWS = [row.strip("| ") for row in ROWS if row.strip("| ") not in ("message", "status")]
-ERRORS = {"ValueError", "DegenerateCurvesError"}
+ERRORS = {"ValueError", "DegenerateCurvesError", "EngineError", "HopelessError", "NotStartedError"}
 
 
 def text_of(node):
@@ -45,7 +45,7 @@ def sentences(node):
 
 
 def messages():
-    for folder in ("core", "tactile_addon"):
+    for folder in ("core", "tactile_addon", "cluster"):
         for path in sorted((ROOT / folder).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text())):
                 for found in sentences(node):

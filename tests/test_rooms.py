@@ -12,10 +12,22 @@ import pytest
 ROOT = Path(__file__).parents[1]
 # Ground floor first. What is in no room is below all rooms where it is listed, and above them where not.
 ROOMS = {
-    "core": ("arguments", "contours", "patch", "paper", "bayes", "reconstruction", "exploration", "scan"),
-    "tactile_addon": (
-        *("touch", "scene", "probes", "stability_map", "files", "comparison", "viewport", "sidebar"),
+    "core": (
+        "arguments",
+        "contours",
+        "patch",
+        "paper",
+        "bayes",
+        "reconstruction",
+        "exploration",
+        "atlas",
+        "scan",
     ),
+    "tactile_addon": (
+        *("touch", "scene", "probes", "stability_map", "whole_object", "files", "comparison"),
+        *("report", "viewport", "sidebar"),
+    ),
+    "cluster": ("extension", "data_set", "worker"),
 }
 MOST_FILES, MOST_LINES = 9, 250
 
@@ -67,6 +79,13 @@ def test_core_knows_no_blender_and_the_add_on_imports_it_only_as_a_whole():
         assert "bpy" not in path.read_text().replace("without bpy", ""), name
 
 
+def test_what_is_shipped_knows_no_cluster():
+    for package in ("core", "tactile_addon"):
+        for name, path in modules(package):
+            assert not any(imported.startswith("cluster") for imported in imports(name, path)), name
+            assert not re.search(r"(import|from) (dask|distributed|pyarrow)", path.read_text()), name
+
+
 @pytest.mark.parametrize("package", ROOMS)
 def test_rooms_and_modules_are_small(package):
     for folder in [ROOT / package, *(p for p in (ROOT / package).iterdir() if p.is_dir())]:
@@ -80,6 +99,5 @@ def test_the_tree_for_contributors_is_that_of_the_files():
     tree = (ROOT / "CONTRIBUTING.md").read_text().split("```")[3]
     named = re.findall(r"^ +(\w+)/? ", tree, re.MULTILINE)
     there = [p.stem for package in ROOMS for _, p in modules(package) if p.name != "__init__.py"]
-    assert sorted(named) == sorted(
-        [*there, *(r for rooms in ROOMS.values() for r in rooms if r != "arguments")]
-    )
+    rooms = [room for package, rooms in ROOMS.items() for room in rooms if (ROOT / package / room).is_dir()]
+    assert sorted(named) == sorted([*there, *rooms])

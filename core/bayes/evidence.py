@@ -18,7 +18,7 @@ USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal
 NOISES = 5  # grid points, from the floor up
 FREE_PRECISION = 1e-4  # Prior precision of the five free terms: nearly none, it keeps the matrix invertible.
 ROUNDING = 1e-13  # Share of the trace of a system.
-GROUP = 4  # touches whose likelihoods are computed at once
+GROUP = 4  # touches whose likelihoods are computed at once (benchmarks.speed)
 
 
 class Restricted(NamedTuple):

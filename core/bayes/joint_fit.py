@@ -34,6 +34,7 @@ from .linear_system import (
 )
 from .posterior import FREE, Posterior
 
+# benchmarks.accuracy judges MISFIT, the outliers of benchmarks.stability the last two.
 MISFIT = 2e-3  # Share of the radius: no surface is a polynomial, so the noise is never less.
 PASSES = 8  # At most: two passes turn the frame to what they found, and more are for outliers.
 SETTLED_WEIGHT = 0.1  # Change of a weight between passes that counts as none.

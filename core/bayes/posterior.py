@@ -15,7 +15,7 @@ from ..patch.monge import DEGREE, TERMS, MongePatch, monomials
 ORDERS = TERMS.sum(axis=1).astype(float)
 FREE = 5  # x, y, x^2, xy, y^2 have no prior
 DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L
-ALIKE = 0.05  # a difference of curvatures that makes no directions
+ALIKE = 0.05  # a difference of curvatures that makes no directions, as in the rule of benchmarks.stability
 CONFIDENCE = 0.95
 INVISIBLE = 0.9  # A direction of which this share of the prior's variance is left is invisible.
 

@@ -34,8 +34,8 @@ FREE_VARIANCE = 0.03  # of slopes and second derivatives: where curves end early
 TEMPER = 0.15  # of the log likelihood: contacts side by side tell of waves between the curves no more
 
 
-class Touch(NamedTuple):
-    """A touch in unit radius and in a frame near to its Darboux frame.
+class Observations(NamedTuple):
+    """What a touch has felt, in unit radius and in a frame near to its Darboux frame.
 
     contacts : (n, 3)
     weights : (n,), above 0
@@ -49,7 +49,7 @@ class Touch(NamedTuple):
     most: float
     normals: Array | None
 
-    def moved(self, turn: Array, scale: float) -> "Touch":
+    def moved(self, turn: Array, scale: float) -> "Observations":
         """This touch in axes (3, 3), with lengths over `scale`."""
         return self._replace(
             contacts=self.contacts @ turn / scale,
@@ -80,7 +80,7 @@ class System(NamedTuple):
     kernels: list[Array]
 
 
-def system_of(touch: Touch) -> System:
+def system_of(touch: Observations) -> System:
     """What fits of the touch are made of."""
     flat = touch.contacts[:, :2]
     basis = monomials(flat[:, 0], flat[:, 1], TERMS)
@@ -102,7 +102,7 @@ class Sizes(NamedTuple):
     asked: bool
 
 
-def sizes(touch: Touch, system: System) -> Sizes:
+def sizes(touch: Observations, system: System) -> Sizes:
     """By the marginal likelihood of the heights.
 
     Heights ~ N(0, K), K = basis prior basis' + v k + noise^2, by one Cholesky factor of K bordered by the
@@ -122,7 +122,7 @@ def sizes(touch: Touch, system: System) -> Sizes:
     return Sizes(shares.sum(axis=2) @ AMPLITUDES**2, noise, bool(p.mean() > ODDS * p_alone.mean()))
 
 
-def _weighted(touch: Touch, system: System) -> tuple[Array, Array, list[Array]]:
+def _weighted(touch: Observations, system: System) -> tuple[Array, Array, list[Array]]:
     """Basis, heights and kernels of the places, rows times the roots of their weights."""
     if len(system.places) == len(touch.weights) and touch.weights.min() == 1.0:
         return system.basis, system.heights, system.kernels
@@ -195,7 +195,7 @@ def _surprises_alone(basis: Array, heights: Array) -> Array:
     return surprises
 
 
-def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
+def mean_given(touch: Observations, system: System, sizes: Sizes) -> Array:
     """Means of the terms, and of what k(p, places) is multiplied with, (27 + m,)."""
     from scipy.linalg.lapack import dposv
 
@@ -211,7 +211,7 @@ def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
     return np.concatenate([prior * (solution @ basis), np.sqrt(touch.weights) * solution])
 
 
-def fitted(touch: Touch, system: System, variances: Array, noise: float) -> Residual:
+def fitted(touch: Observations, system: System, variances: Array, noise: float) -> Residual:
     """What the contacts say, given these.
 
     The unknowns are the terms and what L^-1 k(u, p) is multiplied with: that makes the prior's precision 1
@@ -238,7 +238,7 @@ def fitted(touch: Touch, system: System, variances: Array, noise: float) -> Resi
     return residual
 
 
-def _add_slopes(touch: Touch, precision: Array, seen: Array) -> None:
+def _add_slopes(touch: Observations, precision: Array, seen: Array) -> None:
     """What measured normals add to the terms' part of the system."""
     assert touch.normals is not None
     given = touch.normals, touch.contacts, touch.weights

@@ -21,9 +21,9 @@ from .joint_fit import turned
 from .posterior import DISK, FREE, Posterior, nodes
 from .residual_evidence import (
     ROUGH_MISFIT,
+    Observations,
     Sizes,
     System,
-    Touch,
     asking,
     fitted,
     mean_given,
@@ -31,7 +31,7 @@ from .residual_evidence import (
     system_of,
 )
 
-QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's.
+QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's (benchmarks.real).
 
 
 class RoughFit(NamedTuple):
@@ -74,7 +74,7 @@ def rough_fit(
     for i in candidates.tolist():
         there, least = weights[i] > 0.0, max(float(accuracy[i]), ROUGH_MISFIT)
         point = np.zeros((int(through), 3))  # a contact like the others: on facets it may be off as they are
-        touch = Touch(
+        touch = Observations(
             np.vstack([contacts[i][there], point]),
             np.append(weights[i][there], np.ones(len(point))),
             least,
@@ -88,7 +88,9 @@ def rough_fit(
     return found
 
 
-def _settle(found: RoughFit, place: int, touch: Touch, system: System, size: Sizes, tangent: Array) -> None:
+def _settle(
+    found: RoughFit, place: int, touch: Observations, system: System, size: Sizes, tangent: Array
+) -> None:
     """Into `found`: the fit of a touch in the frame that its first fit shows."""
     (at, weights), half = _projection(), len(nodes()[2])
     first, places = mean_given(touch, system, size), touch.contacts[system.places, :2]

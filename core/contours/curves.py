@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..arguments import SMALLEST, Array
 from .contour import Contour, cross
 
-WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
+# Contacts "very close to p" (benchmarks.accuracy); even: a cubic term bends no quadratic over equal sides.
+WINDOW = 10
 LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
 RIDGE = 1e-12  # Share of the equations of r0, r1 and r2 that is added, for all s may be one.
 EXACT = 1e-6  # radians, of a measured normal: no less is told apart

@@ -13,6 +13,7 @@ from ..arguments import Array
 from .contour import Contour, cross
 from .curves import LEAST_CONTACTS, Curves
 
+# benchmarks.stability leads planes and tilts to where these refuse them.
 LEAST_ANGLE = math.radians(1.0)  # between tangents that count as distinct
 OFF_PLANE = math.sin(math.radians(25.0))  # Sine of the angle of a tangent and the tangent plane.
 UMBILIC = 1e-9  # the difference of curvatures, in unit radius, that is none

@@ -21,6 +21,7 @@ from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_STD
 
+# benchmarks.amount judges the numbers of contacts, benchmarks.extents how far curves grow.
 # Numbers of contacts of the longest half curve: the first that is enough is taken.
 CONTACT_COUNTS = (12, 24, 48)
 LEAST = 4  # contacts of the shortest half curve
@@ -39,11 +40,15 @@ Feel = Callable[[float], list[Contour]]  # contours of an extent
 
 @dataclass(frozen=True, eq=False)
 class Felt:
-    """Contours as they were tracked with a step between contacts; `partial`: not as far as may be."""
+    """Contours as they were tracked with a step between contacts; `partial`: not as far as may be.
+
+    largest_std : a length, that the mean deviation of the height may be at most; None for a share of L
+    """
 
     contours: list[Contour]
     point: Array
     step: float
+    largest_std: float | None
     partial: bool = False
 
     @cached_property
@@ -86,7 +91,7 @@ class Felt:
         starts = np.cumsum(sizes) - sizes.ravel()
         squares = np.append((z - r.height(x, y)) ** 2, 0.0)
         sums = np.add.reduceat(squares, starts).reshape(-1, 3)[:, ::2]
-        limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
+        limit = max(EXPLAINED * max(r.accuracy, MISFIT) * r.radius, self.largest_std or 0.0)
         return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0) / limit
 
 
@@ -114,10 +119,10 @@ class Grown(NamedTuple):
         return self.result.status == "ok"
 
 
-def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
+def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: float | None) -> Fits:
     """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
     first = SEEDS[0] * step
-    felt = Felt(feel(min(first, farthest)), point, step, partial=first < farthest)
+    felt = Felt(feel(min(first, farthest)), point, step, largest_std, partial=first < farthest)
     known: dict[bytes, Grown] = {}
     found = yield from _seed(felt, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
@@ -127,7 +132,7 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
         if (felt.open & (longer > felt.whole)).any():
-            felt = Felt(feel(farthest), point, step)
+            felt = Felt(feel(farthest), point, step, largest_std)
         longer = np.minimum(longer, felt.whole)
         try:
             trial = known.get(longer.tobytes()) or (yield from tried(felt, longer))
@@ -168,7 +173,7 @@ def tried(felt: Felt, counts: Counts) -> Fits:
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
-    spread = r.mean_height_std / (GROWN_STD * r.radius)
+    spread = r.mean_height_std / (felt.largest_std or GROWN_STD * r.radius)
     return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
 
 

@@ -35,6 +35,7 @@ def explore(
     planes: int | Sequence[SamplingPlane] = 3,
     *,
     farthest: float | None = None,
+    largest_std: float | None = None,
     tolerance: float | None = None,
     most_planes: int = 6,
     extent: float | str = "auto",
@@ -51,6 +52,8 @@ def explore(
 
     planes : as in `track`, or how many, k: then their azimuths are pi i / k
     farthest : the longest that a half curve may become; None for as long as curves go on before they end
+    largest_std : mean deviation of the height until which half curves grow, and until which they count as
+        explained; None for shares of the radius
     tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
         added, up to `most_planes`, as long as one takes a tenth off. None for the given planes only
     extent : of each half curve, as in `track`; "auto" has each grow until the default fit no longer
@@ -80,6 +83,7 @@ def explore(
         up[None],
         planes,
         farthest=farthest,
+        largest_std=largest_std,
         tolerance=tolerance,
         most_planes=most_planes,
         extent=extent,
@@ -104,6 +108,7 @@ def explore_many(
     planes: int | Sequence[SamplingPlane] = 3,
     *,
     farthest: float | None = None,
+    largest_std: float | None = None,
     tolerance: float | None = None,
     most_planes: int = 6,
     extent: float | str = "auto",
@@ -132,6 +137,7 @@ def explore_many(
         "extent": length,
         "step": _given("step", step),
         "farthest": length or (None if farthest is None else number("farthest", farthest, above=0.0)),
+        "largest_std": None if largest_std is None else number("largest_std", largest_std, above=0.0),
         "tolerance": None if tolerance is None else number("tolerance", tolerance, least=0.0),
         "most_planes": number("most_planes", most_planes, least=3.0),
         "is_grown": method == "bayes",

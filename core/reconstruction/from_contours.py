@@ -28,7 +28,7 @@ METHODS = ("bayes", *PAPER_METHODS)
 # lambda L^2: of TAGC the paper's 9.99/mm^2 at L = 10 mm; quadratic variation in the paper is subject to
 # f = 0, which 1e5 comes near.
 WEIGHTS = {"tagc": 1e3, "quadratic-variation": 1e5}
-STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache
+STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache (benchmarks.speed)
 
 
 def reconstruct(

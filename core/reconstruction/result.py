@@ -23,7 +23,7 @@ from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.residual import Residual
 from .status import doubt
 
-MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at most.
+MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at most (benchmarks.patch_mesh).
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,16 +44,12 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
     unit: EnumProperty(name="Unit", description="What the numbers of the file measure", items=UNITS)
-    use_point: BoolProperty(
-        name="Given Reference Point",
-        description="Not the point nearest to all curves",
-        options={"SKIP_PRESET"},
-    )
     point: FloatVectorProperty(
         name="Reference Point",
         subtype="TRANSLATION",
-        description="Where the curves meet, exact, or a place among strokes; in units of the scene",
-        options={"SKIP_PRESET"},
+        description="Where the curves meet, exact, or a place among strokes; until it is set "
+        "that of the file, or the point nearest to all curves",
+        options={"SKIP_SAVE", "SKIP_PRESET"},
     )
     strokes: BoolProperty(
         name="Strokes",
@@ -67,17 +63,11 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         min=0.0,
         precision=4,
     )
-    use_outward: BoolProperty(
-        name="Given Outward Direction",
-        description="Not the mean of the normals, nor the side to which the surface bulges",
-        options={"SKIP_PRESET"},
-    )
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="A direction on the outer side of the surface",
-        default=(0.0, 0.0, 1.0),
-        options={"SKIP_PRESET"},
+        description="A direction on the outer side of the surface, for scripts; Flip chooses the other side",
+        options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
     )
     flip: BoolProperty(name="Flip", description="The other side is the outer one")
     noise: FloatProperty(
@@ -132,24 +122,12 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         return {"FINISHED"}
 
     def _given(self, name):
-        """The vector, where its box is ticked or, by a script, it is set."""
-        use = f"use_{name}"
-        given = (
-            getattr(self, use)
-            if self.properties.is_property_set(use)
-            else self.properties.is_property_set(name)
-        )
-        return list(getattr(self, name)) if given else None
+        return list(getattr(self, name)) if self.properties.is_property_set(name) else None
 
     def draw(self, context):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(self, "unit")
-        for name in ("point", "outward"):
-            layout.prop(self, f"use_{name}")
-            if getattr(self, f"use_{name}"):
-                layout.prop(self, name)
-        for name in ("strokes", "radius", "flip", "noise", "normal_std"):
+        for name in ("unit", "point", "strokes", "radius", "flip", "noise", "normal_std"):
             layout.prop(self, name)
         draw_solver(layout, self)
 

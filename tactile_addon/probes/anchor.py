@@ -117,6 +117,11 @@ def keep(probe, patch):
     patch[BASE] = [*_numbers(target.matrix_world), *_numbers(patch_record.matrix_of(axes, origin))]
 
 
+def let_go(patch):
+    """The target of the probe is another now, which does not carry a patch of the one before."""
+    patch.pop(BASE, None)
+
+
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def carry(probe, patch):
     """Where the target was moved since, the patch's record is that of a patch that was moved with it.
@@ -124,8 +129,10 @@ def carry(probe, patch):
     Not where the probe has been left behind, as one that is not the target's child.
     """
     target, report, base = probe.tactile_probe.target, patch_record.report_of(patch), patch.get(BASE)
-    if target is None or report is None or base is None or report["source"] != target.name:
+    if target is None or report is None or base is None:
         return
+    if report["source"] != target.name:  # it was renamed
+        report["source"] = target.name
     if not is_attached(probe) and seat(probe, report.get("extent", 0.0)) != list(probe.tactile_probe.seat):
         return
     before, frame = np.reshape(base, (2, 4, 4))

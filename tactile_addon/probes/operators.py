@@ -91,9 +91,9 @@ def report_error(operator, error):
 
 
 def target_object(context, name):
-    """The object to touch: by name, or the active one, or what the active patch or map was touched on."""
+    """The object to touch: by name, or the active one, or what the active patch, map or surface is of."""
     obj = context.view_layer.objects.active
-    record, found = record_of(obj) or (obj and obj.get(patch_record.MAP_RECORD)), probe_of(obj)
+    record, found = record_of(obj) or patch_record.touched_record(obj), probe_of(obj)
     if not name and found is not None and found.tactile_probe.target is not None:
         return found.tactile_probe.target
     if not name and record is not None:

@@ -101,7 +101,7 @@ def _add(settings, suggested):
 
 
 class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
-    """Feel along one plane less"""
+    """Remove this sampling plane"""
 
     bl_idname = "tactile.remove_plane"
     bl_label = "Remove Plane"
@@ -120,6 +120,11 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
     def execute(self, context):
         found = probe.probe_of(context.view_layer.objects.active)
         settings = found.tactile_probe
+        count = settings.plane_count
+        if self.plane >= count:
+            return report_error(
+                self, ValueError(f"There are {count} planes, 0 to {count - 1}: take one of them")
+            )
         for name in ("azimuths", "tilts"):
             values = list(getattr(settings, name))
             values.append(values.pop(self.plane))

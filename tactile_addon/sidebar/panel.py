@@ -10,7 +10,6 @@ from ..comparison.verify_operator import TACTILE_OT_verify
 from ..probes import number_fields, probe
 from ..probes.probe_operators import (
     TACTILE_OT_add_plane,
-    TACTILE_OT_add_planes,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
     TACTILE_OT_share_range,
@@ -25,6 +24,8 @@ from ..touch import units
 from ..touch.settings import draw_chosen, draw_sensor, draw_solver
 from ..touch.wording import registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
+from ..whole_object.object_operator import TACTILE_OT_touch_all_over
+from ..whole_object.object_report import object_rows
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
@@ -90,7 +91,7 @@ def _draw_planes(layout, settings):
     heading = column.row(align=True)
     for text in ("Azimuth", "Tilt"):
         heading.label(text=text)
-    heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
+    heading.label(icon="BLANK1")  # above the buttons of the rows
     for i in range(settings.plane_count):
         row = column.row(align=True)
         row.use_property_split = False
@@ -128,6 +129,8 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_range(layout, patch)
         _draw_shown(layout, found, patch)
+        if is_outdated:  # of these numbers
+            layout.label(text="Last Touch")
         draw_rows(context, layout, main_rows(record, unit), active=not is_outdated)
         _draw_details(context, layout, record, unit)
         layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
@@ -137,11 +140,25 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if "registration" in record:
             draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
         if "verification" in record:
-            _draw_verification(context, layout, record["verification"], unit)
+            column = layout.column()
+            column.active = not is_outdated
+            _draw_verification(context, column, record["verification"], unit)
         if found is not None:
             draw_rows(context, layout, plane_rows(record, unit), active=not is_outdated)
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
-            layout.operator(TACTILE_OT_add_planes.bl_idname, icon="PLUS")
+
+
+class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
+    bl_idname = "TACTILE_PT_object"
+    bl_label = "Whole Object"
+
+    def draw_active(self, context, layout, obj):
+        layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
+        if obj is None or patch_record.ATLAS_RECORD not in obj:
+            return
+        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on It", icon="EYEDROPPER").new = True
+        _draw_colors(context, layout, obj, "tactile_colors")
+        draw_rows(context, layout.box(), object_rows(obj[patch_record.ATLAS_RECORD]))
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
@@ -213,4 +230,4 @@ def _draw_verification(context, layout, found, unit):
     draw_rows(context, layout, verification_rows(found, unit))
 
 
-PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_map)
+PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map)

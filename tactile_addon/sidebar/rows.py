@@ -32,6 +32,10 @@ TIPS = {
     "Error on … More": "The same over contacts of more contours between the sampling planes, felt on it",
     "Total |K|": "Absolute Gaussian curvature summed over the patch: 0 where it is flat or rolled",
     "Overlap": "Share of the patch's area that has mesh below it",
+    "Touches": "How many touches the object took",
+    "Surface": "Closed where the object was felt all round",
+    "Rims Left": "Places from which touches could go on",
+    "Tolerance": "How well the height of each patch was to be known",
     "Points": "How many points of the mesh were touched",
     "Spacing": "Distance between the points that were touched",
     "Patches": "How many touches gave a patch",
@@ -84,7 +88,7 @@ def draw_rows(context, layout, rows, active=True):
 
 
 def draw_sentence(context, layout, sentence, icon):
-    """As many lines as the sidebar's width needs."""
+    """Draws a sentence in as many lines as the sidebar's width needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8
     for i, line in enumerate(textwrap.wrap(sentence, max(16, int(_letters(context))))):

@@ -12,19 +12,22 @@ from .stability import REASONS
 
 def map_readable(record):
     """Lines of label and value; lengths in the unit of the scene or file."""
+    return table(map_table_rows(record))
+
+
+def map_table_rows(record):
+    """(label, value) of all that a map has to say."""
     refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
     unit = units.unit_of(bpy.context.scene, record["spacing"])
     lengths = ("spacing", "extent", "step")
-    return table(
-        [
-            ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
-            ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
-            ("refused", refused),
-            ("fit", f"{record['method']}, degree {record['degree']}"),
-            (", ".join(lengths), ", ".join(units.say(record[name], 1, unit) for name in lengths)),
-            *((f"median {name}", value) for name, _, value in _medians(record, unit)),
-        ]
-    )
+    return [
+        ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
+        ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
+        ("refused", refused),
+        ("fit", f"{record['method']}, degree {record['degree']}"),
+        (", ".join(lengths), ", ".join(units.say(record[name], 1, unit) for name in lengths)),
+        *((f"median {name}", value) for name, _, value in _medians(record, unit)),
+    ]
 
 
 def map_summary(record):

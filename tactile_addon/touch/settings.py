@@ -42,6 +42,8 @@ AUTO = {  # literals, to be translated
     "step": "Step (Auto)",
     "degree": "Degree (Auto)",
     "spacing": "Spacing (Auto)",
+    "tolerance": "Tolerance (Auto)",
+    "edge": "Edge Length (Auto)",
 }
 MOST_PLANES = 6
 STEEPEST = math.radians(60)  # Greatest tilt by mouse.
@@ -60,6 +62,10 @@ def silent():
         yield
     finally:
         _is_silent = False
+
+
+def is_silent():
+    return _is_silent
 
 
 def changed(settings, context):

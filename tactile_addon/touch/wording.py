@@ -16,9 +16,14 @@ SHORT = ("edge", "crease", "turns away")  # what ends a curve that could be felt
 
 def readable(report):
     """Lines of label and value; lengths in the unit of the scene or file."""
+    return table(readable_rows(report))
+
+
+def readable_rows(report):
+    """(label, value) of all that a patch has to say."""
     seconds, unit = report["seconds"], unit_of(bpy.context.scene, report["radius"])
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
-    rows = [
+    return [
         ("touched", report["source"]),
         ("status", f"{report['status']}: {report['message']}"),
         ("fit", f"{report['method']}, degree {report['degree']}"),
@@ -44,7 +49,6 @@ def readable(report):
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
-    return table(rows)
 
 
 def verdict(report, unit):

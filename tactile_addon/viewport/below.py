@@ -88,8 +88,8 @@ def point_below(context, event):
 
 
 def _touched_by_map(obj, space):
-    """What a stability map shows, where it is not to be seen itself; `obj` for all else."""
-    record = obj.get(patch_record.MAP_RECORD)
+    """What a map or a whole object shows, where it is not to be seen itself; `obj` for all else."""
+    record = patch_record.touched_record(obj)
     source = record and bpy.data.objects.get(record["source"])
     return obj if source is None or source.visible_in_viewport_get(space) else source
 

@@ -46,6 +46,21 @@ def test_every_option_arrives(command, files):
     assert bpy.data.objects["Sphere Patch"]["tactile"]["degree"] == 5
 
 
+def test_a_whole_object_from_a_file(command, files):
+    output = files / "whole.ply"
+    options = ("--tolerance", "0.01", "--edge", "0.2", "--seed", "1", "--json", "-", "--output", output)
+    code, out, _ = command("object", files / "ball.ply", *options)
+    assert code == 0
+    (line,) = [line for line in out.splitlines() if line.startswith("{")]
+    report = json.loads(line)
+    assert report["is_closed"]
+    assert report["deviation_mean"] < 0.01
+    assert b"property float height_std" in output.read_bytes()[:2000]
+    code, out, _ = command("object", files / "ball.ply", "--tolerance", "0.01")
+    assert code == 0
+    assert "closed all round" in out
+
+
 def test_a_map_from_every_kind_of_file(command, files):
     reports = []
     for kind in ("ply", "stl", "obj", "blend"):

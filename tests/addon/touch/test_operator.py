@@ -32,7 +32,7 @@ def reconstruct(bpy, **arguments):
 
 
 def test_enabling_the_extension_imports_no_scipy():
-    """In a process of its own, for the tests import scipy."""
+    """A process of its own looks, for the tests import scipy."""
     code = (
         "import sys, bpy, addon_utils; addon_utils.enable('bl_ext.user_default.tactile_patch');"
         "assert hasattr(bpy.types, 'TACTILE_OT_reconstruct'), 'not enabled';"
@@ -227,7 +227,7 @@ def test_extent_and_step_suit_the_object_where_they_are_not_given(empty, ball):
 
 
 def test_the_chosen_extent_does_not_depend_on_how_the_object_is_turned(empty, ball):
-    """With the planes turned along, which are otherwise laid out by the axes of the world."""
+    """The planes turn along, which are otherwise laid out by the axes of the world."""
     ball.scale = (1.0, 2.0, 0.5)
     extents, along = [], None
     for angle in (0.0, 0.7):

@@ -7,6 +7,7 @@ import pytest
 import surfaces
 
 import core
+from core.exploration import one_touch
 from core.exploration.one_touch import NOTICEABLE, is_enough
 from core.reconstruction.status import DOUBTFUL_STD
 
@@ -297,7 +298,7 @@ def test_whether_contacts_are_enough_is_no_matter_of_the_unit(noise):
 
 
 def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
-    """By another fit: the deviation with as many contacts more, between those there are."""
+    """The deviation, by another fit, with as many contacts more, between those there are."""
     surface = surfaces.torus(40, 20, 0.6)
     for step, noise in ((0.5, 0.05), (2.0, 0.05), (3.0, 0.2), (1.0, 0.01)):
         planes = surfaces.planes((0, 60, 120))
@@ -344,3 +345,12 @@ def test_planes_may_be_a_number_of_evenly_laid_out_ones(count):
 def test_too_few_or_too_many_planes_are_refused(planes):
     with pytest.raises(ValueError, match="planes: wanted 3 to 24, or sampling planes, got"):
         explore(surfaces.plane(), planes=planes)
+
+
+def test_six_planes_are_the_most_unless_more_are_wanted(monkeypatch):
+    s = surfaces.torus(40, 20, 0.6)
+    monkeypatch.setattr(one_touch, "HELPS", -1.0)
+    given = {"extent": 12.0, "step": 1.0, "tolerance": 0.0, "noise": 0.05, "rng": 0}
+    assert len(core.explore(s, s.point, s.normal, **given).planes) == 6
+    assert len(core.explore_many(s, [s.point], [s.normal], **given)[0].planes) == 6
+    assert len(core.explore(s, s.point, s.normal, most_planes=4, **given).planes) == 4

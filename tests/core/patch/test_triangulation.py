@@ -50,7 +50,7 @@ def deviations(patch, points, triangles, steps=9):
 
 
 def angles(points, triangles):
-    """Of the triangles' corners in the tangent plane, in degrees; negative where it goes round clockwise."""
+    """The triangles' angles in the tangent plane, in degrees; negative where one goes round clockwise."""
     corners = points[triangles][:, :, :2]
     u, v = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     return np.degrees(np.arctan2(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0], np.sum(u * v, axis=-1)))
@@ -168,3 +168,10 @@ def test_a_touch_has_a_mesh_as_fine_as_what_is_known_of_it(surface, noise, metho
     assert angles(points, triangles).min() > LEAST_ANGLE
     assert points[0].tolist() == [0.0, 0.0, 0.0]  # the reference point
     assert len(points) < 2000
+
+
+def test_where_it_is_flat_neighbors_are_a_quarter_of_the_radius_apart():
+    points, triangles = patch_mesh(PATCHES["plane"], DOMAINS["even"], 0.1)
+    inner = triangles[(np.linalg.norm(points[triangles], axis=2) < 0.6).all(axis=1)]
+    edges = np.linalg.norm(points[inner] - points[np.roll(inner, 1, axis=1)], axis=2)
+    assert edges.min() > 0.1 and edges.max() < 0.275

@@ -258,3 +258,12 @@ def test_the_frame_may_be_ten_degrees_off_and_curvatures_a_tenth_of_one_over_the
     monkeypatch.setattr(Posterior, "curvature_std", lambda _: std)
     assert (r.status == "uncertain") == bool(doubt)
     assert doubt in r.message
+
+
+@pytest.mark.parametrize(
+    ("deviations", "angle", "told"), [(5.5, 0.011, True), (5.5, 0.009, False), (4.5, 0.011, False)]
+)
+def test_normals_contradict_by_five_deviations_and_a_hundredth(deviations, angle, told):
+    r = surfaces.pear().fit(contours_of(surfaces.pear()))
+    vars(r)["contradiction"] = (deviations, angle)
+    assert (r.status == "uncertain") is told

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Export Report: the page of the active patch or stability map as a file."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ..files import whole_file
+from ..probes import probe
+from ..probes.operators import report_error
+from ..scene import patch_record
+from .map_page import map_page
+from .patch_page import patch_page
+
+
+def write(path, obj):
+    """The page of a patch or map object as the file `path`.
+
+    Raises ValueError where the patch was edited, OSError where the file cannot be written.
+    """
+    whole_file.write_text(path, map_page(obj) if patch_record.MAP_RECORD in obj else patch_page(obj))
+
+
+def _reported(context):
+    """The map or patch that is active, or that the active object belongs to, or None."""
+    obj = context.view_layer.objects.active
+    return obj if obj is not None and patch_record.MAP_RECORD in obj else probe.patch_near(obj)
+
+
+class TACTILE_OT_export_report(ExportHelper, bpy.types.Operator):
+    """Write one page for a browser: pictures, deviations, tolerance bands, numbers, settings and versions"""
+
+    bl_idname = "tactile.export_report"
+    bl_label = "Export Report"
+    filename_ext = ".html"
+    filter_glob: StringProperty(default="*.html", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context):
+        if _reported(context) is None:
+            cls.poll_message_set("Select a patch, its probe or its contours, or a stability map first")
+            return False
+        return True
+
+    def invoke(self, context, event):
+        if not self.filepath:
+            self.filepath = bpy.path.clean_name(_reported(context).name) + self.filename_ext
+        return super().invoke(context, event)
+
+    def execute(self, context):
+        try:
+            write(self.filepath, _reported(context))
+        except (OSError, ValueError) as error:
+            return report_error(self, error)
+        self.report({"INFO"}, f'Wrote "{Path(self.filepath).name}"')
+        return {"FINISHED"}
+
+
+def draw_export(self, context):
+    self.layout.operator(TACTILE_OT_export_report.bl_idname, text="Tactile Report (.html)")
+
+
+MENUS = (("TOPBAR_MT_file_export", draw_export),)

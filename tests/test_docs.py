@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Links between the pages lead somewhere, what commands name is there, and the site can be searched."""
+
+import re
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tools import check_site
+
+ROOT = Path(__file__).parent.parent
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+SITE = ROOT / "build" / "site" / "html"
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+FENCE = re.compile(r"^ *```.*?^ *```", re.DOTALL | re.MULTILINE)
+MOST_BYTES, MOST_LINES = 300_000, 75
+
+
+def slug(heading):
+    """The anchor of a heading, as repositories' pages and the site have it."""
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)|[`*]", r"\1", heading.lower())
+    return re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", plain.strip()))
+
+
+def anchors(path):
+    text = FENCE.sub("", path.read_text(encoding="utf-8"))
+    return {slug(heading) for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for link in LINK.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
+        if re.match(r"https?://", link):
+            continue
+        # These two are pages of the site alone, which are made of those beside README.md.
+        name, _, anchor = link.partition("#")
+        target = page.parent / name if name else page
+        if page.parent.name == "docs" and name in ("contributing.md", "changelog.md"):
+            target = ROOT / name.upper().replace(".MD", ".md")
+        assert target.exists(), link
+        if anchor:
+            assert anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_name_what_is_there(page):
+    text = page.read_text(encoding="utf-8")
+    targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    for target in re.findall(r"(?:^|`)make ([a-z-]+)", text, re.MULTILINE):
+        assert target in targets
+    for module in re.findall(r"python -m ((?:benchmarks|tools)\.\w+)", text):
+        assert (ROOT / f"{module.replace('.', '/')}.py").is_file(), module
+    for script in re.findall(r"`((?:benchmarks|examples|tools|tests)/[\w/]+\.\w+)", text):
+        assert (ROOT / script).is_file(), script
+
+
+def test_the_readme_is_short_and_its_picture_small():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= MOST_LINES
+    assert (ROOT / "docs" / "film.webp").stat().st_size < MOST_BYTES
+
+
+def test_the_citation_has_the_version():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert f"\nversion: {manifest['version']}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_the_checker_of_the_site_finds_what_is_broken(tmp_path):
+    (tmp_path / "a.html").write_text(
+        '<h1 id="top"></h1><a href="b.html#here">b</a><a href="#top">t</a><a href="https://elsewhere.org">e</a>'
+    )
+    (tmp_path / "b.html").write_text('<p id="here"></p><a href="a.html">a</a>')
+    assert list(check_site.problems(tmp_path)) == []
+    (tmp_path / "b.html").write_text(
+        '<a href="c.html">c</a><script src="https://elsewhere.org/x.js"></script>'
+    )
+    (tmp_path / "s.css").write_text("body { background: url(//elsewhere.org/x.png) }")
+    found = "\n".join(check_site.problems(tmp_path))
+    for words in (
+        "b.html#here names no place",
+        "c.html leads nowhere",
+        "x.js is loaded from another host",
+        "x.png is",
+    ):
+        assert words in found
+
+
+def test_the_site_is_searched_without_a_server():
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None or not SITE.is_dir():
+        pytest.skip("needs build/site/html, by make site, and a Chromium")
+    command = [
+        browser,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--virtual-time-budget=8000",
+        "--dump-dom",
+    ]
+    page = subprocess.run(
+        [*command, f"{SITE.as_uri()}/index.html?q=umbilic"], capture_output=True, text=True, timeout=120
+    )
+    assert re.search(r'md-search-result__meta">\d+ matching document', page.stdout)
+    assert "<mark>umbilic" in page.stdout
