@@ -18,7 +18,7 @@ from common import PICK_BUTTON, check, is_complete, last_report, look, open_tab,
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
 NUMBER, EXTENT, SENSOR, NOISE = (790, 524), (943, 180), (815, 321), (943, 378)
-CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 234)
+CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 284)
 PIXELS = 20
 
 
