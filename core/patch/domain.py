@@ -52,22 +52,22 @@ class Domain:
         Its slopes at the ends follow from the continuity of its second derivative. Beside straight pieces,
         which are chords, it sets out across the ray to the end, as a circle does.
         """
-        chords = np.roll(self.ends, -1, axis=0) - self.ends
-        lengths = np.sqrt(chords[:, 0] ** 2 + chords[:, 1] ** 2)
-        m, before = len(lengths), np.roll(lengths, 1)
-        rise, rows = chords / lengths[:, None], np.arange(m)
-        system = np.zeros((m, m))
+        rows = np.arange(len(self.ends))
+        last, following = rows - 1, rows + 1 - len(rows)  # of them, in a circle
+        chords = self.ends[following] - self.ends
+        lengths = np.sqrt(np.einsum("mi,mi->m", chords, chords))
+        over, before = lengths[:, None], lengths[last]
+        rise = chords / over
+        system = np.zeros((len(rows), len(rows)))
         system[rows, rows] = 2.0 * (lengths + before)
-        system[rows, rows - 1], system[rows, rows + 1 - m] = lengths, before
-        right = 3.0 * (lengths[:, None] * np.roll(rise, 1, axis=0) + before[:, None] * rise)
-        beside = self._straight | np.roll(self._straight, 1)
-        system[beside], right[beside] = np.eye(m)[beside], self.ends[beside] @ QUARTER
+        system[rows, last], system[rows, following] = lengths, before
+        right = 3.0 * (over * rise[last] + before[:, None] * rise)
+        beside = self._straight | self._straight[last]
+        system[beside], right[beside] = np.eye(len(rows))[beside], self.ends[beside] @ QUARTER
         right[beside] /= np.linalg.norm(self.ends[beside], axis=1, keepdims=True)
         slopes = np.linalg.solve(system, right)
-        bend = (slopes + np.roll(slopes, -1, axis=0) - 2.0 * rise) / lengths[:, None]
-        pieces = np.array(
-            [self.ends, slopes, (rise - slopes) / lengths[:, None] - bend, bend / lengths[:, None]]
-        )
+        bend = (slopes + slopes[following] - 2.0 * rise) / over
+        pieces = np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
         pieces[1, self._straight] = rise[self._straight]
         pieces[2:, self._straight] = 0.0
         return lengths, pieces
@@ -117,8 +117,20 @@ class Domain:
         weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 
+    @cached_property
+    def _around(self) -> tuple[Array, Array]:
+        """`_polar`, and its ends once more at the other end: for azimuths from -pi to pi."""
+        azimuths, radii = self._polar
+        whole = 2.0 * np.pi
+        return (
+            np.concatenate([azimuths[-1:] - whole, azimuths, azimuths[:1] + whole]),
+            np.concatenate([radii[-1:], radii, radii[:1]]),
+        )
+
     def _radius(self, azimuth: Array) -> Array:
-        """How far out the boundary is, by the chords of its samples: straight pieces are exact."""
+        """How far out the boundary is; beside straight pieces by its samples' chords, which are exact."""
+        if self.brinks is None:
+            return np.interp(azimuth, *self._around)
         azimuths, radii = self._polar
         turns, turn = azimuths - azimuths[0], (azimuth - azimuths[0]) % (2.0 * np.pi)
         before = np.searchsorted(turns, turn, side="right") - 1

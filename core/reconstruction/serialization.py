@@ -51,7 +51,6 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "patch": _polynomial_dict(r.patch),
         "contours": [_plain(vars(contour)) for contour in r.contours],
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
-        "misses": r.misses.tolist(),
         "posterior": None if posterior is None else _plain(posterior._asdict()),
     }
 
@@ -89,7 +88,6 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         geometry=_geometry(_of(d, "geometry")),
         patch=_polynomial(_of(d, "patch")),
         contours=contours,
-        misses=finite_array("misses", _of(d, "misses") if contours else np.empty((0, 2)), (len(contours), 2)),
         accuracy=number("accuracy", _of(d, "accuracy"), least=0.0),
         method=method,
         converged=bool(_of(d, "converged")),

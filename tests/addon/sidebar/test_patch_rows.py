@@ -3,6 +3,7 @@
 """What the sidebar says: a verdict first, found values, and what each row means."""
 
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -129,3 +130,61 @@ def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
         empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=0.2)
     with pytest.raises(RuntimeError, match=r"got nan mm, 0 mm and 0 mm"):
         empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=float("nan"))
+
+
+class Layout:
+    """What a panel draws, as (text, whether it is drawn as usual) in `drawn`; parts of it share the list."""
+
+    def __init__(self, whole=None):
+        self.drawn, self.whole, self.active = [] if whole is None else whole.drawn, whole, True
+
+    @property
+    def is_gray(self):
+        return not self.active or (self.whole is not None and self.whole.is_gray)
+
+    def part(self, *_, **__):
+        return Layout(self)
+
+    row = column = split = box = part
+
+    def label(self, *, text="", **_):
+        self.drawn.append((text, not self.is_gray))
+
+    def panel(self, *_, **__):
+        return self.part(), self.part()
+
+    def operator(self, *_, text="", **__):
+        self.drawn.append((text, not self.is_gray))
+        return SimpleNamespace()
+
+    def prop(self, *_, **__):
+        pass
+
+    prop_search = prop
+
+
+def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty, ball):
+    probe, _ = ball
+    assert empty.ops.tactile.verify() == {"FINISHED"}
+    probe.tactile_probe.live = False
+    context = SimpleNamespace(
+        view_layer=empty.context.view_layer,
+        scene=empty.context.scene,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        region=SimpleNamespace(width=300),
+        space_data=SimpleNamespace(shading=SimpleNamespace(type="MATERIAL")),
+    )
+
+    def drawn():
+        layout = Layout()
+        extension.tactile_addon.sidebar.panel.TACTILE_PT_result.draw_active(None, context, layout, probe)
+        return layout.drawn
+
+    numbers = ("κ1 Curvature", "κ2 Curvature", "Height", "Curvedness", "Overlap")
+    assert "Last Touch" not in dict(drawn())
+    assert all(dict(drawn())[name] for name in numbers[:4])
+    probe.tactile_probe.extent = 0.2
+    empty.context.view_layer.update()
+    texts = [text for text, _ in drawn()]
+    assert texts.index("Last Touch") < texts.index("κ1 Curvature")
+    assert not any(dict(drawn())[name] for name in numbers)

@@ -32,6 +32,19 @@ def test_a_patch_of_a_given_extent_says_where_its_curves_ended_before(empty, cub
     assert "half curves" not in report_of(empty, (0.1, 0.2, 1.0), extent=0.5)["message"]
 
 
+@pytest.mark.parametrize("extent", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize("location", [(0.9, 0.2, 1.0), (0.98, 0.1, 1.0), (0.9, 0.85, 1.0), (0.6, -0.7, 1.0)])
+def test_the_patch_ends_at_the_edges_of_its_face(empty, cube, location, extent):
+    report_of(empty, location, extent=extent)
+    (patch,) = empty.context.object.children
+    reach = max(
+        abs(value) for v in patch.data.vertices for value in (patch.matrix_world @ v.co)[:2]
+    )  # the cube's is 1
+    assert reach < 1.005
+    assert empty.ops.tactile.verify() == {"FINISHED"}
+    assert patch["tactile"]["verification"]["overlap"] > 0.99
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.4])
 @pytest.mark.parametrize("extent", [0.0, 0.2, 0.5])
 @pytest.mark.parametrize("location", [(0.1, 0.2, 1.0), (0.9, 0.2, 1.0), (0.9, 0.85, 1.0)])
