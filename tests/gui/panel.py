@@ -18,7 +18,7 @@ from common import PICK_BUTTON, check, is_complete, last_report, look, open_tab,
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
 NUMBER, EXTENT, SENSOR, NOISE = (790, 524), (943, 180), (815, 321), (943, 378)
-CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 234)
+CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 284)
 PIXELS = 20
 
 
@@ -60,10 +60,9 @@ def first():
 
 
 def dragged(place):
-    """Presses on a number and moves it by some pixels, slowly enough for each to count."""
-    x, y = place
-    moves = [arg for i in range(2, PIXELS + 1, 2) for arg in ("mousemove", x + i, y, "sleep", 0.1)]
-    gui.xdo("mousemove", x, y, "sleep", 0.3, "mousedown", 1, "sleep", 0.3, *moves, "mouseup", 1)
+    """Presses on a number and moves it by some pixels, slowly, as a hand does: Blender holds the pointer."""
+    moves = ("mousemove_relative", 2, 0, "sleep", 0.2) * (PIXELS // 2)
+    gui.xdo("mousemove", *place, "sleep", 0.3, "mousedown", 1, "sleep", 0.3, *moves, "mouseup", 1)
     yield from until(is_complete)
 
 
