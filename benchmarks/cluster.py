@@ -105,27 +105,33 @@ def looped(files, asked, count):
 
 def rates(files, runs, touches):
     """(a); seconds of processor time of a touch, by kind."""
+    pairs = {(kind, workers): [] for kind in KINDS for workers in (1, 2)}
+    for workers in (1, 2):
+        with connected(None, workers, None) as client:
+            engine = Engine(client, LIMIT)
+            made(engine, files, options(2 * 60, 60, seed=99, **KINDS["fixed"]))  # warm
+            for _ in range(runs):
+                for kind, more in KINDS.items():
+                    plain = looped(files, {"touches": touches[kind], "block": 500, **more}, workers)
+                    cluster = made(engine, files, options(workers * touches[kind], 500, **more))
+                    pairs[kind, workers].append((plain, cluster))
+                    _say(kind, workers, plain, cluster)
     rows, seconds = [], {}
-    for kind, more in KINDS.items():
-        asked = {"touches": touches[kind], "block": 500, **more}
-        for workers in (1, 2):
-            total = workers * len(files) * touches[kind]
-            pairs = []
-            with connected(None, workers, None) as client:
-                engine = Engine(client, LIMIT)
-                made(engine, files, options(**asked | {"touches": 2 * 60, "block": 60, "seed": 99}))  # warm
-                for _ in range(runs):
-                    plain = looped(files, asked, workers)
-                    wide = asked | {"touches": workers * touches[kind]}
-                    pairs.append((plain, made(engine, files, options(**wide))))
-            plain, cluster = (total / median(pair[i][0] for pair in pairs) for i in (0, 1))
-            wall = median(pair[0][0] / pair[1][0] for pair in pairs)
-            work = median(pair[0][1] / pair[1][1] for pair in pairs)
-            rows.append([kind, f"{workers}", f"{plain:.0f}", f"{cluster:.0f}", f"{wall:.2f}", f"{work:.2f}"])
-            seconds[kind] = median(pair[0][1] for pair in pairs) / total
+    for (kind, workers), found in pairs.items():
+        total = workers * len(files) * touches[kind]
+        seconds[kind] = median(plain[1] for plain, _ in found) / total
+        speeds = [total / median(pair[i][0] for pair in found) for i in (0, 1)]
+        ratios = [median(plain[i] / cluster[i] for plain, cluster in found) for i in (0, 1)]
+        rows.append([kind, f"{workers}", *(f"{v:.0f}" for v in speeds), *(f"{v:.2f}" for v in ratios)])
     print(f"(a) {len(files)} scans, {touches} touches of each and worker, blocks of 500.\n")
     table(["touches", "workers", "plain loops /s", "data set /s", "ratio", "processor"], rows, left=1)
     return seconds
+
+
+def _say(kind, workers, plain, cluster):
+    """What a pair of runs has taken, at once, for they take long."""
+    times = [f"{seconds:.1f} s, processor {work:.1f} s" for seconds, work, *_ in (plain, cluster)]
+    print(f"{kind}, {workers}: plain loops {times[0]}; data set {times[1]}", file=sys.stderr, flush=True)
 
 
 def overhead(path, count):
