@@ -129,7 +129,7 @@ class ObjectTouches:
             "touches": len(self.found),
             "patches": len(atlas.patches),
             "in_doubt": sum(r.status != "ok" for r in atlas.patches),
-            "uncovered": atlas.uncovered,
+            "uncovered": len(atlas.uncovered),
             "edges": len(atlas.edges),
             "is_closed": mesh.is_closed,
             "vertices": len(mesh.vertices),

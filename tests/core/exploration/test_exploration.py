@@ -7,8 +7,9 @@ import pytest
 import surfaces
 
 import core
-from core.exploration import one_touch
+from core.exploration import growth, one_touch, touches
 from core.exploration.one_touch import NOTICEABLE, is_enough
+from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
 
 PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
@@ -80,6 +81,38 @@ def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_leng
     found = explore(surface, noise=0.08, rng=0)
     assert found.extent == pytest.approx(9 * 30.0 / 96)  # 6, 12 and 24 of 96 are the lengths tried first
     assert true_error(surface, found) < 1.5 * found.result.mean_height_std
+
+
+def short_waves():
+    return bowl_with(
+        lambda x, y: 0.12 * np.sin(2.0 * x) * np.sin(2.0 * y),
+        lambda x, y: (
+            0.24 * np.cos(2.0 * x) * np.sin(2.0 * y),
+            0.24 * np.sin(2.0 * x) * np.cos(2.0 * y),
+        ),
+    )
+
+
+def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
+    asked = []
+    monkeypatch.setattr(touches, "fitted", lambda *given: asked.append(1) or fitted(*given))
+    found, few = explore(short_waves()), len(asked)
+    monkeypatch.setattr(growth, "TOO_ROUGH", np.inf)
+    assert explore(short_waves()).extent == found.extent
+    assert len(asked) - few > few
+
+
+def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
+    tried = growth.tried
+
+    def of_more_than_the_least(felt, counts):
+        if counts.max() <= growth.SEEDS[-1]:
+            raise core.DegenerateCurvesError("too few")
+        return (yield from tried(felt, counts))
+
+    monkeypatch.setattr(growth, "tried", of_more_than_the_least)
+    monkeypatch.setattr(growth.Felt, "roughness", lambda *_: 2.0)
+    assert explore(surfaces.plane()).result.status == "ok"
 
 
 def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
