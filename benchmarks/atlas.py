@@ -3,11 +3,11 @@
 """Whole objects: how far the surface of all touches is off, after how many touches and seconds, beside peers.
 
 `python -m benchmarks.atlas [--only NAME] [--finest T] [--no-peers]`, from the root of a checkout; bpy to read
-the scans and to cast rays, pymeshlab for two of the peers. Sizes are 1, contacts have a noise of .0005. Prints
-Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the object from
-the mesh, what share of these the field's 90 % interval holds, and what the mesh is; (b) peers on the contacts of
-tolerance .001, each at the best of its settings, with the surface's own normals at all contacts; (c) as many
-touches at random places. Draws build/charts/atlas.png.
+the scans and to cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a noise of .0005.
+Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the object
+from the mesh, what share of these the field's 90 % interval holds, and what the mesh is; (b) peers on the
+contacts of tolerance .001, each at the best of its settings, with the surface's own normals at all contacts;
+(c) as many touches at random places. Draws build/charts/atlas.png.
 """
 
 import argparse
@@ -63,6 +63,7 @@ class Exact:
 
 def off_mesh(vertices, triangles, points):
     """Distances of points from a mesh, in permille of the size."""
+    import bpy  # noqa: F401  # brings mathutils
     from mathutils.bvhtree import BVHTree
 
     tree = BVHTree.FromPolygons(np.asarray(vertices).tolist(), np.asarray(triangles).tolist())
