@@ -106,8 +106,8 @@ def _mean(
     """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
 
     def total(values: Array) -> Array:
-        found: Array = np.bincount(place, w * values, count)  # type: ignore[assignment]
-        return found
+        # Of nothing numpy counts integers.
+        return np.bincount(place, w * values, count).astype(np.float64)
 
     some = total(np.ones(len(w)))
     there = some > 0.0
