@@ -117,20 +117,8 @@ class Domain:
         weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 
-    @cached_property
-    def _around(self) -> tuple[Array, Array]:
-        """`_polar`, and its ends once more at the other end: for azimuths from -pi to pi."""
-        azimuths, radii = self._polar
-        whole = 2.0 * np.pi
-        return (
-            np.concatenate([azimuths[-1:] - whole, azimuths, azimuths[:1] + whole]),
-            np.concatenate([radii[-1:], radii, radii[:1]]),
-        )
-
     def _radius(self, azimuth: Array) -> Array:
-        """How far out the boundary is; beside straight pieces by its samples' chords, which are exact."""
-        if self.brinks is None:
-            return np.interp(azimuth, *self._around)
+        """How far out the boundary is, by the chords of its samples: straight pieces are exact."""
         azimuths, radii = self._polar
         turns, turn = azimuths - azimuths[0], (azimuth - azimuths[0]) % (2.0 * np.pi)
         before = np.searchsorted(turns, turn, side="right") - 1
