@@ -217,9 +217,7 @@ def add_planes():
     yield from until(lambda: probe().tactile_probe.plane_count > planes, 10)
     more = len(patch()["tactile"]["added_planes"])
     there = probe().tactile_probe.plane_count
-    check(
-        "a menu's entry adds planes while they help", there == planes + more > planes, (planes, more, there)
-    )
+    check("an entry adds planes while they help", there == planes + more > planes, (planes, more, there))
     said = last_report()
     check("... and says what they have brought", "Planes added at" in said and "has become" in said, said)
     consistent("more planes")
