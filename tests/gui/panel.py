@@ -70,20 +70,26 @@ def numbers():
     yield from until(is_complete)
 
 
+def toggled(place, reached):
+    """Presses a button once the mouse is known to be over it."""
+    gui.xdo("mousemove", place[0] - 5, place[1], "sleep", 0.3, "mousemove", *place)
+    yield 0.7
+    gui.click(*place)
+    yield from until(reached, 10)
+
+
 def hidden():
-    (lines,) = patch().children
-    for place in (CONTOURS, HANDLES):
-        gui.click(*place)
-        yield 1
+    (lines,), settings = patch().children, probe().tactile_probe
+    yield from toggled(CONTOURS, lambda: lines.hide_viewport)
     check("a button hides the contours", lines.hide_viewport and not lines.visible_get())
-    check("... and one the handles", not probe().tactile_probe.show_handles)
+    yield from toggled(HANDLES, lambda: not settings.show_handles)
+    check("... and one the handles", not settings.show_handles)
     picture("panel_hidden")
-    probe().tactile_probe.azimuths[0] += 0.1
+    settings.azimuths[0] += 0.1
     yield from until(is_complete)
-    for place in (CONTOURS, HANDLES):
-        gui.click(*place)
-        yield 1
-    check("... and they come back", lines.visible_get() and probe().tactile_probe.show_handles)
+    yield from toggled(CONTOURS, lambda: not lines.hide_viewport)
+    yield from toggled(HANDLES, lambda: settings.show_handles)
+    check("... and they come back", lines.visible_get() and settings.show_handles)
 
 
 def on_map():
