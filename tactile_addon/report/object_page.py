@@ -19,7 +19,7 @@ def object_page(obj):
     limit = symmetric_range(off, parts.LEAST_RANGE)
     scale = page.figure(drawing.scale(limit, parts.label(1, unit)), "deviation, red outside of the mesh")
     reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
-    words = "Shares of the area by its distance from the mesh that was touched. Both ends count more."
+    words = "Shares of the area by its distance from the mesh. The outermost bars count all beyond."
     sections = [
         page.verdict(object_summary(record), record["is_closed"]),
         page.section("Pictures", *views.three_sides(obj.data, shades(off, limit)), scale),

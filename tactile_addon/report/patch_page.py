@@ -65,9 +65,11 @@ def _has_mesh(record):
 def _deviations(patch, r, record):
     if _has_mesh(record):
         points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
-        words = "Shares of the patch's area by its distance from the mesh. Both ends count all beyond."
+        words = (
+            "Shares of the patch's area by its distance from the mesh. The outermost bars count all beyond."
+        )
         off = values(patch.data, "deviation").astype(float)
         return Deviations(off, parts.vertex_areas(points, corners), words)
     x, y, z = r.contacts.T
-    words = "Shares of the contacts by the patch's height above them. Both ends count all beyond."
+    words = "Shares of the contacts by the patch's height above them. The outermost bars count all beyond."
     return Deviations(r.height(x, y) - z, np.ones(len(x)), words)

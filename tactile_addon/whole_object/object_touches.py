@@ -134,7 +134,7 @@ class ObjectTouches:
             "is_closed": mesh.is_closed,
             "vertices": len(mesh.vertices),
             "triangles": len(mesh.triangles),
-            "height_std": float(mesh.std.mean()),
+            "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # where it was felt
             "deviation_mean": float(off.mean()),
             "deviation_max": float(off.max()),
             "radius": float(np.median([r.radius for r in atlas.patches])),
