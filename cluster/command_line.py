@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ def main(words: Sequence[str] | None = None) -> int:
     """Makes a data set; returns the exit code."""
     parser = _parser()
     given = parser.parse_args(words)
+    if given.dashboard and find_spec("bokeh") is None:
+        parser.error("--dashboard: wanted bokeh beside Dask, which draws it: install it")
     try:
         run = Run(DataSet(given.output), _options(given), files_of(given.objects))
         with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:

@@ -65,6 +65,7 @@ class Run:
         known = {path for path in self.files if f"{file_key(path, Path(path).stem)}-00000" in done}
         versions = manifest.versions()
         orders = (Order(path, "survey", (path, versions)) for path in self.files if path not in known)
+        self.progress.note(f"{len(self.files) - len(known):,} files to look through")
         facts = {path: [] for path in self.files}
         for outcome in self._outcomes(engine, orders):
             path = outcome.order.label

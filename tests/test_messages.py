@@ -17,7 +17,7 @@ ROWS = [
     for cell in line.split(" | ")[slice(1, 2) if STATUS.match(line) else slice(1)]
 ]
 ROWS = [row.strip("| ") for row in ROWS if row.strip("| ") not in ("message", "status")]
-ERRORS = {"ValueError", "DegenerateCurvesError", "EngineError", "HopelessError"}
+ERRORS = {"ValueError", "DegenerateCurvesError", "EngineError", "HopelessError", "NotStartedError"}
 
 
 def text_of(node):

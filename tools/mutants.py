@@ -32,6 +32,7 @@ TESTS = {  # of each module of core, those that fail soonest first
     "bayes/posterior": "posterior status",
     "bayes/residual_evidence": "residual",
     "bayes/rough_fit": "residual",
+    "bayes/roughness": "roughness exploration",
     "contours/common_point": "common_point",
     "contours/contour": "tracking reconstruction measured_normals",
     "contours/curves": "local_geometry reconstruction status measured_normals",

@@ -41,7 +41,6 @@ TOUCHES = (
     ("extent", NUMBER, LENGTH, "of the longest half curve"),
     ("step", NUMBER, LENGTH, "between contacts"),
     ("noise", NUMBER, LENGTH, "standard deviation of the simulated sensor"),
-    ("fit_error", NUMBER, LENGTH, "mean distance in height of contacts and surface"),
     ("mesh_error", NUMBER, LENGTH, "mean distance in height of mesh and surface; null where there is none"),
 )
 OBJECTS = (

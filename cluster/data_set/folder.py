@@ -14,12 +14,13 @@ from typing import Any
 import pyarrow.parquet as pq
 
 from ..extension import addon
-from .columns import OBJECT_SCHEMA, TOUCH_SCHEMA, kind_of, table
+from .columns import OBJECT_SCHEMA, REPEATED, TOUCH_SCHEMA, kind_of, table
 
 whole_file = addon("files.whole_file")
 SUMMARY = "summary"  # key of a file's metadata
 ERROR = "-error.parquet"  # ends the names of files of error rows; without them a run tries again
 DIGITS = 16  # of hashes
+REPEATING = [field.name for field in TOUCH_SCHEMA if field.type == REPEATED] + ["stops.list.element"]
 
 
 def hash_of(*parts: bytes) -> str:
@@ -100,4 +101,5 @@ def write_block(path: Path, rows: list[dict[str, Any]], facts: dict[str, Any], s
 
 def _write(path: Path, content: Any) -> None:
     with whole_file.replacing(path) as temporary:
-        pq.write_table(content, temporary, compression="zstd")
+        # Numbers rarely repeat, and as a dictionary they would take half as long again, and more room.
+        pq.write_table(content, temporary, compression="zstd", use_dictionary=REPEATING)

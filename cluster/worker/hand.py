@@ -86,6 +86,7 @@ def main() -> None:
     connection, orders = Connection(int(sys.argv[1])), queue.SimpleQueue()
     threading.Thread(target=_listen, args=(connection, orders), daemon=True).start()
     hand = Hand()
+    connection.send("ready")
     while True:
         limit, name, arguments = orders.get()
         faulthandler.dump_traceback_later(limit, exit=True)

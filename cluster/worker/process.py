@@ -3,25 +3,32 @@
 """A hand in a process of its own: started, asked, watched and ended."""
 
 import os
+import platform
 import signal
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from multiprocessing import Pipe
-from time import monotonic
 from typing import Any
 
 from ..extension import ROOT
 
 DONE, FAILED, STOP = "done", "failed", "stop"  # How an order went: STOP where all others would go so too.
-START = 120.0  # seconds that Blender may take to start, beside an order's limit
+START = 120.0  # seconds that Blender may take to start
+GRACE = 1.0  # seconds in which a process that is about to end does so
+TIMEOUT, UNENDED = "Timeout (", "It did not end by itself"  # The first is the watchdog's word.
 MOST_OPENED = 200  # objects that a process opens before another takes its place
 THREADS = ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR")
-TAIL = 2000  # characters of what a process has said last
+TAIL = 20_000  # characters of what a process has said last
 
 
 class LostError(Exception):
     """The process has ended, or was ended, in the middle of an order; says why."""
+
+
+class NotStartedError(LostError):
+    """Blender cannot be started on this machine."""
 
 
 class HandProcess:
@@ -50,16 +57,16 @@ class HandProcess:
 
     def ask(self, limit: float, name: str, *arguments: Any) -> tuple[str, Any]:
         """How an order went, and what came of it; see hand.py. Raises LostError where the process is gone."""
-        start, allowed = monotonic(), limit + (START if self._is_new else 1.0)
-        try:
+        self._start()
+        with suppress(EOFError, OSError):
             self._connection.send((limit, name, arguments))
-            if self._connection.poll(allowed):
+            if self._connection.poll(limit + GRACE):
                 how, value, self._opened = self._connection.recv()
-                self._is_new = False
                 return how, value
-        except (EOFError, OSError):
-            pass
-        raise LostError(self._end(monotonic() - start >= limit, limit))
+        way, words = self._end()
+        if TIMEOUT in words or way == UNENDED:
+            way = f"It took longer than the limit of {limit:g} s"
+        raise LostError(f"{way}\n{words}")
 
     def close(self) -> None:
         """Ends it, whatever it does."""
@@ -68,17 +75,32 @@ class HandProcess:
         self._process.wait()
         self._said.close()
 
-    def _end(self, is_late: bool, limit: float) -> str:
-        """Ends it, and says why it is gone, with its last words."""
+    def _start(self) -> None:
+        """Waits for a new one until it says that Blender is there."""
+        if not self._is_new:
+            return
+        with suppress(EOFError, OSError):
+            if self._connection.poll(START):
+                self._connection.recv()
+                self._is_new = False
+                return
+        _, words = self._end()
+        last = (words.splitlines() or ["it did not say why"])[-1]
+        raise NotStartedError(
+            f"Blender cannot be started on {platform.node()} ({last}): start workers in an environment "
+            "that has it"
+        )
+
+    def _end(self) -> tuple[str, str]:
+        """Ends it; how it had ended by itself, and its last words."""
         try:
-            code = self._process.wait(1.0)
+            code = self._process.wait(GRACE)
+            way = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
         except subprocess.TimeoutExpired:
+            way = None
             self._process.kill()
-            code = self._process.wait()
+            self._process.wait()
         self._said.seek(max(0, os.fstat(self._said.fileno()).st_size - TAIL))
         words = self._said.read().decode(errors="replace").strip()
         self.close()
-        if is_late:
-            return f"It took longer than the limit of {limit:g} s\n{words}"
-        way = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
-        return f"Blender ended {way}\n{words}"
+        return UNENDED if way is None else f"Blender ended {way}", words

@@ -5,7 +5,7 @@
 import threading
 from typing import Any
 
-from .process import FAILED, HandProcess, LostError
+from .process import FAILED, STOP, HandProcess, LostError, NotStartedError
 
 TRIES = 2
 _own = threading.local()
@@ -15,14 +15,16 @@ def perform(label: str, limit: float, name: str, *arguments: Any) -> tuple[str, 
     """How an order went, what came of it, and what went wrong before; `label` names object and block."""
     troubles: list[str] = []
     for _ in range(TRIES):
+        last = FAILED
         try:
             how, value = _hand().ask(limit, name, *arguments)
         except LostError as error:
             how, value = FAILED, str(error)
+            last = STOP if isinstance(error, NotStartedError) else FAILED
         if how != FAILED:
             return how, value, troubles
         troubles.append(f"{label}: {value}")
-    return FAILED, value.partition("\n")[0], troubles
+    return last, value.partition("\n")[0], troubles
 
 
 def _hand() -> HandProcess:

@@ -73,7 +73,7 @@ def _row(target: Touchable, found: Any) -> dict[str, Any]:
         "coefficients": r.patch.coefficients,
         "domain": r.domain.ends.ravel(),
         "height_std": r.mean_height_std,
-        **{name: getattr(r, name) for name in ("radius", "k1_std", "k2_std", "fit_error")},
+        **{name: getattr(r, name) for name in ("radius", "k1_std", "k2_std")},
         "contacts": (np.vstack([c.points for c in contours]) + target.offset).ravel(),
         "normals": np.vstack([c.normals for c in contours]).ravel().astype(np.float32),
         "curves": [len(c.points) for c in contours],

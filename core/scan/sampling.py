@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points thinned to an even spacing: where to touch, for touches all over a surface."""
+"""Points at random or of an even spacing: where to touch, for touches all over a surface."""
 
 from collections.abc import Iterator
 

@@ -277,6 +277,16 @@ def test_a_worker_of_another_environment_is_refused(command, objects, tmp_path, 
     assert code == 1 and "the data set 0.1: start workers in the same environment" in error
 
 
+def test_a_worker_without_blender_is_said(objects, monkeypatch):
+    from cluster.worker import process, task
+
+    monkeypatch.setattr(process.sys, "executable", "/bin/false")
+    how, value, troubles = task.perform("pebble", 10.0, "survey", str(objects / "pebble.ply"), {})
+    assert how == "stop" and len(troubles) == 2
+    assert value.startswith("Blender cannot be started on ")
+    assert value.endswith("(it did not say why): start workers in an environment that has it")
+
+
 def test_a_process_that_has_opened_enough_gives_way(objects, monkeypatch):
     from cluster.data_set import manifest
     from cluster.worker import process

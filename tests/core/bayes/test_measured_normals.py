@@ -182,9 +182,9 @@ def test_without_slopes_both_likelihoods_are_one():
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
     alone = linear_system.linear_system(local, weights, nothing, local[:, :0])
-    data = evidence.restricted(linear_system.of_heights(alone, weights))
+    data = evidence.restricted(alone.equations)
     empty = alone._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
-    one, other = (linear_system.hyperparameters(s, data, weights, np.array([2e-3])) for s in (alone, empty))
+    one, other = (linear_system.hyperparameters(s, data, np.array([2e-3])) for s in (alone, empty))
     for a, b in zip(one, other, strict=True):
         assert b == pytest.approx(a, rel=1e-4)
 

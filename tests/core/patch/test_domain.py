@@ -135,3 +135,42 @@ def test_the_domain_of_scattered_contacts_is_their_hull():
     assert np.hypot(*domain.boundary(100).T) == pytest.approx(2.0, rel=0.01)
     with pytest.raises(ValueError, match="points: wanted the origin among them"):
         hull_domain(points + np.array([1.95, 0.0]), 2.0)
+
+
+def cut(angles, distance):
+    """Ends of half curves of length 1 on what ends at x = distance, and which of them end there."""
+    ends = circle(angles)
+    ahead = np.cos(np.radians(angles))
+    is_cut = ahead > distance
+    return ends * np.where(is_cut, distance / np.where(is_cut, ahead, 1.0), 1.0)[:, None], is_cut
+
+
+@pytest.mark.parametrize("distance", [0.02, 0.1, 0.3, 0.45])
+@pytest.mark.parametrize("turn", [0, 10, 30])
+def test_the_domain_ends_where_the_surface_does(distance, turn):
+    ends, brinks = cut(SIXTH + turn, distance)
+    domain = closed_spline_domain(ends, 1.0, brinks)
+    assert brinks.any()
+    assert domain.boundary(3600)[:, 0].max() <= distance + 2e-4
+    points, weights = domain.nodes
+    assert points[:, 0].max() < distance
+    assert weights.sum() == pytest.approx(1.0, rel=1e-12)
+    dense, h = domain.grid(40000)
+    assert len(dense) * h**2 == pytest.approx(domain.area, rel=1e-2)
+    for i, j in [(2, 0), (1, 1), (0, 2), (0, 4)]:
+        moment = np.mean(dense[:, 0] ** i * dense[:, 1] ** j)
+        assert weights @ (points[:, 0] ** i * points[:, 1] ** j) == pytest.approx(moment, abs=2e-3)
+    assert domain.scaled(3.0).area == pytest.approx(9.0 * domain.area)
+
+
+def test_beside_no_brink_the_boundary_is_round():
+    ends, brinks = cut(SIXTH, 0.3)
+    domain, round_one = closed_spline_domain(ends, 1.0, brinks), closed_spline_domain(ends, 1.0)
+    turns = np.radians(np.arange(120, 241))  # where no end is one
+    places = np.column_stack([np.cos(turns), np.sin(turns)])
+    radii = np.linalg.norm(domain.points_at(places), axis=1)
+    assert radii == pytest.approx(1.0, abs=0.01)
+    assert radii[::60] == pytest.approx(1.0, abs=1e-5)
+    everywhere = closed_spline_domain(ends, 1.0, np.zeros(6, dtype=bool))
+    assert everywhere.brinks is None
+    assert (everywhere.boundary(99) == round_one.boundary(99)).all()

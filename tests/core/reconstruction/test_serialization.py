@@ -107,7 +107,6 @@ def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
         (["contours"], [], "contours: wanted a list of some"),
         (["contours", 0, "points"], [1, 2], "points: wanted shape"),
         (["contours", 0, "noise"], -1.0, "noise: wanted a finite number of 0 or more"),
-        (["misses"], [[0.0, 0.0]], "misses: wanted shape"),
         (["geometry", "residual"], {"places": 3}, "places: wanted shape"),
         (["posterior", "covariance"], [[1.0]], "covariance: wanted shape"),
         (["posterior", "mean"], None, "mean: wanted it in the dict"),
