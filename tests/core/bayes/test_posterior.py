@@ -337,8 +337,9 @@ def test_an_outlying_contact_weighs_as_under_students_distribution():
 
 def test_scatter_makes_contacts_outlying_beyond_five_of_its_deviations_by_the_median():
     even = np.array([[1.0, -1.0, 1.0, 1.0, 2.0, -2.0, 2.0, 12.0]]) * 0.01
-    weights = joint_fit._student_weights(even, np.ones((1, 8), dtype=bool), np.full(1, 2e-3))
-    assert weights[0] == pytest.approx(5.0 / (4.0 + (even[0] / (1.4826 * 0.015)) ** 2))
+    for floor in (1e-4, 2e-3):
+        weights = joint_fit._student_weights(even, np.ones((1, 8), dtype=bool), np.full(1, floor))
+        assert weights[0] == pytest.approx(5.0 / (4.0 + (even[0] / (1.4826 * 0.015)) ** 2))
     residuals = np.array([[1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 8.0]]) * 0.01
     deviation = 1.4826 * 0.01
     weights = joint_fit._student_weights(residuals, np.ones((1, 7), dtype=bool), np.full(1, 2e-3))

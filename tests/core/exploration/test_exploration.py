@@ -122,9 +122,10 @@ def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
     assert {stop for contour in found.contours for stop in contour.stops} == {core.EXTENT}
 
 
-def test_curves_end_before_a_rib_and_go_on_elsewhere():
+@pytest.mark.parametrize("options", [{}, {"step": 0.25}], ids=["any step", "a fine step"])
+def test_curves_end_before_a_rib_and_go_on_elsewhere(options):
     surface = rib(at=9.0, high=0.8, wide=1.0)
-    found = explore(surface)
+    found = explore(surface, **options)
     for contour in found.contours:
         assert contour.points[:, 0].max() < 8.5  # the rib rises from there
     assert core.UNEXPLAINED in found.contours[0].stops
