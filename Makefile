@@ -115,9 +115,9 @@ clean:
 $(ZIP): $(SOURCES) | $(READY)
 	@zip=$$($(VENV_PY) tools/build.py --output build) && mv "$$zip" $@
 
-$(SITE)/.ready: tools/site_requirements.txt | $(READY)
+$(SITE)/.ready: tools/site_requirements.txt
 	@echo 'Installing what the site is made with, in $(SITE): once.'
-	@'$(PYTHON)' -m venv $(SITE)
+	@'$(or $(PYTHON),python3)' -m venv $(SITE)
 	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
 	@touch $@
 

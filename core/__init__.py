@@ -6,6 +6,11 @@ Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the calle
 convex body has negative curvatures under its outward normal.
 """
 
+from .atlas.boundaries import Edge
+from .atlas.measured import atlas_of
+from .atlas.meshing import Mesh
+from .atlas.object_atlas import Atlas, NextTouch
+from .atlas.touching import Progress, explore_object, touch_all_over
 from .contours.common_point import common_point, in_running_order
 from .contours.contour import (
     CREASE,
@@ -32,7 +37,7 @@ from .reconstruction.serialization import from_dict, to_dict
 from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
-from .scan.verification import reachable, verify
+from .scan.verification import reachable, verify, verifying
 
 __all__ = [
     "CREASE",
@@ -42,22 +47,29 @@ __all__ = [
     "NO_CONTACT",
     "SOLVERS",
     "UNEXPLAINED",
+    "Atlas",
     "Contour",
     "DegenerateCurvesError",
     "Domain",
+    "Edge",
     "Exploration",
     "Frame",
     "Geometry",
+    "Mesh",
     "MongePatch",
+    "NextTouch",
     "Pose",
+    "Progress",
     "Reconstruction",
     "SamplingPlane",
     "Surface",
+    "atlas_of",
     "azimuth_of",
     "common_point",
     "distances",
     "explore",
     "explore_many",
+    "explore_object",
     "fit_error",
     "from_dict",
     "height_error",
@@ -74,7 +86,9 @@ __all__ = [
     "spaced_count",
     "suggest_plane",
     "to_dict",
+    "touch_all_over",
     "track",
     "verify",
+    "verifying",
     "with_height_stds",
 ]

@@ -8,31 +8,39 @@ import bpy
 
 from . import command_line
 from .comparison import register_operator, verify_operator
-from .files import contact_operators
+from .files import contact_operators, export_operators
 from .probes import change_handlers, operators, probe, probe_operators
 from .report import report_operator
 from .scene import color_range
 from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
-from .viewport import drag, gizmos, overlay, pick
+from .viewport import drag, gizmos, overlay, pick, tool
+from .whole_object import object_operator
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
     verify_operator.TACTILE_OT_verify,
     register_operator.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,
+    object_operator.TACTILE_OT_touch_all_over,
     pick.TACTILE_OT_pick,
     drag.TACTILE_OT_drag,
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,
+    *export_operators.CLASSES,
     report_operator.TACTILE_OT_export_report,
     rows.TACTILE_OT_copy_value,
     *panel.PANELS,
     preferences.VIEW3D_MT_tactile,
     preferences.TactilePreferences,
 )
-MENUS = (*preferences.MENUS, *contact_operators.MENUS, *report_operator.MENUS)
+MENUS = (
+    *preferences.MENUS,
+    *contact_operators.MENUS,
+    *export_operators.MENUS,
+    *report_operator.MENUS,
+)
 _commands, _drawings = [], []
 TOP = str(Path(__file__).resolve().parents[1])  # where presets/ is
 
@@ -43,6 +51,7 @@ def register():
     map_object.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    tool.register()
     preferences.restore_tab()
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
@@ -62,6 +71,7 @@ def unregister():
     bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
+    tool.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     map_object.unregister()

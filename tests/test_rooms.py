@@ -12,19 +12,20 @@ import pytest
 ROOT = Path(__file__).parents[1]
 # Ground floor first. What is in no room is below all rooms where it is listed, and above them where not.
 ROOMS = {
-    "core": ("arguments", "contours", "patch", "paper", "bayes", "reconstruction", "exploration", "scan"),
+    "core": (
+        "arguments",
+        "contours",
+        "patch",
+        "paper",
+        "bayes",
+        "reconstruction",
+        "exploration",
+        "atlas",
+        "scan",
+    ),
     "tactile_addon": (
-        *(
-            "touch",
-            "scene",
-            "probes",
-            "stability_map",
-            "files",
-            "comparison",
-            "report",
-            "viewport",
-            "sidebar",
-        ),
+        *("touch", "scene", "probes", "stability_map", "whole_object", "files", "comparison"),
+        *("report", "viewport", "sidebar"),
     ),
     "cluster": ("extension", "data_set", "worker"),
 }

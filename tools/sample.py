@@ -17,12 +17,14 @@ OUTPUT = Path(__file__).resolve().parents[1] / "examples" / "sample.blend"
 LARGEST = 300_000  # bytes
 AROUND, ALONG, SUBDIVISIONS = 32, 20, 3
 HEIGHT, PLACE = 2.4, 1.45  # of the vase, and of the probe on it
-NOTE = """Tactile Patch: a probe on a vase
+NOTE = """A probe on a vase
 
-Open the sidebar (N) and its tab Tactile.
-Drag a disc on the rim: the plane turns.
-Drag the white disc: the probe slides.
-Red is bulging, blue is a saddle."""
+Open the sidebar (N), tab Tactile.
+Drag a disc on the rim:
+the plane turns.
+Drag the white disc:
+the probe slides.
+Red bulges, blue is a saddle."""
 
 
 def main():
@@ -91,9 +93,9 @@ def note():
 
     bpy.data.texts.new("Read Me").write(NOTE)
     curve = bpy.data.curves.new("Note", "FONT")
-    curve.body, curve.size = NOTE, 0.16
+    curve.body, curve.size = NOTE, 0.13
     obj = bpy.data.objects.new("Note", curve)
-    obj.location, obj.rotation_euler = (1.1, -0.3, 1.9), (np.pi / 2.0, 0.0, 0.0)
+    obj.location, obj.rotation_euler = (-2.75, -0.3, 1.9), (np.pi / 2.0, 0.0, 0.0)
     bpy.context.scene.collection.objects.link(obj)
 
 
@@ -108,7 +110,7 @@ def frame_viewports():
                 space = area.spaces.active
                 space.show_region_ui = True
                 space.region_3d.view_perspective = "PERSP"
-                space.region_3d.view_location = (0.9, 0.0, 1.3)
+                space.region_3d.view_location = (-0.25, 0.0, 1.2)
                 space.region_3d.view_rotation = Vector((0.15, -1.0, 0.25)).to_track_quat("Z", "Y")
                 space.region_3d.view_distance = 5.5
 

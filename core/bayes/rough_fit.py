@@ -113,7 +113,7 @@ def _put(found: RoughFit, place: int, residual: Residual) -> None:
     mean[:FREE] = 0.0, 0.0, k1 / 2.0, 0.0, k2 / 2.0
     residual.mean[: len(TERMS)] -= mean
     told, left = whitened(residual.places_factor, residual.factor, terms.T, told.T)
-    own = np.tensordot(residual.variances, _own(tuple(beside.LENGTHS)), axes=1)
+    own = sum(map(np.multiply, residual.variances, _own(tuple(beside.LENGTHS))))
     found.posterior.mean[place], found.posterior.noise[place] = mean, residual.noise
     found.posterior.covariance[place] = own + left.T @ left - told.T @ told
     found.residuals[place] = residual

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
+from ..bayes.roughness import roughness
 from ..contours.contour import EXTENT, UNEXPLAINED, Contour
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.result import Reconstruction
@@ -31,6 +32,7 @@ GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underest
 STRETCH = 1.5  # A half curve grows by this factor at once.
 NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
+TOO_ROUGH = 0.0085  # Roughness of contacts whose fit ends growth, in all but one of a hundred
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
@@ -40,11 +42,15 @@ Feel = Callable[[float], list[Contour]]  # contours of an extent
 
 @dataclass(frozen=True, eq=False)
 class Felt:
-    """Contours as they were tracked with a step between contacts; `partial`: not as far as may be."""
+    """Contours as they were tracked with a step between contacts; `partial`: not as far as may be.
+
+    largest_std : a length, that the mean deviation of the height may be at most; None for a share of L
+    """
 
     contours: list[Contour]
     point: Array
     step: float
+    largest_std: float | None
     partial: bool = False
 
     @cached_property
@@ -74,6 +80,13 @@ class Felt:
             found.append(contour.part(which, (first, last)))
         return found
 
+    def roughness(self, counts: Counts) -> float:
+        """How far so many contacts are off any sextic: above 1 their fit would be in doubt."""
+        contours = self.shortened(counts, stride_of(counts))
+        points = np.vstack([contour.points for contour in contours])
+        noise = max(contour.noise or 0.0 for contour in contours)
+        return roughness(points - self.point, noise) / TOO_ROUGH
+
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
         """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
 
@@ -87,7 +100,7 @@ class Felt:
         starts = np.cumsum(sizes) - sizes.ravel()
         squares = np.append((z - r.height(x, y)) ** 2, 0.0)
         sums = np.add.reduceat(squares, starts).reshape(-1, 3)[:, ::2]
-        limit = EXPLAINED * max(r.accuracy, MISFIT) * r.radius
+        limit = max(EXPLAINED * max(r.accuracy, MISFIT) * r.radius, self.largest_std or 0.0)
         return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0) / limit
 
 
@@ -115,10 +128,10 @@ class Grown(NamedTuple):
         return self.result.status == "ok"
 
 
-def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
+def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: float | None) -> Fits:
     """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
     first = SEEDS[0] * step
-    felt = Felt(feel(min(first, farthest)), point, step, partial=first < farthest)
+    felt = Felt(feel(min(first, farthest)), point, step, largest_std, partial=first < farthest)
     known: dict[bytes, Grown] = {}
     found = yield from _seed(felt, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
@@ -128,7 +141,7 @@ def grown(feel: Feel, point: Array, farthest: float, step: float) -> Fits:
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
         if (felt.open & (longer > felt.whole)).any():
-            felt = Felt(feel(farthest), point, step)
+            felt = Felt(feel(farthest), point, step, largest_std)
         longer = np.minimum(longer, felt.whole)
         try:
             trial = known.get(longer.tobytes()) or (yield from tried(felt, longer))
@@ -148,15 +161,18 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
     error, seeds = None, list(SEEDS)
     while seeds:
         counts = np.minimum(seeds.pop(0), felt.whole)
-        try:
-            trial = yield from tried(felt, counts)
-        except DegenerateCurvesError as why:
-            error = why
-            continue
-        known[counts.tobytes()] = trial
-        if trial.doubt <= 1.0:
-            break
-        if trial.spread > HOPELESS and len(seeds) > 1:
+        doubt = felt.roughness(counts) if seeds else 0.0  # the shortest are fitted however rough they are
+        if doubt <= 1.0:
+            try:
+                trial = yield from tried(felt, counts)
+            except DegenerateCurvesError as why:
+                error = why
+                continue
+            known[counts.tobytes()] = trial
+            if trial.doubt <= 1.0:
+                break
+            doubt = trial.spread
+        if doubt > HOPELESS and len(seeds) > 1:
             seeds.pop(0)
     if not known and error is not None:
         raise error
@@ -165,12 +181,17 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
 
 def tried(felt: Felt, counts: Counts) -> Fits:
     """The fit of so many contacts, of which as few are fitted as most often are enough."""
-    stride = max(1, int(spacing(counts, CONTACT_COUNTS[0])))
+    stride = stride_of(counts)
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
-    spread = r.mean_height_std / (GROWN_STD * r.radius)
+    spread = r.mean_height_std / (felt.largest_std or GROWN_STD * r.radius)
     return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
+
+
+def stride_of(counts: Counts) -> int:
+    """One contact of so many is fitted."""
+    return max(1, int(spacing(counts, CONTACT_COUNTS[0])))
 
 
 def spacing(reaches: Array | Counts, count: int) -> float:

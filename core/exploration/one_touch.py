@@ -67,6 +67,7 @@ class Touch:
 
     Lengths are None where they are to be chosen, the tolerance where no planes are to be added.
     reference : columns e1, n and e1 x n, which azimuths are measured by
+    largest_std : a length, that curves may grow to
     is_grown : whether what makes curves grow is the fit that is asked for
     """
 
@@ -79,6 +80,7 @@ class Touch:
     farthest: float
     tolerance: float | None
     most_planes: float
+    largest_std: float | None
     is_grown: bool
 
     def steps(self) -> Steps:
@@ -108,7 +110,9 @@ class Touch:
     def _grown(self) -> Steps:
         """The touch that is as large as it can be trusted."""
         between = max(self.step or 0.0, self.farthest / FELT)
-        fits = grown(lambda extent: self._felt(extent, between), self.point, self.farthest, between)
+        fits = grown(
+            lambda extent: self._felt(extent, between), self.point, self.farthest, between, self.largest_std
+        )
         contours = next(fits)
         while True:
             answer = yield Ask(contours, growing=not self.is_grown)
@@ -136,7 +140,8 @@ class Touch:
                 known = largest.result if same else None
                 return felt.shortened(counts, stride), stride * felt.step, known
             # A step longer than that, so that where they end shows.
-            again = Felt(self._felt(min(length + step, self.farthest), step), self.point, step)
+            longer = self._felt(min(length + step, self.farthest), step)
+            again = Felt(longer, self.point, step, self.largest_std)
             fewer = np.minimum((reaches / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
             return again.shortened(fewer), step, None
 
@@ -163,7 +168,7 @@ class Touch:
         Felt twice as densely as fitted: what lies between tells whether it is explained.
         """
         half = 0.5 * found.step
-        felt = Felt(self.feel((plane,), extent=found.extent, step=half), self.point, half)
+        felt = Felt(self.feel((plane,), extent=found.extent, step=half), self.point, half, self.largest_std)
         counts = felt.whole // 2 * 2
         while True:
             contours = [*found.contours, *felt.shortened(counts, 2)]

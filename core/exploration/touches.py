@@ -18,8 +18,11 @@ from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vect
 from ..contours.contour import EXTENT, Contour, SamplingPlane
 from ..contours.tracking import Surface, generator_of, track
 from ..reconstruction.deviations import with_height_stds
-from ..reconstruction.from_contours import reconstruct_many
+from ..reconstruction.from_contours import fitted, options_of
 from ..reconstruction.result import Reconstruction
+from ..reconstruction.stacks import Options
+from ..reconstruction.start import Given
+from ..reconstruction.strokes import gathered
 from .one_touch import Answer, Ask, Exploration, Steps, Touch
 
 MOST_EVEN = 24  # At most so many planes are laid out evenly.
@@ -35,6 +38,7 @@ def explore(
     planes: int | Sequence[SamplingPlane] = 3,
     *,
     farthest: float | None = None,
+    largest_std: float | None = None,
     tolerance: float | None = None,
     most_planes: int = 6,
     extent: float | str = "auto",
@@ -51,6 +55,8 @@ def explore(
 
     planes : as in `track`, or how many, k: then their azimuths are pi i / k
     farthest : the longest that a half curve may become; None for as long as curves go on before they end
+    largest_std : mean deviation of the height until which half curves grow, and until which they count as
+        explained; None for shares of the radius
     tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
         added, up to `most_planes`, as long as one takes a tenth off. None for the given planes only
     extent : of each half curve, as in `track`; "auto" has each grow until the default fit no longer
@@ -80,6 +86,7 @@ def explore(
         up[None],
         planes,
         farthest=farthest,
+        largest_std=largest_std,
         tolerance=tolerance,
         most_planes=most_planes,
         extent=extent,
@@ -104,6 +111,7 @@ def explore_many(
     planes: int | Sequence[SamplingPlane] = 3,
     *,
     farthest: float | None = None,
+    largest_std: float | None = None,
     tolerance: float | None = None,
     most_planes: int = 6,
     extent: float | str = "auto",
@@ -132,6 +140,7 @@ def explore_many(
         "extent": length,
         "step": _given("step", step),
         "farthest": length or (None if farthest is None else number("farthest", farthest, above=0.0)),
+        "largest_std": None if largest_std is None else number("largest_std", largest_std, above=0.0),
         "tolerance": None if tolerance is None else number("tolerance", tolerance, least=0.0),
         "most_planes": number("most_planes", most_planes, least=3.0),
         "is_grown": method == "bayes",
@@ -145,7 +154,7 @@ def explore_many(
         noisy = partial(feel, noise=noise, rng=generator)
         return (yield from Touch(noisy, point, reference, **wanted | {"farthest": farthest}).steps())
 
-    fit = {"method": method, "degree": degree, "weight": weight, "solver": solver}
+    fit = options_of(method, degree, None, weight, solver)
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, fit)
 
 
@@ -195,7 +204,7 @@ def _given(name: str, length: float | str) -> float | None:
 
 
 def _side_by_side(
-    steps: Sequence[Steps], points: Array, outward: Array, fit: dict[str, Any]
+    steps: Sequence[Steps], points: Array, outward: Array, fit: Options
 ) -> list[Exploration | ValueError]:
     """What each of b touches comes to, at (b, 3) and (b, 3); the fits that they ask for in stacks."""
     found: dict[int, Exploration | ValueError] = {}
@@ -212,10 +221,10 @@ def _side_by_side(
         answers = {}
         for growing in (True, False):
             which = [i for i, ask in asked.items() if ask.growing is growing]
-            options = fit | ({"method": "bayes"} if growing else {})
-            contours = [asked[i].contours for i in which]
+            options = fit._replace(method="bayes") if growing else fit
+            touches = [Given(asked[i].contours, *gathered(())) for i in which]
             if which:
-                results = reconstruct_many(points[which], contours, outward=outward[which], **options)
+                results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, _with_stds(results), strict=True))
     return [found[i] for i in range(len(steps))]
 

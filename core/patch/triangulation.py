@@ -117,9 +117,7 @@ def _delaunay(points: Array, inner: int) -> NDArray[np.intp]:
 
     scaled = points / np.abs(points).max()
     scaled *= 1.0 + UNEQUAL * (scaled**2 @ (1.0, 2.0))[:, None]
-    triangles = Delaunay(scaled).simplices.astype(np.intp)
-    clockwise = _doubled_areas(scaled, triangles) < 0.0
-    triangles[clockwise] = triangles[clockwise, ::-1]
+    triangles = Delaunay(scaled).simplices.astype(np.intp)  # counterclockwise in two dimensions
     # One outside has its corners on the rim, and goes round the other way than the rim does.
     ahead = triangles < np.roll(triangles, -1, axis=1)
     return triangles[(triangles.min(axis=1) < inner) | (np.count_nonzero(ahead, axis=1) == 2)]

@@ -13,10 +13,10 @@ from ..bayes.joint_fit import joint_fit
 from ..bayes.posterior import Posterior
 from ..bayes.rough_fit import rough_fit
 from ..contours.contour import Contour
-from ..contours.curves import Curves, misses
+from ..contours.curves import Curves
 from ..contours.local_geometry import DegenerateCurvesError, Frame
 from ..paper.by_method import coefficients
-from ..patch.domain import Domain, hull_domain
+from ..patch.domain import hull_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import DEGREE, MongePatch
 from ..patch.residual import Residual
@@ -42,7 +42,7 @@ class _Parts(NamedTuple):
     radius: float
     curves: Curves
     strokes: Array  # (m, 3)
-    misses: Array  # Distances of the curves from the point, and their deviations, (c, 2).
+    known: Curves  # The same as a stack of one, in the world.
     k1: float
     k2: float
     accuracy: float
@@ -83,14 +83,13 @@ def _fitted(start: Start, options: Options) -> list[_Parts]:
     curvatures = fit.radii[:, None, None] * (curves.curvatures @ fit.axes)
     local = fit.contacts[:, :places].reshape(curves.points.shape)
     curves = Curves(local, curves.present, along, fit.tangents, curvatures)
-    missed = misses(curves)
     return [
         _Parts(
             Frame(fit.points[i], fit.axes[i]),
             float(fit.radii[i]),
             curves.at(i),
             fit.contacts[i, places : places + len(start.strokes[i])],
-            missed[i],
+            start.curves.at([i]),
             float(start.k1[i]),
             float(start.k2[i]),
             float(start.stds[i] / fit.radii[i]),
@@ -184,7 +183,7 @@ def _result(
     touch: _Parts, contours: Sequence[Contour], options: Options
 ) -> Reconstruction | DegenerateCurvesError:
     try:
-        domain = domain_of(touch.curves) if contours else hull_domain(touch.strokes[:, :2], 1.0)
+        domain = domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)
     except ValueError:
         return DegenerateCurvesError(
             "the curves end in fewer than three places apart from each other, so they bound no patch: "
@@ -201,15 +200,15 @@ def _result(
         patch = touch.posterior.patch(touch.degree)
     scale = touch.radius
     surface = patch if touch.posterior is None else touch.posterior.patch(DEGREE)
-    domain = Domain(domain.ends * scale)
+    domain = domain.scaled(scale)
     return Reconstruction(
         Geometry(touch.frame, scale, surface.scaled(scale), domain, touch.residual),
         patch.scaled(scale),
         tuple(contours),
-        scale * touch.misses[: len(contours)],
         accuracy=touch.accuracy,
         method=options.method,
         converged=converged,
         strokes=touch.frame.to_world(scale * touch.strokes),
         joint_posterior=touch.posterior,
+        known_curves=touch.known,
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.posterior import Posterior
-from ..contours.contour import Contour
+from ..contours.contour import BRINKS, Contour
 from ..contours.curves import Curves, curves_through, stacked
 from ..contours.local_geometry import (
     DegenerateCurvesError,
@@ -21,7 +21,7 @@ from ..contours.local_geometry import (
     surface_normals,
 )
 from ..contours.thinning import thinned
-from ..patch.domain import Domain, closed_spline_domain
+from ..patch.domain import BRINK, Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
 from .strokes import STRIPS, FirstFrame, first_frame, means
 
@@ -102,7 +102,8 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         beside, size = given[i].strokes, 1
         if len(beside):
             beside = (beside - points[i]) @ axes[row] / radii[row]
-            beside, size = means(beside[_over(curves.at(row), local[row], beside)])
+            turned = replace(curves.at(row), points=local[row], tangents=curves.tangents[row] @ axes[row])
+            beside, size = means(beside[_over(turned, touches[i], beside)])
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
@@ -116,10 +117,10 @@ def _std(noise: float | None, size: int, known: list[float]) -> float:
     return max(known) if noise is None else noise / math.sqrt(size)
 
 
-def _over(curves: Curves, local: Array, strokes: Array) -> NDArray[np.bool_]:
+def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArray[np.bool_]:
     """Which strokes (n, 3) are over the domain of curves, all in unit radius; none where they bound none."""
     try:
-        domain = domain_of(replace(curves, points=local))
+        domain = domain_of(curves, contours)
     except ValueError:
         return np.zeros(len(strokes), dtype=bool)
     return domain.contains(strokes[:, 0], strokes[:, 1]) & (np.abs(strokes[:, 2]) <= 1.0)
@@ -167,13 +168,23 @@ def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
     return found
 
 
-def domain_of(curves: Curves) -> Domain:
-    """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing."""
+def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
+    """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing.
+
+    Where the surface ended before the first contact of a side, it ends at the point.
+    """
     last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
-    rows = np.arange(len(last))
-    before, after = curves.present[:, 0] & (curves.along[:, 0] < 0.0), curves.along[rows, last] > 0.0
-    ends = np.vstack([curves.points[before, 0], curves.points[rows, last][after & curves.present[:, 0]]])
-    return closed_spline_domain(ends[:, :2], 1.0)
+    rows, ahead = np.arange(len(last)), curves.tangents[:, :2]
+    there = curves.present[:, 0]
+    felt = np.array([there & (curves.along[:, 0] < 0.0), there & (curves.along[rows, last] > 0.0)])
+    ends = np.array([curves.points[rows, 0, :2], curves.points[rows, last, :2]])
+    brinks = np.zeros_like(felt)
+    for i, contour in enumerate(contours):
+        brinks[:, i] = [stop in BRINKS for stop in contour.stops or ("", "")]
+    at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
+    ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
+    counted = felt | at_point
+    return closed_spline_domain(ends[counted], 1.0, brinks[counted])
 
 
 def _coarse(gap: float, size: float) -> DegenerateCurvesError:

@@ -26,6 +26,7 @@ SOME = 2000  # contacts that the quartic is fitted to
 NEAR = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
 DETERMINED = 0.02  # the least singular value of a quadric's terms in the mean over contacts, in unit radius
 QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
+OPEN = 1e-3  # share of the largest singular value: contacts on a few lines leave such terms of a quartic open
 FAR = 0.999  # of the greatest distance, that is as far: rounding must not choose
 
 
@@ -77,7 +78,7 @@ def means(contacts: Array) -> tuple[Array, int]:
     starts = (firsts[:, None] + np.arange(STRIPS) * lengths[:, None] // STRIPS).ravel()
     counts = np.diff(starts, append=n)[:, None]
     some = contacts[:: max(1, n // SOME)]
-    quartic = np.linalg.lstsq(_basis(some), some[:, 2], rcond=None)[0]
+    quartic = np.linalg.lstsq(_basis(some), some[:, 2], rcond=OPEN)[0]
     over = contacts[order]
     over[:, 2] -= _basis(over) @ quartic
     found: Array = np.add.reduceat(over, starts, axis=0) / counts

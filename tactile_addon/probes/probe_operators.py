@@ -13,7 +13,7 @@ from ..touch import units
 from ..touch.settings import MOST_PLANES
 from ..touch.wording import added_planes
 from . import probe, touch_again
-from .operators import is_unlocked, report_error
+from .operators import is_unlocked, report_error, waiting
 
 
 class _ProbeOperator:
@@ -142,7 +142,8 @@ class TACTILE_OT_update(_ProbeOperator, bpy.types.Operator):
 
     def execute(self, context):
         found = probe.probe_of(context.view_layer.objects.active)
-        touch_again.refresh(found, context)
+        with waiting(context):
+            touch_again.refresh(found, context)
         if found.tactile_probe.message:
             self.report({"WARNING"}, found.tactile_probe.message)
         return {"FINISHED"}

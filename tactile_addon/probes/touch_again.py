@@ -161,7 +161,7 @@ def is_outdated(probe, depsgraph):
     meshes = patch_object.meshes(patch_of(probe))
     if name != probe.name and (not meshes or any(mesh.users > 1 for mesh in meshes)):
         return True  # a copy, which has no patch yet, or none of its own
-    digest = _digest(probe, depsgraph)
+    digest = _digest(probe, depsgraph, anchor.seat(probe, _extent_of(probe)))
     return any(other != digest for other in (touched, *(block.get(DIGEST) for block in made)))
 
 
@@ -174,7 +174,7 @@ def _made(probe):
 def _sign(probe, depsgraph):
     measure_shape(probe.tactile_probe, depsgraph)
     probe.tactile_probe.seat = anchor.seat(probe, _extent_of(probe))
-    digest = _digest(probe, depsgraph)
+    digest = _digest(probe, depsgraph, list(probe.tactile_probe.seat))
     probe.tactile_probe.digest = f"{digest} {probe.name}"
     for block in _made(probe):
         block[DIGEST] = digest
@@ -186,13 +186,15 @@ def _signed(settings):
     return digest, name
 
 
-def _digest(probe, depsgraph):
+def _digest(probe, depsgraph, seat):
     """The digest of all inputs of a touch; names are none of them.
+
+    seat : where it is on its target, see anchor.seat
 
     The checksum of the target's vertices is dear, so it is kept, and taken anew where they may have changed.
     """
     settings, target = probe.tactile_probe, probe.tactile_probe.target
-    inputs = [*anchor.seat(probe, _extent_of(probe)), touch_arguments(settings)]
+    inputs = [*seat, touch_arguments(settings)]
     if target is not None:
         _, _, checksum = settings.shape.partition(" ")
         inputs += [_is_there(target, depsgraph), is_disabled(target), checksum]

@@ -38,7 +38,21 @@ class DetachedMesh(PlacedMesh):
         self.points, self.normals = co @ linear.T, normals @ np.linalg.inv(linear)
         self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1, keepdims=True), 1e-30)
         try:
-            rays = BVHTree.FromObject(obj, depsgraph).ray_cast  # half the time of the object's own
+            self._tree = BVHTree.FromObject(obj, depsgraph)  # its rays take half the time of the object's own
         except ValueError as error:
             raise disabled(obj) from error
+        rays = self._tree.ray_cast
         super().__init__(linear, np.zeros(3), lambda *ray: rays(*ray)[:2])
+
+    @property
+    def origin(self):
+        """Where all begins, in the world."""
+        return np.array(self.matrix.translation)
+
+    def project(self, location):
+        """A point of the mesh near a place, and the unit normal there."""
+        point, normal = self._nearest(self._to_local(location))
+        return self._to_world(point), self._normal_to_world(normal)
+
+    def _nearest(self, local):
+        return self._tree.find_nearest(local)[:2]

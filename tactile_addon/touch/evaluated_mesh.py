@@ -106,6 +106,8 @@ class PlacedMesh:
 
     linear, origin : (3, 3) and (3,), the transform
     cast : as ray_cast, in the mesh's own coordinates; its point is None where it meets nothing
+
+    What inherits it has `_nearest`: the (point, normal) nearest to a point, in the mesh's own coordinates.
     """
 
     def __init__(self, linear, origin, cast):
@@ -131,9 +133,32 @@ class PlacedMesh:
             return None
         return self._to_world(point), self._normal_to_world(normal)
 
+    def deviations(self, points, normals, reach):
+        """Signed distances (n,) of world points to the mesh, positive outside it.
+
+        Measured along the unit normals (n, 3) either way, up to `reach`; to the nearest point of the
+        mesh where they meet nothing, as over a hole.
+        """
+        pairs = zip(points.tolist(), normals.tolist(), strict=True)
+        return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
+
+    def _deviation(self, point, normal, reach):
+        found = []
+        for sign in (-1.0, 1.0):
+            hit = self.ray_cast(point, [-sign * v for v in normal], reach)
+            if hit is not None:
+                found.append(sign * math.dist(point, hit[0]))
+        if found:
+            return min(found, key=abs)
+        foot = self._to_world(self._nearest(self._to_local(point))[0])
+        return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
+
     def _to_world(self, point):
         x, y, z = product(self._rows, *point)
         return x + self._at[0], y + self._at[1], z + self._at[2]
+
+    def _to_local(self, point):
+        return self._inverse @ np.subtract(point, self._origin)
 
     def _normal_to_world(self, normal):
         """The normal by the inverse transpose: outward stays outward under any scale, a mirroring one too."""

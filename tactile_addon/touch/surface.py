@@ -109,26 +109,6 @@ class MeshSurface(PlacedMesh):
         point = self._to_world(point)
         return point, self._normal_to_world(normal), math.dist(location, point)
 
-    def deviations(self, points, normals, reach):
-        """Signed distances (n,) of world points to the mesh, positive outside it.
-
-        Measured along the unit normals (n, 3) either way, up to `reach`; to the nearest point of the
-        mesh where they meet nothing, as over a hole.
-        """
-        pairs = zip(points.tolist(), normals.tolist(), strict=True)
-        return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
-
-    def _deviation(self, point, normal, reach):
-        found = []
-        for sign in (-1.0, 1.0):
-            hit = self.ray_cast(point, [-sign * v for v in normal], reach)
-            if hit is not None:
-                found.append(sign * math.dist(point, hit[0]))
-        if found:
-            return min(found, key=abs)
-        foot = self._to_world(self._nearest(self._to_local(point))[0])
-        return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
-
     def spacing(self, point):
         """How far apart neighboring float32 numbers are at a world point, in the world and in the mesh."""
         scale = np.linalg.norm(self._linear, axis=0).max()
@@ -137,12 +117,15 @@ class MeshSurface(PlacedMesh):
         )
         return float(max(world, scale * local))
 
+    def facet(self, point):
+        """The longest edge of the face nearest to a world point."""
+        _, _, _, number = self._object.closest_point_on_mesh(self._to_local(point), depsgraph=self._depsgraph)
+        corners = self._co[list(self._mesh.polygons[number].vertices)] @ self._linear.T
+        return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max())
+
     def _nearest(self, local):
         """(point, normal) in object coordinates."""
         found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
         if not found:
             raise ValueError("The location is too far away to be measured: set it on the surface")
         return point, normal
-
-    def _to_local(self, point):
-        return self._inverse @ np.subtract(point, self._origin)

@@ -12,13 +12,14 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from html import unescape
 from pathlib import Path
 
 import bpy
 import gui
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check
+from common import check, picture, until
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 REPOSITORY, MODULE = FOLDER / "repository", "local_server"
@@ -58,6 +59,18 @@ def installed():
     return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]
 
 
+def drop_link():
+    """What Blender does with the page's link where it is dropped: a dialog, and Return confirms it."""
+    (link,) = re.findall(r'href="\./(offered\.zip[^"]*)"', (REPOSITORY / "index.html").read_text("utf-8"))
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.extensions.package_install("INVOKE_DEFAULT", url=f"http://127.0.0.1:{PORT}/{unescape(link)}")
+    yield 4
+    picture("dropped")
+    gui.xdo("key", "Return")
+    yield from until(lambda: installed() is not None, 30)
+
+
 def steps():
     zip_path = FOLDER / "tactile_patch.zip"
     with zipfile.ZipFile(zip_path) as file:
@@ -84,6 +97,10 @@ def steps():
         bpy.ops.extensions.package_upgrade_all()
         yield 1
         check("it is updated from there", installed() == newest, installed())
+        bpy.ops.extensions.package_uninstall(repo_index=index, pkg_id="tactile_patch")
+        yield 1
+        yield from drop_link()
+        check("it is installed by the link of the page", installed() == newest, installed())
         bpy.ops.mesh.primitive_monkey_add(size=2.0)
         bpy.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 3
         bpy.ops.tactile.pick(location=(0.32, -0.19, 0.84))

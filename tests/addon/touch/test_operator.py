@@ -549,7 +549,7 @@ def test_a_doubtful_patch_finishes_with_a_warning(empty, capfd):
     _, report = reconstruct(empty, location=(0.42, -0.62, 0.78), extent=0.3)
     assert report["status"] == "uncertain"
     assert "take a shorter extent" in report["message"]
-    assert "Warning: Heights are good to" in capfd.readouterr().out
+    assert "Warning: Doubtful: take a shorter extent, or add sampling planes" in capfd.readouterr().out
 
 
 def test_a_bump_between_the_curves_is_a_doubt_once_the_mesh_is_compared(empty):

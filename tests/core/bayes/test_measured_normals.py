@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, reconstruct_many
 from core.bayes import evidence, linear_system, posterior
-from core.bayes.contradiction import contradiction
+from core.bayes.contradiction import contradiction, measured_normals
 from core.bayes.measured_slopes import slope_equations
+from core.contours.local_geometry import Frame
 from core.patch.monge import monomials
 
 PLANES = surfaces.planes((0, 60, 120))
@@ -181,9 +182,9 @@ def test_without_slopes_both_likelihoods_are_one():
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
     alone = linear_system.linear_system(local, weights, nothing, local[:, :0])
-    data = evidence.restricted(linear_system.of_heights(alone, weights))
+    data = evidence.restricted(alone.equations)
     empty = alone._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
-    one, other = (linear_system.hyperparameters(s, data, weights, np.array([2e-3])) for s in (alone, empty))
+    one, other = (linear_system.hyperparameters(s, data, np.array([2e-3])) for s in (alone, empty))
     for a, b in zip(one, other, strict=True):
         assert b == pytest.approx(a, rel=1e-4)
 
@@ -304,3 +305,8 @@ def test_a_contradiction_is_counted_in_deviations_of_the_mean_and_in_radians():
     assert angle == pytest.approx(0.03, rel=1e-3)
     scattered = np.tile(lean / 0.02, (40, 1)) + 3.0 * rng.normal(size=(40, 3))
     assert contradiction(contacts, scattered, known)[0] < 0.6 * deviations
+
+
+def test_of_contours_without_normals_there_are_none():
+    contacts, normals = measured_normals([Contour(np.eye(3))], Frame(np.zeros(3), np.eye(3)), 1.0)
+    assert contacts.shape == normals.shape == (0, 3)

@@ -189,3 +189,23 @@ def test_curves_a_degree_apart_are_distinct(degrees, distinct):
     else:
         with pytest.raises(DegenerateCurvesError, match=r"run in one direction \(0.9 degrees apart\)"):
             surface.fit(contours)
+
+
+def test_tangents_point_the_way_the_contour_was_given():
+    for s in (np.linspace(-5.0, 1.0, 13), np.linspace(-1.0, 5.0, 13), np.linspace(1.0, 5.0, 9)):
+        ahead = Contour(np.column_stack([s, 0.0 * s, -0.02 * s**2]))
+        for way in (1, -1):
+            curves = through([Contour(ahead.points[::way])], np.zeros(3))
+            assert way * curves.tangents[0, 0] @ [1.0, 0.0, 0.0] > 0.99
+            along = curves.along[curves.present]
+            assert along == pytest.approx(
+                way
+                * np.copysign(1.0, s[s != 0.0][::way])
+                * np.linalg.norm(curves.points[curves.present], axis=1)
+            )
+
+
+def test_at_an_umbilic_of_large_curvatures_rounding_makes_no_direction():
+    angles, known = np.array([0.1, 1.0, 2.0, 0.0]), np.array([True, True, True, False])
+    curvatures = 1e9 * (1.0 + 1e-12 * np.array([1.0, -1.0, 0.5, 0.0]))
+    assert principal_curvatures(angles, curvatures, known)[2] == 0.0

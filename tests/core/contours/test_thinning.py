@@ -102,6 +102,14 @@ def test_means_run_as_the_contour_does_and_keep_to_their_side_of_the_point():
     assert backward.points == pytest.approx(fewer.points[::-1])
 
 
+@pytest.mark.parametrize("count", [101, 150, 201])
+def test_more_than_a_hundred_contacts_become_a_hundred_at_most(count):
+    t = np.linspace(0.1, 1.0, count)
+    fewer, size = thinned(Contour(np.column_stack([t, 0.0 * t, -0.2 * t**2])), np.zeros(3))
+    assert size == -(-count // MOST_CONTACTS) > 1
+    assert len(fewer.points) <= MOST_CONTACTS
+
+
 @pytest.mark.parametrize("count", [1, 50, MOST_CONTACTS])
 def test_few_contacts_stay_as_they_are(count):
     contour = Contour(np.random.default_rng(0).normal(size=(count, 3)))

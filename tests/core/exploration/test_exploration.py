@@ -7,6 +7,7 @@ import pytest
 import surfaces
 
 import core
+from core.exploration import one_touch
 from core.exploration.one_touch import NOTICEABLE, is_enough
 from core.reconstruction.status import DOUBTFUL_STD
 
@@ -66,7 +67,7 @@ def test_on_a_sphere_the_patch_is_large_and_as_good_as_it_says(radius, noise):
     assert off < 3.0 * r.mean_height_std
 
 
-@pytest.mark.parametrize(("high", "wide"), [(1.6, 2.4), (1.2, 2.1), (3.2, 2.8)])
+@pytest.mark.parametrize(("high", "wide"), [(1.6, 2.4), (1.4, 2.3), (3.2, 2.8)])
 def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_lengths_tried_first(high, wide):
     def waves(x, y):
         return high * np.sin(x / wide) * np.sin(y / wide)
@@ -344,3 +345,12 @@ def test_planes_may_be_a_number_of_evenly_laid_out_ones(count):
 def test_too_few_or_too_many_planes_are_refused(planes):
     with pytest.raises(ValueError, match="planes: wanted 3 to 24, or sampling planes, got"):
         explore(surfaces.plane(), planes=planes)
+
+
+def test_six_planes_are_the_most_unless_more_are_wanted(monkeypatch):
+    s = surfaces.torus(40, 20, 0.6)
+    monkeypatch.setattr(one_touch, "HELPS", -1.0)
+    given = {"extent": 12.0, "step": 1.0, "tolerance": 0.0, "noise": 0.05, "rng": 0}
+    assert len(core.explore(s, s.point, s.normal, **given).planes) == 6
+    assert len(core.explore_many(s, [s.point], [s.normal], **given)[0].planes) == 6
+    assert len(core.explore(s, s.point, s.normal, most_planes=4, **given).planes) == 4

@@ -223,6 +223,13 @@ def test_single_precision_far_from_the_origin_is_refused_and_near_it_taken():
         at(1e6)
 
 
+def with_misses(r, misses, **more):
+    """That reconstruction, of curves that pass the point at these distances."""
+    found = replace(r, **more)
+    vars(found)["misses"] = np.array(misses)
+    return found
+
+
 @pytest.mark.parametrize(
     ("share", "std", "doubt"),
     [(0.0049, 0.0, False), (0.0051, 0.0, True), (0.0099, 0.002, False), (0.0101, 0.002, True)],
@@ -232,11 +239,11 @@ def test_a_curve_may_miss_the_point_by_half_a_percent_of_the_radius_or_five_devi
     r = s.fit(contours_of(s, noise=0.0))
     misses = np.zeros((3, 2))
     misses[2] = share * r.radius, std * r.radius
-    assert (replace(r, misses=misses).status == "uncertain") == doubt
+    assert (with_misses(r, misses).status == "uncertain") == doubt
     # A contact's accuracy is the least that curves scatter by, but for a third.
-    rough = replace(r, misses=np.array([[0.01 * r.radius, 0.0]] * 3), accuracy=0.01)
-    assert rough.status == "ok"
-    assert replace(rough, accuracy=0.006).status == "uncertain"
+    far = [[0.01 * r.radius, 0.0]] * 3
+    assert with_misses(r, far, accuracy=0.01).status == "ok"
+    assert with_misses(r, far, accuracy=0.006).status == "uncertain"
 
 
 @pytest.mark.parametrize(("share", "doubt"), [(0.0199, False), (0.0201, True)])
@@ -258,3 +265,12 @@ def test_the_frame_may_be_ten_degrees_off_and_curvatures_a_tenth_of_one_over_the
     monkeypatch.setattr(Posterior, "curvature_std", lambda _: std)
     assert (r.status == "uncertain") == bool(doubt)
     assert doubt in r.message
+
+
+@pytest.mark.parametrize(
+    ("deviations", "angle", "told"), [(5.5, 0.011, True), (5.5, 0.009, False), (4.5, 0.011, False)]
+)
+def test_normals_contradict_by_five_deviations_and_a_hundredth(deviations, angle, told):
+    r = surfaces.pear().fit(contours_of(surfaces.pear()))
+    vars(r)["contradiction"] = (deviations, angle)
+    assert (r.status == "uncertain") is told

@@ -320,3 +320,34 @@ def test_long_triangles_are_halved_until_a_patch_covers_many():
     assert np.linalg.norm(scanned_mesh._across(mesh.triangles), axis=1).sum() / 2.0 == pytest.approx(6.0)
     assert mesh.centers == pytest.approx(mesh.triangles.mean(axis=1))
     assert mesh.smooth == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(mesh.smooth), 1)))
+
+
+def test_a_piece_is_long_by_its_edges_and_not_by_its_normals():
+    corners = 0.1 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    normals = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    assert len(scanned_mesh._halved(np.concatenate([corners, normals], axis=1)[None])) == 1
+
+
+def test_the_foot_on_a_triangle_is_the_nearest_of_its_points():
+    rng = np.random.default_rng(0)
+    triangles, points = rng.normal(size=(200, 3, 3)), rng.normal(size=(200, 3))
+    feet = scanned_mesh._feet(points, triangles)
+    a, b = np.meshgrid(np.linspace(0.0, 1.0, 101), np.linspace(0.0, 1.0, 101))
+    shares = np.stack([a, b, 1.0 - a - b])[:, a + b <= 1.0 + 1e-9].T
+    nearest = np.linalg.norm(shares @ triangles - points[:, None], axis=2).min(axis=1)
+    ours = np.linalg.norm(feet - points, axis=1)
+    assert np.all(ours <= nearest + 1e-9)
+    assert ours == pytest.approx(nearest, abs=0.02)
+    inside = np.linalg.solve(np.swapaxes(triangles, 1, 2), feet[..., None])[..., 0]
+    assert inside.min() > -1e-9 and inside.sum(axis=1) == pytest.approx(np.ones(200))
+
+
+def test_contours_are_tried_in_turns_of_ten_degrees(monkeypatch):
+    surface, vertices, faces = bumpy()
+    tried, scores = [], pose_search._scores
+    monkeypatch.setattr(
+        pose_search, "_scores", lambda felt, fields: tried.append(felt[0, -1]) or scores(felt, fields)
+    )
+    register(touch(surface), vertices, faces)
+    turns = np.sort(np.degrees(np.arctan2(*np.array(tried)[:, 1::-1].T)))
+    assert np.diff(turns) == pytest.approx(np.full(35, 10.0))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import core
+from core.scan import sampling
 
 
 @pytest.mark.parametrize("spacing", [0.1, 0.2, 0.4])
@@ -20,6 +21,13 @@ def test_the_count_of_spaced_points_is_known_before_they_are_chosen(spacing):
 
 def test_there_is_one_point_at_least():
     assert core.spaced_count(0.01, 1.0) == 1
+
+
+def test_of_the_points_in_a_cell_one_is_left():
+    points = np.random.default_rng(1).uniform(-3.0, 2.0, (4000, 3)) * [1.0, 2.0, 0.5]
+    cells = np.floor(points / 0.4)
+    first = np.unique(cells, axis=0, return_index=True)[1]
+    assert np.array_equal(np.sort(sampling._one_a_cell(points, 0.4)), np.sort(first))
 
 
 def test_scattered_points_are_even_by_area_and_on_their_faces():

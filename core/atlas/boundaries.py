@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The edges of the graph (paper, VI): the boundary curve between two patches is where they weigh the same."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from .charts import MARGIN, Charts, Pairs
+from .field import DIFFER, LAYER, node_weights
+
+TURNS, OUTWARD = 32, 16  # rays from the middle of each patch, and places on each
+
+
+class Edge(NamedTuple):
+    """Two patches that share a boundary: their indices, its points (m, 3), angles of their normals (m,)."""
+
+    nodes: tuple[int, int]
+    curve: Array
+    angle: Array
+
+
+class _Crossing(NamedTuple):
+    """Where on rays a patch gives way: its index, the other's, the ray, the point, the angle of normals."""
+
+    node: NDArray[np.intp]
+    other: NDArray[np.intp]
+    ray: NDArray[np.intp]
+    point: Array
+    angle: Array
+
+
+def edges_of(charts: Charts) -> list[Edge]:
+    """All pairs that share a boundary, each with that of the patch on which it is seen from more rays."""
+    parts = [_crossings(charts, node) for node in range(len(charts.radii))]
+    found = _Crossing(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    pairs: dict[tuple[int, int], list[int]] = {}
+    for i, pair in enumerate(zip(found.node.tolist(), found.other.tolist(), strict=True)):
+        pairs.setdefault(pair, []).append(i)
+    edges = []
+    for pair in sorted({(min(p), max(p)) for p in pairs}):
+        which = max(pairs.get(pair, []), pairs.get(pair[::-1], []), key=len)
+        which = _in_turn(which, found.ray)
+        edges.append(Edge(pair, found.point[which], found.angle[which]))
+    return edges
+
+
+def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:
+    """From the ray after the widest gap on."""
+    rays = ray[which]
+    gaps = np.diff(rays, append=rays[0] + TURNS)
+    start = int(np.argmax(gaps)) + 1
+    return which[start:] + which[:start]
+
+
+def _crossings(charts: Charts, node: int) -> _Crossing:
+    """Where a patch gives way to another, on rays from its middle."""
+    turns = 2.0 * np.pi * np.arange(TURNS) / TURNS
+    out = MARGIN * np.arange(1, OUTWARD + 1) / (OUTWARD + 1)
+    rays = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    each = np.full(TURNS, node)
+    unit = 1.0 / np.maximum(charts.shares(rays[:, 0], rays[:, 1], each), 1e-9)
+    xy = (rays * unit[:, None])[:, None] * out[:, None]
+    points, normals = charts.world(np.full(TURNS * OUTWARD, node), *xy.reshape(-1, 2).T)
+    pairs = charts.pairs(points)
+    weights = node_weights(charts, pairs)
+    cosine = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
+    wall = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > DIFFER)
+    own = pairs.node == node
+    mine = np.bincount(pairs.place[own], weights[own], len(points))
+    best, which = _strongest(pairs, np.where(wall & ~own, weights, 0.0), len(points))
+    ratio = np.log(np.maximum(best, 1e-300) / np.maximum(mine, 1e-300)).reshape(TURNS, OUTWARD)
+    lost = ratio > 0.0
+    ray = np.flatnonzero(lost.any(axis=1))
+    at = lost[ray].argmax(axis=1)
+    before = np.maximum(at - 1, 0)
+    a, b = np.where(at > 0, ratio[ray, before], 0.0), ratio[ray, at]
+    share = np.clip(-a / np.where(b - a > 0.0, b - a, 1.0), 0.0, 1.0)
+    place = ray * OUTWARD + at
+    flat = (1.0 - share)[:, None] * xy[ray, before] + share[:, None] * xy[ray, at]
+    point, _ = charts.world(np.full(len(ray), node), *flat.T)
+    angle = np.arccos(np.clip(cosine[which[place]], -1.0, 1.0))
+    return _Crossing(np.full(len(ray), node), pairs.node[which[place]], ray, point, angle)
+
+
+def _strongest(pairs: Pairs, weights: Array, count: int) -> tuple[Array, NDArray[np.intp]]:
+    """The largest weight at each of `count` places, and the pair that has it."""
+    order = np.lexsort((-weights, pairs.place))
+    starts = np.flatnonzero(np.diff(pairs.place[order], prepend=-1))
+    best, which = np.zeros(count), np.zeros(count, dtype=np.intp)
+    best[pairs.place[order[starts]]], which[pairs.place[order[starts]]] = (
+        weights[order[starts]],
+        order[starts],
+    )
+    return best, which

@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Many patches as tables, so that what all of them say of many places is one pass over arrays.
+
+A patch with a residual costs a kernel with each of its contacts at every place. Here it costs 16 numbers of a
+cubic B-spline, which is C2 and off the patch by less than the residual's own grain.
+"""
+
+from dataclasses import dataclass, fields
+from functools import cache, cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+
+SIDE = 33  # knots of a table along each axis
+MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
+AZIMUTHS = 96  # samples of a domain's radius
+REACH = 0.5  # of the radius, that a place may be off its patch
+CHUNK = 200_000  # pairs at once
+
+
+class Pairs(NamedTuple):
+    """What patches say of places near by, m pairs sorted by place.
+
+    place, node : (m,), indices
+    share : (m,), of the domain's radius at its foot, below MARGIN
+    distance : (m,), signed
+    normal : (m, 3), of the patch below the place
+    std : (m,), of the distance
+    """
+
+    place: NDArray[np.intp]
+    node: NDArray[np.intp]
+    share: Array
+    distance: Array
+    normal: Array
+    std: Array
+
+    def chosen(self, which: NDArray[Any]) -> "Pairs":
+        """Some of the pairs."""
+        return Pairs(*(values[which] for values in self))
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """n patches; a table's knots are evenly spaced over [-half, half]^2, in unit radius.
+
+    origins (n, 3), axes (n, 3, 3), radii (n,), halves (n,)
+    heights, stds : (n, SIDE, SIDE), spline coefficients of heights; deviations; in unit radius
+    rims : (n, AZIMUTHS), the domains' radii, in unit radius
+    """
+
+    origins: Array
+    axes: Array
+    radii: Array
+    halves: Array
+    heights: Array
+    stds: Array
+    rims: Array
+
+    @cached_property
+    def tree(self) -> Any:
+        """Of the origins."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.origins)
+
+    @cached_property
+    def reaches(self) -> Array:
+        """How far from its origin a patch is asked, (n,)."""
+        flat: Array = MARGIN * self.rims.max(axis=1)
+        return self.radii * np.hypot(flat, np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5) + REACH)
+
+    def pairs(self, points: Array, nodes: NDArray[np.intp] | None = None) -> Pairs:
+        """What patches say of places (k, 3); with `nodes` (k,), only that one of each."""
+        found = [self._pairs_at(points, *some) for some in self._near(points, nodes)]
+        return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+    def _near(self, points: Array, nodes: NDArray[np.intp] | None) -> Any:
+        """Pairs of places and patches that may be within reach, sorted by place, CHUNK at once or so."""
+        if nodes is not None:
+            yield np.arange(len(points)), nodes
+            return
+        rows = max(1, CHUNK // 16)
+        for start in range(0, max(len(points), 1), rows):
+            lists = self._tree_of(points[start : start + rows])
+            counts = [len(some) for some in lists]
+            node = np.repeat(np.arange(len(lists)), counts)
+            place = np.fromiter((i for some in lists for i in some), dtype=np.intp, count=sum(counts))
+            order = np.argsort(place, kind="stable")
+            yield start + place[order], node[order]
+
+    def _tree_of(self, points: Array) -> list[list[int]]:
+        from scipy.spatial import cKDTree
+
+        if not len(points):
+            return [[]]
+        found: list[list[int]] = cKDTree(points).query_ball_point(self.origins, self.reaches).tolist()
+        return found
+
+    def local(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Array:
+        """Places in the frames of patches and in unit radius, (m, 3)."""
+        off = points[place] - self.origins[node]
+        found: Array = np.einsum("mi,mij->mj", off, self.axes[node]) / self.radii[node, None]
+        return found
+
+    def shares(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
+        """Shares (m,) of the domain's radius at local (x, y); smooth in the azimuth."""
+        at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
+        first = at.astype(np.intp)
+        weights = _catmull_rom(at - first)
+        steps = (first[:, None] + np.arange(-1, 3)) % AZIMUTHS
+        radius = np.einsum("mk,mk->m", self.rims[node[:, None], steps], weights)
+        return np.hypot(x, y) / np.maximum(radius, 1e-6)
+
+    def _pairs_at(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
+        """Distances to the tangent plane at the foot, which is where the share and the deviation are of."""
+        x, y, z = self.local(points, place, node).T
+        inside = (self.shares(x, y, node) < MARGIN + REACH) & (np.abs(z) < 2.0)
+        place, node, x, y, z = (values[inside] for values in (place, node, x, y, z))
+        h, hx, hy, _ = self._heights(x, y, node)
+        off = (z - h) / (1.0 + hx**2 + hy**2)
+        foot_x, foot_y = x + off * hx, y + off * hy
+        share = self.shares(foot_x, foot_y, node)
+        inside = (share < MARGIN) & (np.abs(off) < REACH)
+        place, node, x, y, z, foot_x, foot_y, share = (
+            values[inside] for values in (place, node, x, y, z, foot_x, foot_y, share)
+        )
+        h, hx, hy, std = self._heights(foot_x, foot_y, node)
+        steep, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[node]
+        distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * steep
+        normal = np.stack([-hx * steep, -hy * steep, steep], axis=1)
+        return Pairs(
+            place,
+            node,
+            share,
+            distance * radius,
+            np.einsum("mij,mj->mi", self.axes[node], normal),
+            std * steep * radius,
+        )
+
+    def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
+        """Heights, slopes and deviations (m,) at local (x, y)."""
+        pitch = 2.0 * self.halves[node] / (SIDE - 1)
+        column, by_x, by_dx = _b_spline(x / pitch + 0.5 * (SIDE - 1))
+        row, by_y, by_dy = _b_spline(y / pitch + 0.5 * (SIDE - 1))
+        h, hx, hy = np.zeros((3, len(x)))
+        flat = self.heights.reshape(-1)
+        start = (node * SIDE + column - 1) * SIDE + row - 1
+        for i in range(4):
+            taps = flat[start[:, None] + (i * SIDE + np.arange(4))]
+            across = np.einsum("mk,mk->m", taps, by_y)
+            h += by_x[:, i] * across
+            hx += by_dx[:, i] * across
+            hy += by_x[:, i] * np.einsum("mk,mk->m", taps, by_dy)
+        nearest = np.clip(np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp), 0, SIDE - 1)
+        std = self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]]
+        return h, hx / pitch, hy / pitch, std
+
+    def joined(self, others: "Charts") -> "Charts":
+        """These patches and others."""
+        return Charts(
+            *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
+        )
+
+    def world(self, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
+        """Points and normals (m, 3) of patches above local (x, y), which are in unit radius."""
+        h, hx, hy, _ = self._heights(x, y, node)
+        steep = 1.0 / np.sqrt(1.0 + hx**2 + hy**2)
+        normal = np.stack([-hx * steep, -hy * steep, steep], axis=1)
+        local = np.stack([x, y, h], axis=1) * self.radii[node, None]
+        axes = self.axes[node]
+        return self.origins[node] + np.einsum("mij,mj->mi", axes, local), np.einsum(
+            "mij,mj->mi", axes, normal
+        )
+
+
+def _catmull_rom(t: Array) -> Array:
+    """Weights (m, 4) of four neighbors at shares t of the way between the middle two."""
+    return (
+        np.stack(
+            [
+                ((2.0 - t) * t - 1.0) * t,
+                (3.0 * t - 5.0) * t**2 + 2.0,
+                ((4.0 - 3.0 * t) * t + 1.0) * t,
+                (t - 1.0) * t**2,
+            ],
+            axis=1,
+        )
+        / 2.0
+    )
+
+
+def _b_spline(at: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    """The knot before each place (m,), weights of the four knots around it (m, 4), and their slopes."""
+    at = np.clip(at, 1.0, SIDE - 2.0 - 1e-9)
+    knot = at.astype(np.intp)
+    powers = np.vander(at - knot, 4, increasing=True)
+    values, slopes = _b_spline_tables()
+    return knot, powers @ values, powers[:, :3] @ slopes
+
+
+@cache
+def _b_spline_tables() -> tuple[Array, Array]:
+    values = (
+        np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]])
+        / 6.0
+    )
+    return values, values[1:] * np.array([[1.0], [2.0], [3.0]])

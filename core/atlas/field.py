@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One surface of many patches: a partition of unity of their signed distances, and its deviation.
+
+Only patches that face one way at a place are blended there. Others are its other walls: of two that face away
+from each other the inside is in both (a crease, a thin wall), of two that face each other it is in either (a
+valley, a gap). Beside the paper; weights as of Ohtake et al. 2003, with what is known of each patch.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from .charts import MARGIN, Charts, Pairs
+
+FLOOR = 1e-3  # of the radius, that no deviation is taken below in a weight
+AGREE, DIFFER = 0.64, 0.34  # cosines of 50 and 70 degrees: between them a patch fades out of a blend
+LAYER = 0.15  # of the radius, that patches of one wall may differ in height at most
+SLANT = 0.5  # and of the distance from it
+WALLS = 3  # that meet at a place
+
+
+class Blend(NamedTuple):
+    """For k places: signed distance and std (k,), gradient (k, 3), the patch of most weight (k,).
+
+    Where no patch reaches, the distance is 0, the deviation inf and the patch -1.
+    """
+
+    distance: Array
+    std: Array
+    normal: Array
+    node: NDArray[np.intp]
+
+
+def blended(charts: Charts, points: Array) -> Blend:
+    """The field at places (k, 3)."""
+    return blend_of(charts, charts.pairs(points), len(points))
+
+
+def blend_of(charts: Charts, pairs: Pairs, count: int) -> Blend:
+    """The field at `count` places of what patches say there."""
+    weights = node_weights(charts, pairs)
+    first, taken = _wall(charts, pairs, weights, count, np.ones(len(weights), dtype=bool))
+    found, left = first, ~taken
+    for _ in range(WALLS - 1):
+        if not left.any():
+            break
+        other, taken = _wall(charts, pairs, weights, count, left)
+        found, left = _combined(found, first, other), left & ~taken
+    return found[0]
+
+
+_Wall = tuple[Blend, Array]  # with the places of the patches' origins
+
+
+def node_weights(charts: Charts, pairs: Pairs) -> Array:
+    """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), u the share of MARGIN times the domain's radius."""
+    u = pairs.share / MARGIN
+    floor = FLOOR * charts.radii[pairs.node]
+    weights: Array = (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (pairs.std**2 + floor**2)
+    return weights
+
+
+def _wall(
+    charts: Charts, pairs: Pairs, weights: Array, count: int, active: NDArray[np.bool_]
+) -> tuple[_Wall, NDArray[np.bool_]]:
+    """The blend of the active pairs that face the way of the nearest at each place, and which they are."""
+    which = np.flatnonzero(active)
+    place, node, out, distance, normal, std = pairs.chosen(which)
+    radius = charts.radii[node]
+    nearest = _first(place, np.abs(distance) + 0.5 * LAYER * radius * out**2, count)
+    r = nearest[place]
+    cosine = np.einsum("mi,mi->m", normal, normal[r])
+    agree = np.clip((cosine - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
+    agree *= agree * (3.0 - 2.0 * agree)
+    room = LAYER * np.maximum(radius, radius[r]) + SLANT * np.abs(distance[r])
+    agree *= np.clip(1.0 - ((distance - distance[r]) / room) ** 2, 0.0, 1.0) ** 2
+    w = weights[which] * agree
+    blend = _mean(place, node, distance, normal, std, w, count)
+    origins = charts.origins[node[nearest]] if len(node) else np.zeros((count, 3))
+    taken = active.copy()
+    taken[which] = agree > 0.0
+    return (blend, origins), taken
+
+
+def _first(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
+    """For each of `count` places the pair of the least key; -1 where there is none."""
+    order = np.lexsort((key, place))
+    found = np.full(count, -1)
+    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
+    found[place[order[starts]]] = order[starts]
+    return found
+
+
+def _mean(
+    place: NDArray[np.intp],
+    node: NDArray[np.intp],
+    distance: Array,
+    normal: Array,
+    std: Array,
+    w: Array,
+    count: int,
+) -> Blend:
+    """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
+
+    def total(values: Array) -> Array:
+        found: Array = np.bincount(place, w * values, count)  # type: ignore[assignment]
+        return found
+
+    some = total(np.ones(len(w)))
+    there = some > 0.0
+    scale = 1.0 / np.where(there, some, 1.0)
+    mean = scale * total(distance)
+    variance = scale * total(std**2 + (distance - mean[place]) ** 2)
+    up = np.stack([total(normal[:, i]) for i in range(3)], axis=1)
+    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
+    best = _first(place, -w, count)
+    return Blend(
+        mean,
+        np.where(there, np.sqrt(variance), np.inf),
+        up,
+        np.where(there, np.append(node, -1)[best], -1),
+    )
+
+
+def _combined(found: _Wall, first: _Wall, other: _Wall) -> _Wall:
+    """What is inside both walls where they face away from each other, inside either elsewhere."""
+    (a, origins), (b, others) = found, other
+    across = others - first[1]
+    away = np.einsum("ki,ki->k", first[0].normal - b.normal, across) < 0.0
+    takes = (b.node >= 0) & np.where(away, b.distance > a.distance, b.distance < a.distance)
+    wide = takes[:, None]
+    blend = Blend(
+        np.where(takes, b.distance, a.distance),
+        np.where(takes, b.std, a.std),
+        np.where(wide, b.normal, a.normal),
+        np.where(takes, b.node, a.node),
+    )
+    return blend, np.where(wide, others, origins)

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An atlas of contacts that were measured, as a robot's rasters: no surface is asked, no touch chosen."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import Array, list_of, number, unit_vector
+from ..contours.contour import Contour
+from ..reconstruction.from_contours import reconstruct_many
+from ..reconstruction.result import Reconstruction
+from .join import FACING, charts_of
+from .object_atlas import Atlas
+
+FIRST, SOME = 40, 24  # contacts of the smallest patch; those that are asked how large that is
+STRETCH, STEPS = 1.4, 10  # by what patches grow, and how often
+MISSED = 3.0  # times what is expected, that contacts are off a patch in the median
+APART = 0.6  # radii from patch to patch
+NEIGHBORS = 16  # contacts that a normal follows from, where none was measured
+GROWN = 0.012  # of the radius, that a patch may be uncertain in the mean where there is no tolerance
+
+
+def atlas_of(
+    contours_or_strokes: Sequence[ArrayLike | Contour],
+    *,
+    outward: ArrayLike | None = None,
+    tolerance: float | None = None,
+    noise: float | None = None,
+) -> Atlas:
+    """The atlas of measured contacts: contours, with normals or without, and strokes (n, 3).
+
+    outward : (3,), on the outer side of all contacts; wanted where some have no normals that face outward
+    tolerance : mean deviation of the height until which patches grow; None for 1.2 % of their radius
+    noise : accuracy of a contact; None for the contours' own
+
+    Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, and where no
+    contacts carry a patch.
+    """
+    from scipy.spatial import cKDTree
+
+    points, normals, own = _contacts(contours_or_strokes, outward)
+    largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
+    noise = own if noise is None else number("noise", noise, least=0.0)
+    found = _patches(_Cloud(points, normals, cKDTree(points), noise, largest))
+    return Atlas(tuple(found), charts_of(found), largest)
+
+
+def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -> tuple[Array, Array, float]:
+    """Contacts and outward normals (n, 3), and the largest noise that is known."""
+    strokes = [
+        stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
+        for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
+    ]
+    up = None if outward is None else unit_vector("outward", outward)
+    if up is None and any(stroke.normals is None for stroke in strokes):
+        raise ValueError("outward: wanted a direction where contacts have no normals, got none")
+    points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
+    if len(points) < FIRST:
+        raise ValueError(f"contours_or_strokes: wanted {FIRST} contacts or more, got {len(points)}")
+    if up is None:
+        normals = np.vstack([stroke.normals for stroke in strokes])  # type: ignore[misc]
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    else:
+        normals = _normals(points, up)
+    return points, normals, max(stroke.noise or 0.0 for stroke in strokes)
+
+
+def _normals(points: Array, up: Array) -> Array:
+    """Of the planes nearest to the neighbors of each contact, on the side of `up`, (n, 3)."""
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(points).query(points, min(NEIGHBORS, len(points)))[1]
+    off = points[near] - points[near].mean(axis=1, keepdims=True)
+    normals: Array = np.linalg.eigh(np.swapaxes(off, 1, 2) @ off)[1][..., 0]
+    return np.where((normals @ up < 0.0)[:, None], -normals, normals)
+
+
+class _Cloud(NamedTuple):
+    """Contacts and normals (n, 3), a tree of them, their noise, and the deviation that patches grow to."""
+
+    points: Array
+    normals: Array
+    tree: Any
+    noise: float
+    largest: float | None
+
+    def patch(self, i: int, radius: float) -> Reconstruction | None:
+        """Around a contact, of those that face its way."""
+        near = np.array(self.tree.query_ball_point(self.points[i], radius))
+        near = near[self.normals[near] @ self.normals[i] > FACING]
+        strokes, place, outward = [[self.points[near]]], self.points[i][None], self.normals[i][None]
+        (r,) = reconstruct_many(place, [()], outward=outward, strokes_list=strokes, noise=self.noise)
+        return r if isinstance(r, Reconstruction) else None
+
+    def largest_patch(self, i: int, radius: float) -> Reconstruction | None:
+        """The largest that is certain enough, or the smallest where none is."""
+        best = None
+        for _ in range(STEPS):
+            r = self.patch(i, radius)
+            if r is None:
+                break
+            most = self.largest or GROWN * r.radius
+            off = r.typical_miss > MISSED * max(self.noise, most)
+            if best is not None and (off or r.mean_height_std > most):
+                break
+            best, radius = r, STRETCH * radius
+        return best
+
+    def least_radius(self) -> float:
+        """At which half of some contacts carry a patch: rasters have theirs in lines. Raises ValueError."""
+        some = np.linspace(0, len(self.points) - 1, SOME).astype(np.intp)
+        radius = float(np.median(self.tree.query(self.points[some], FIRST)[0][:, -1]))
+        for _ in range(STEPS):
+            if sum(self.patch(i, radius) is not None for i in some.tolist()) * 2 >= SOME:
+                return radius
+            radius *= STRETCH
+        raise ValueError(
+            f"contours_or_strokes: wanted contacts all around some place, got {len(self.points)} without"
+        )
+
+
+def _patches(cloud: _Cloud) -> list[Reconstruction]:
+    """Patches at contacts that none so far covers, one after the other, each as large as it may be."""
+    radius = cloud.least_radius()
+    left, found = np.ones(len(cloud.points), dtype=bool), []
+    for i in range(len(left)):
+        if not left[i]:
+            continue
+        r = cloud.largest_patch(i, radius)
+        room = APART * (radius if r is None else r.radius)
+        near = cloud.tree.query_ball_point(cloud.points[i], room)
+        left[near] &= cloud.normals[near] @ cloud.normals[i] < FACING
+        if r is not None:
+            found.append(r)
+    return found

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Atlases of measured contacts: rasters without normals, contours with them."""
+
+import numpy as np
+import pytest
+
+import core
+from tests import solids
+
+
+def bump(x, y):
+    return 0.3 * np.exp(-(x**2 + y**2) / 0.3)
+
+
+def raster(noise=0.0, lines=17, each=60):
+    rng = np.random.default_rng(0)
+    x = np.linspace(-1.0, 1.0, each)
+    rows = []
+    for y in np.linspace(-1.0, 1.0, lines):
+        z = bump(x, y) + rng.normal(0.0, noise, each)
+        rows.append(np.column_stack([x, np.full(each, y), z]))
+    return rows
+
+
+def test_a_raster_becomes_a_surface():
+    atlas = core.atlas_of(raster(noise=1e-3), outward=(0, 0, 1), tolerance=4e-3, noise=1e-3)
+    x, y = np.random.default_rng(1).uniform(-0.7, 0.7, (2, 200))
+    distance, std = atlas.distance(np.column_stack([x, y, bump(x, y)]))
+    assert np.isfinite(std).mean() > 0.95
+    assert np.abs(distance[np.isfinite(std)]).mean() < 2e-3
+    above, _ = atlas.distance(np.column_stack([x, y, bump(x, y) + 0.02]))
+    assert (above > 0.0).mean() > 0.98
+
+
+def test_contours_with_normals_need_no_direction():
+    solid = solids.ball()
+    planes = [core.SamplingPlane(a) for a in np.radians([0, 45, 90, 135])]
+    contours = core.track(solid, solid.start, solid.outward, planes, extent=0.7, step=0.05)
+    atlas = core.atlas_of(contours, tolerance=1e-2)
+    assert atlas.patches[0].patch.k1 == pytest.approx(-1.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "outward", "message"),
+    [
+        ([np.zeros((3, 3))], (0, 0, 1), "wanted 40 contacts or more, got 3"),
+        (raster(), None, "outward: wanted a direction where contacts have no normals"),
+        (
+            [np.column_stack([np.linspace(0, 1, 60), np.zeros(60), np.zeros(60)])],
+            (0, 0, 1),
+            "around some place",
+        ),
+        (7, (0, 0, 1), "contours_or_strokes: wanted a list"),
+    ],
+)
+def test_what_carries_no_atlas_gets_a_sentence(given, outward, message):
+    with pytest.raises(ValueError, match=message):
+        core.atlas_of(given, outward=outward)

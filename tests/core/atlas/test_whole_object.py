@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Touches all over exact objects: what is found of them, where it is closed, and how far it is off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import core
+from tests import solids
+
+
+def explored(solid, **options):
+    return core.explore_object(solid, solid.start, solid.outward, rng=0, **{"tolerance": 4e-3} | options)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return explored(solids.ball(), noise=1e-3)
+
+
+@pytest.fixture(scope="module")
+def ring():
+    return explored(solids.ring(), noise=1e-3)
+
+
+@pytest.fixture(scope="module")
+def block():
+    return explored(solids.block())
+
+
+def test_a_ball_is_closed_and_as_near_as_asked(ball):
+    mesh = ball.mesh(0.08)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    assert np.abs(solids.ball().distances(mesh.vertices)).mean() < 1e-3
+    assert ball.status == "ok"
+    assert ball.message == "The object was felt wherever a finger could go on."
+    assert ball.next_touch() is None
+    assert len(ball.patches) < 30
+
+
+def test_triangles_face_outward_and_are_as_large_as_asked(ball):
+    mesh = ball.mesh(0.08)
+    a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
+    assert (np.einsum("ni,ni->n", np.cross(b - a, c - a), a) > 0.0).all()
+    assert np.median(np.linalg.norm(b - a, axis=1)) == pytest.approx(0.08, rel=0.2)
+
+
+def test_distances_are_signed_and_their_deviations_true(ball):
+    rng = np.random.default_rng(1)
+    radii = rng.uniform(0.8, 1.2, 500)
+    p = rng.normal(size=(500, 3))
+    p *= (radii / np.linalg.norm(p, axis=1))[:, None]
+    distance, std = ball.distance(p)
+    assert np.isfinite(distance).all()
+    assert (std > 0.0).all()
+    near = np.abs(radii - 1.0) < 0.02
+    assert np.abs(distance - (radii - 1.0))[near].max() < 6e-3
+    assert (np.sign(distance) == np.sign(radii - 1.0))[np.abs(radii - 1.0) > 6e-3].all()
+
+
+def test_edges_join_neighbors_along_curves_on_the_surface(ball):
+    ends = np.array([edge.nodes for edge in ball.edges])
+    assert len(np.unique(ends)) == len(ball.patches)
+    assert (ends[:, 0] < ends[:, 1]).all()
+    curves = np.vstack([edge.curve for edge in ball.edges])
+    assert np.abs(np.linalg.norm(curves, axis=1) - 1.0).mean() < 1e-3
+    assert np.degrees(np.mean(np.concatenate([edge.angle for edge in ball.edges]))) < 1.0
+
+
+def test_a_torus_has_one_handle(ring):
+    mesh = ring.mesh(0.06)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 0, 1)
+    assert np.abs(solids.ring().distances(mesh.vertices)).mean() < 1e-3
+
+
+def test_touches_bend_around_the_edges_of_a_block(block):
+    normals = np.array([r.frame.axes[:, 2] for r in block.patches])
+    sides = np.vstack([np.eye(3), -np.eye(3)])
+    assert ((normals @ sides.T).max(axis=0) > 0.99).all()
+    rng = np.random.default_rng(0)
+    half = np.array([1.0, 0.7, 0.5])
+    p, axis = rng.uniform(-1.0, 1.0, (1000, 3)) * half, rng.integers(0, 3, 1000)
+    p[np.arange(1000), axis] = np.copysign(half[axis], p[np.arange(1000), axis])
+    distance, std = block.distance(p)
+    felt = np.isfinite(std)
+    assert felt.mean() > 0.98
+    assert np.abs(distance[felt]).mean() < 1e-3
+
+
+def test_progress_can_end_it_with_what_is_there():
+    told = []
+
+    def progress(done, uncovered):
+        told.append((done, uncovered))
+        return done < 5
+
+    solid = solids.ball()
+    atlas = explored(solid, progress=progress)
+    assert 5 <= len(atlas.patches) <= 8
+    assert told[-1][0] == len(atlas.patches)
+    assert solids.topology(atlas.mesh(0.1).triangles).open > 0
+
+
+def test_a_small_budget_leaves_places_uncovered_and_says_where_to_go_on():
+    solid = solids.ball()
+    atlas = explored(solid, most=4)
+    assert len(atlas.patches) <= 4
+    assert atlas.status == "uncertain"
+    assert "places where the object goes on: allow more touches" in atlas.message
+    touch = atlas.next_touch()
+    assert abs(solid.distance(*touch.point)) < 0.05
+    assert touch.outward @ touch.point > 0.9
+    assert touch.gain > 0.0
+    far = np.array([-3.0 * touch.outward, 3.0 * touch.outward])
+    distance, std = atlas.distance(far)
+    assert np.isfinite(distance).all()
+    assert np.isinf(std).any()
+
+
+def test_patches_that_are_less_certain_than_the_tolerance_are_said(ball):
+    strict = replace(ball, tolerance=1e-9)
+    assert strict.status == "uncertain"
+    assert "patches are less certain than the tolerance" in strict.message
+    assert abs(np.linalg.norm(strict.next_touch().point) - 1.0) < 5e-3
+
+
+def test_far_away_the_nearest_place_counts(ball):
+    directions = np.random.default_rng(2).normal(size=(50, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    distance, std = ball.distance(np.vstack([3.0 * directions, 0.1 * directions]))
+    assert distance[:50] == pytest.approx(2.0, rel=0.03)
+    assert distance[50:] == pytest.approx(-0.9, rel=0.05)
+    assert np.isfinite(std).all()
+
+
+def test_steps_tell_what_was_found():
+    solid = solids.ball()
+    steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=4e-3, rng=0)
+    found, joining = [], []
+    try:
+        while True:
+            progress = next(steps)
+            found += progress.found
+            joining.append(progress.joining)
+    except StopIteration as end:
+        atlas = end.value
+    assert len(found) == len(atlas.patches) <= progress.done
+    assert joining[0] is None
+    assert joining[-1] == 1.0
+
+
+def test_the_same_seed_makes_the_same_touches(ball):
+    again = explored(solids.ball(), noise=1e-3)
+    assert all(
+        np.array_equal(a.frame.origin, b.frame.origin)
+        for a, b in zip(again.patches, ball.patches, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"tolerance": 0.0}, "tolerance: wanted a finite number above 0, got 0"),
+        ({"tolerance": 1e-3, "noise": 2e-3}, "tolerance: wanted the noise 0.002 or more, got 0.001"),
+        ({"most": 0}, "most: wanted a finite number of 1 or more, got 0"),
+    ],
+)
+def test_bad_arguments_get_a_sentence(options, message):
+    with pytest.raises(ValueError, match=message):
+        explored(solids.ball(), **options)
+
+
+def test_no_start_on_the_surface_gets_a_sentence():
+    with pytest.raises(ValueError, match="wanted one on the surface"):
+        core.explore_object(solids.ball(), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), tolerance=1e-2)

@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole objects to touch, by signed distances known in closed form; and what a mesh of them is."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+HAIR = 1e-12
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Answers rays by walking as far as its signed distance allows, from outside or from inside.
+
+    distance : of a point (x, y, z), negative inside, never too large
+    start, outward : a point on it, and the normal there
+    """
+
+    distance: Callable
+    start: tuple
+    outward: tuple
+
+    def ray_cast(self, origin, direction, distance):
+        (x, y, z), (a, b, c), f = origin, direction, self.distance
+        gone, side = 0.0, math.copysign(1.0, f(x, y, z))
+        while gone <= distance:
+            step = side * f(x + gone * a, y + gone * b, z + gone * c)
+            if step < HAIR and gone > 0.0:
+                point = x + gone * a, y + gone * b, z + gone * c
+                return point, self.normal(*point)
+            gone += max(step, HAIR)
+        return None
+
+    def normal(self, x, y, z, h=1e-6):
+        f = self.distance
+        n = f(x + h, y, z) - f(x - h, y, z), f(x, y + h, z) - f(x, y - h, z), f(x, y, z + h) - f(x, y, z - h)
+        length = math.hypot(*n)
+        return n[0] / length, n[1] / length, n[2] / length
+
+    def distances(self, points):
+        return np.array([self.distance(*p) for p in np.asarray(points).tolist()])
+
+    def placed(self, scale=1.0, shift=(0.0, 0.0, 0.0)):
+        """The same elsewhere, in another unit."""
+        u, v, w = shift
+        return Solid(
+            lambda x, y, z: scale * self.distance((x - u) / scale, (y - v) / scale, (z - w) / scale),
+            tuple(scale * s + t for s, t in zip(self.start, shift, strict=True)),
+            self.outward,
+        )
+
+
+def ball(radius=1.0):
+    return Solid(lambda x, y, z: math.hypot(x, y, z) - radius, (0.0, 0.0, radius), (0.0, 0.0, 1.0))
+
+
+def ring(big=1.0, small=0.4):
+    """A torus around z."""
+    return Solid(
+        lambda x, y, z: math.hypot(math.hypot(x, y) - big, z) - small,
+        (big + small, 0.0, 0.0),
+        (1.0, 0.0, 0.0),
+    )
+
+
+def block(a=1.0, b=0.7, c=0.5):
+    def distance(x, y, z):
+        u, v, w = abs(x) - a, abs(y) - b, abs(z) - c
+        return math.hypot(max(u, 0.0), max(v, 0.0), max(w, 0.0)) + min(max(u, v, w), 0.0)
+
+    return Solid(distance, (0.05, 0.03, c), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Topology:
+    """Of triangles: edges with one triangle, edges with more than two, Euler's number, and the pieces."""
+
+    open: int
+    tangled: int
+    euler: int
+    pieces: int
+
+
+def topology(triangles):
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    sides = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    edges, counts = np.unique(sides, axis=0, return_counts=True)
+    used = np.unique(triangles)
+    n = len(used)
+    ends = np.searchsorted(used, edges)
+    pieces, _ = connected_components(coo_matrix((np.ones(len(ends)), tuple(ends.T)), (n, n)))
+    return Topology(
+        int((counts == 1).sum()), int((counts > 2).sum()), n - len(edges) + len(triangles), pieces
+    )
