@@ -34,9 +34,9 @@ class Blend(NamedTuple):
     node: NDArray[np.intp]
 
 
-def blended(charts: Charts, points: Array) -> Blend:
-    """The field at places (k, 3)."""
-    return blend_of(charts, charts.pairs(points), len(points))
+def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
+    """The field at places (k, 3); `room` is a length that patches reach at least."""
+    return blend_of(charts, charts.pairs(points, room), len(points))
 
 
 def blend_of(charts: Charts, pairs: Pairs, count: int) -> Blend:
