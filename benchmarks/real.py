@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
-from core.bayes import residual_evidence
+from core.bayes import residual_evidence, rough_fit
 from core.patch import residual
 from core.patch.monge import exponents, monomials
 from tools import blender
@@ -43,6 +43,7 @@ from .peers import Fit, quadric_process, radial_basis
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
 HOLD_OUT, LEAST = 90, 20  # points of the mesh above a domain
 LAYERS = 4
+NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 4, 0.3, 0.2  # toward a surface: a step in radii, and of its height
 WIDE, OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 0.02, 3.0, 5.0, 10.0, 0.05
 DENSE = 150  # points for the true frame
 
@@ -109,7 +110,7 @@ class Touch(NamedTuple):
     """A case of benchmarks.accuracy, as far as the peers need it."""
 
     point: np.ndarray
-    axes: np.ndarray  # whose last column is outward
+    axes: np.ndarray  # the paper's frame
     contours: list
     hold_out: np.ndarray  # (m, 3), relative to the point
 
@@ -123,7 +124,9 @@ class Score(NamedTuple):
 @contextmanager
 def constants(**values):
     """The residual's, for a while."""
-    modules = [m for m in (residual, residual_evidence) if any(hasattr(m, name) for name in values)]
+    modules = [
+        m for m in (residual, residual_evidence, rough_fit) if any(hasattr(m, name) for name in values)
+    ]
     before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
     try:
         for module, old in zip(modules, before, strict=True):
@@ -170,18 +173,33 @@ def touches(scan, count):
                     continue
                 hold_out = scan.above(r, r.domain.grid(HOLD_OUT)[0]) - point
                 if len(hold_out) >= LEAST:
-                    axes = np.column_stack([np.zeros((3, 2)), normal])
-                    yield (planes, extent), Touch(point, axes, contours, hold_out), r.radius
+                    yield (planes, extent), Touch(point, r.frame.axes, contours, hold_out), r.radius
 
 
 def score(fit, touch, radius):
-    x, y, z = (touch.hold_out @ fit.axes).T
-    miss = np.abs(fit.height(x, y) - z) / radius
+    at, off, change = met(fit, touch, radius)
+    miss = np.abs(off) / radius
     if fit.height_std is None:
         return Score(1e3 * miss.mean())
-    half = 1.645 * fit.height_std(x, y) / radius
+    half = 1.645 * fit.height_std(*at[:, :2].T) / change / radius
     beyond = np.maximum(miss - half, 0.0)
     return Score(1e3 * miss.mean(), np.mean(miss <= half), 1e3 * np.mean(2.0 * half + 20.0 * beyond))
+
+
+def met(fit, touch, radius):
+    """Where the surface meets the paper's normals through held-out points, (m, 3) in the frame of the fit.
+
+    And how far along them that is, and how much nearer to it in height a unit along them leads.
+    """
+    at, normal = touch.hold_out @ fit.axes, fit.axes.T @ touch.axes[:, 2]
+    off, change, small = np.zeros(len(at)), np.ones(len(at)), 1e-4 * radius
+    for _ in range(NEWTON_STEPS if normal[2] < 1.0 - 1e-12 else 1):
+        above = fit.height(*at[:, :2].T) - at[:, 2]
+        ahead = at + small * normal
+        change = np.maximum((above - fit.height(*ahead[:, :2].T) + ahead[:, 2]) / small, LEAST_CHANGE)
+        step = np.clip(above / change, -FARTHEST * radius, FARTHEST * radius)
+        at, off = at + step[:, None] * normal, off + step
+    return at, off, change
 
 
 def fixed_scores(scan, count, methods):
@@ -280,7 +298,12 @@ def _off(scan, r):
 
 
 def _turned(scan, r):
-    """Whether the frame is off by TURNED degrees, where curvatures are not ALIKE; by a dense quartic fit."""
+    """Whether the frame is off by TURNED degrees, where curvatures are not ALIKE; by a dense quartic fit.
+
+    Not where the message says that there are no principal directions.
+    """
+    if r.posterior.is_round:
+        return False
     azimuths, reach = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(DENSE), 0.6 * r.radius
     shares = np.sqrt((np.arange(DENSE) + 0.5) / DENSE)
     flat = reach * np.column_stack([shares * np.cos(azimuths), shares * np.sin(azimuths)])
