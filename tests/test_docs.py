@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import core
 from tools import check_site
 
 ROOT = Path(__file__).parent.parent
@@ -62,6 +63,12 @@ def test_the_readme_is_short_and_its_picture_small():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= MOST_LINES
     assert (ROOT / "docs" / "film.webp").stat().st_size < MOST_BYTES
+
+
+def test_the_reference_has_all_that_core_offers():
+    page = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    offered = {name for name in core.__all__ if callable(getattr(core, name))}
+    assert set(re.findall(r"^::: core\.(\w+)$", page, re.MULTILINE)) == offered
 
 
 def test_the_citation_has_the_version():
