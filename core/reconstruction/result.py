@@ -230,8 +230,7 @@ class Reconstruction:
         if self.posterior.is_round:
             message += " The curvatures are alike, so there are no principal directions."
         if self.blind:
-            verb = "is" if self.blind == 1 else "are"
-            terms = terms_to(self.patch.degree)
+            verb, terms = "is" if self.blind == 1 else "are", terms_to(self.patch.degree)
             message += f" {self.blind} of {terms} coefficients {verb} invisible to these planes."
         return message
 
