@@ -105,44 +105,52 @@ def looped(files, asked, count):
 
 def rates(files, runs, touches):
     """(a); seconds of processor time of a touch, by kind."""
+    pairs = {(kind, workers): [] for kind in KINDS for workers in (1, 2)}
+    for workers in (1, 2):
+        with connected(None, workers, None) as client:
+            engine = Engine(client, LIMIT)
+            made(engine, files, options(2 * 60, 60, seed=99, **KINDS["fixed"]))  # warm
+            for _ in range(runs):
+                for kind, more in KINDS.items():
+                    plain = looped(files, {"touches": touches[kind], "block": 500, **more}, workers)
+                    cluster = made(engine, files, options(workers * touches[kind], 500, **more))
+                    pairs[kind, workers].append((plain, cluster))
+                    _say(kind, workers, plain, cluster)
     rows, seconds = [], {}
-    for kind, more in KINDS.items():
-        asked = {"touches": touches[kind], "block": 500, **more}
-        for workers in (1, 2):
-            total = workers * len(files) * touches[kind]
-            pairs = []
-            with connected(None, workers, None) as client:
-                engine = Engine(client, LIMIT)
-                made(engine, files, options(**asked | {"touches": 2 * 60, "block": 60, "seed": 99}))  # warm
-                for _ in range(runs):
-                    plain = looped(files, asked, workers)
-                    wide = asked | {"touches": workers * touches[kind]}
-                    pairs.append((plain, made(engine, files, options(**wide))))
-            plain, cluster = (total / median(pair[i][0] for pair in pairs) for i in (0, 1))
-            wall = median(pair[0][0] / pair[1][0] for pair in pairs)
-            work = median(pair[0][1] / pair[1][1] for pair in pairs)
-            rows.append([kind, f"{workers}", f"{plain:.0f}", f"{cluster:.0f}", f"{wall:.2f}", f"{work:.2f}"])
-            seconds[kind] = median(pair[0][1] for pair in pairs) / total
+    for (kind, workers), found in pairs.items():
+        total = workers * len(files) * touches[kind]
+        seconds[kind] = median(plain[1] for plain, _ in found) / total
+        speeds = [total / median(pair[i][0] for pair in found) for i in (0, 1)]
+        ratios = [median(plain[i] / cluster[i] for plain, cluster in found) for i in (0, 1)]
+        rows.append([kind, f"{workers}", *(f"{v:.0f}" for v in speeds), *(f"{v:.2f}" for v in ratios)])
     print(f"(a) {len(files)} scans, {touches} touches of each and worker, blocks of 500.\n")
     table(["touches", "workers", "plain loops /s", "data set /s", "ratio", "processor"], rows, left=1)
     return seconds
 
 
-def overhead(path, count):
-    """(b); seconds that a block costs on its worker and at client and scheduler, beside its touches."""
+def _say(kind, workers, plain, cluster):
+    """What a pair of runs has taken, at once, for they take long."""
+    times = [f"{seconds:.1f} s, processor {work:.1f} s" for seconds, work, *_ in (plain, cluster)]
+    print(f"{kind}, {workers}: plain loops {times[0]}; data set {times[1]}", file=sys.stderr, flush=True)
+
+
+def overhead(files, count):
+    """(b); seconds that a block of another object costs on its worker and at client and scheduler."""
     fixed = KINDS["fixed"]
     with connected(None, 1, None) as client:
         engine = Engine(client, LIMIT)
-        made(engine, [path], options(2, 1, seed=99, **fixed))
-        seconds, work, central = made(engine, [path], options(count, 1, **fixed))
-    touches = looped([path], {"touches": count, "block": 1, **fixed}, 1)[1]
+        made(engine, files[:1], options(2, 1, seed=99, **fixed))
+        seconds, work, central = made(engine, files[:1], options(count, 1, **fixed))
+    touches = looped(files[:1], {"touches": count, "block": 1, **fixed}, 1)[1]
+    opening = looped(files, {"touches": 1, "block": 1, **fixed}, 1)[1] / len(files) - touches / count
     worker, center = (work - central - touches) / count, central / count
     idle = max(seconds - work, 0.0) / count
-    print(f"(b) A block, out of {count} of one touch.\n")
-    rows = [["worker, processor time", worker], ["client and scheduler, processor time", center]]
+    print(f"(b) A block beside its touches, out of {count} of one touch.\n")
+    rows = [["worker, processor time", worker], ["opening another object, processor time", opening]]
+    rows.append(["client and scheduler, processor time", center])
     rows.append(["beyond the processor time of all, as where other programs have it", idle])
     table(["", "ms"], [[name, f"{1e3 * value:.1f}"] for name, value in rows])
-    return worker, center
+    return worker + opening, center
 
 
 def write_ball(path, radii, rings=32):
@@ -222,7 +230,7 @@ def main():
         sys.exit(f"cluster: there are no scans in {SCANS_FOLDER}")
     touches = {"automatic": 100, "fixed": 300} if quick else {"automatic": 500, "fixed": 1000}
     seconds = rates(files, 3 if quick else 5, touches)
-    worker, center = overhead(files[0], 100 if quick else 300)
+    worker, center = overhead(files, 100 if quick else 300)
     memory(100 if quick else 1000)
     on_paper(seconds, worker, center)
     print(f"\n{machine('bpy', 'numpy', 'scipy', 'distributed', 'pyarrow')}.")

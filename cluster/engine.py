@@ -12,6 +12,7 @@ from time import monotonic, sleep
 from typing import Any, NamedTuple
 from uuid import uuid4
 
+import dask
 from dask.distributed import Client, Future, LocalCluster, as_completed
 from distributed.scheduler import KilledWorker
 
@@ -20,6 +21,12 @@ from .worker.process import FAILED
 
 # Ctrl+C goes to all processes of a terminal, and is for the one that ends the others.
 DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+# What Dask measures of itself all the time takes some hundredths of a processor, for each process.
+CALM = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
 AHEAD = 3  # orders that are out at once, for each thread of a worker
 LEAST_AHEAD = 16
 EVERY = 5.0  # seconds between looks at how many threads there are
@@ -53,6 +60,7 @@ def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Ite
     """A client of the scheduler at an address, or of one with so many workers on this machine."""
     if scheduler is None:
         with (
+            dask.config.set(CALM),
             LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import core
 from tools import check_site
 
 ROOT = Path(__file__).parent.parent
@@ -64,6 +65,12 @@ def test_the_readme_is_short_and_its_picture_small():
     assert (ROOT / "docs" / "film.webp").stat().st_size < MOST_BYTES
 
 
+def test_the_reference_has_all_that_core_offers():
+    page = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    offered = {name for name in core.__all__ if callable(getattr(core, name))}
+    assert set(re.findall(r"^::: core\.(\w+)$", page, re.MULTILINE)) == offered
+
+
 def test_the_citation_has_the_version():
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     assert f"\nversion: {manifest['version']}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
@@ -106,3 +113,9 @@ def test_the_site_is_searched_without_a_server():
     )
     assert re.search(r'md-search-result__meta">\d+ matching document', page.stdout)
     assert "<mark>umbilic" in page.stdout
+
+
+def test_the_lesson_shows_what_core_finds():
+    lesson = pytest.importorskip("tools.lesson", reason="needs matplotlib: make chart installs it")
+    for curvatures in lesson.SHAPES.values():
+        assert lesson.felt(*curvatures) == pytest.approx(curvatures, abs=0.03)

@@ -85,8 +85,7 @@ class Reconstruction:
     @cached_property
     def misses(self) -> Array:
         """At which distance each of the c curves passes the reference point, and its deviation, (c, 2)."""
-        origin = self.frame.origin
-        curves = self.known_curves or curves_through(*stacked(origin[None], [self.contours]))
+        curves = self.known_curves or curves_through(*stacked(self.frame.origin[None], [self.contours]))
         return misses(curves)[0, : len(self.contours)]
 
     @cached_property

@@ -214,17 +214,56 @@ def test_broken_and_empty_files_and_one_that_blender_dies_of_are_error_rows(comm
     assert code == 3 and "7 errors" not in output and output.startswith("8 objects")
 
 
-def test_a_block_that_takes_too_long_is_ended_and_is_error_rows(command, tmp_path):
-    write_ball(tmp_path / "ball.ply")
-    words = ("--touches", "1001", "--block", "1000", "--limit", "1.5")
-    code, output, _ = command(tmp_path / "ball.ply", *words, "--output", tmp_path / "set")
-    assert code == 3 and "1,000 errors: It took longer than the limit of 1.5 s" in output
-    failed, done = (pq.read_table(path) for path in blocks_of(tmp_path / "set"))
-    assert set(failed["status"].to_pylist()) == {"error"} and len(failed) == 1000
-    assert done["touch"].to_pylist() == [1000] and done["status"].to_pylist() != ["error"]
-    log = (tmp_path / "set" / "log.txt").read_text()
-    assert log.count("ball.ply) block 0: It took longer than the limit of 1.5 s") == 2
-    assert "touched" in log  # where it was
+def test_a_process_that_takes_too_long_is_ended(objects, plain, tmp_path):
+    import json
+
+    from cluster.data_set import manifest
+    from cluster.worker.process import HandProcess, LostError
+
+    asked = json.loads((plain / "manifest.json").read_text())["options"] | {"touches": 5000, "block": 5000}
+    survey = ("survey", str(objects / "pebble.ply"), manifest.versions())
+    hand = HandProcess()
+    _, (facts,) = hand.ask(100.0, *survey)
+    with pytest.raises(LostError) as busy:  # some thousand touches, in half a second
+        hand.ask(0.5, "touch", facts, asked, 0, str(tmp_path / "block.parquet"))
+    assert str(busy.value).startswith("It took longer than the limit of 0.5 s\n")
+    assert "in touched" in str(busy.value)  # where it was
+    assert hand.is_worn and not list(tmp_path.iterdir())
+    hand = HandProcess()
+    hand.ask(100.0, *survey)
+    os.kill(hand._process.pid, signal.SIGSTOP)  # as where not even a watchdog runs any more
+    with pytest.raises(LostError, match=r"It took longer than the limit of 0.1 s"):
+        hand.ask(0.1, *survey)
+    assert hand.is_worn
+
+
+def test_a_block_that_fails_twice_is_error_rows(cluster, objects, tmp_path, plain, monkeypatch):
+    import json
+
+    from cluster.data_set.folder import DataSet
+    from cluster.data_set.options import Options
+    from cluster.engine import Engine, Outcome
+    from cluster.run import Run, summed_up
+
+    class Failing(Engine):
+        def performed(self, orders):
+            for order in orders:
+                if order.label.endswith("block 1"):
+                    yield Outcome(order, "failed", "It hung", [f"{order.label}: It hung"] * 2)
+                else:
+                    yield from super().performed([order])
+
+    options = Options.from_dict(json.loads((plain / "manifest.json").read_text())["options"])
+    run = Run(DataSet(tmp_path), options, [str(objects / "pebble.ply")])
+    run.work(Failing(cluster, 100.0))
+    (row,) = summed_up(run.data_set)
+    assert (row["touches"], row["error"], row["message"]) == (30, 10, "It hung")
+    _, failed, _ = (pq.read_table(path).to_pylist() for path in blocks_of(tmp_path))
+    assert [each["touch"] for each in failed] == list(range(10, 20))
+    assert {(each["status"], each["message"], each["hash"]) for each in failed} == {
+        ("error", "It hung", row["hash"])
+    }
+    assert (tmp_path / "log.txt").read_text().count("pebble.ply) block 1: It hung") == 2
 
 
 @pytest.mark.parametrize("place", ["/proc/nothing", "{file}/below"])

@@ -417,3 +417,12 @@ def test_coarse_coordinates_and_bad_arguments_are_refused_with_a_sentence():
             surface.fit([], strokes=strokes)
     with pytest.raises(ValueError, match='strokes: wanted none with "tagc", which is a method of contours'):
         surface.fit(crossed("pear"), strokes=[points], method="tagc")
+
+
+def test_on_a_plane_d1_points_to_the_farthest_contact():
+    flat = np.random.default_rng(2).uniform(-5.0, 5.0, (300, 2))
+    stroke = np.column_stack([np.vstack([flat, [[6.0, 8.0]]]), np.zeros(301)])
+    r = reconstruct((0, 0, 0), [], outward=(0, 0, 1), strokes=[Contour(stroke)])
+    assert r.frame.axes == pytest.approx(
+        np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]), abs=1e-6
+    )
