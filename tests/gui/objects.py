@@ -261,7 +261,7 @@ def handles():
 
 
 def edges():
-    """A point near the edge of a block: what the ring of a pick and the patch promise there."""
+    """A point near a corner of a block: what the ring of a pick and the patch promise there."""
     bpy.data.objects[TARGET].hide_set(True)
     bpy.ops.mesh.primitive_cube_add(location=(0, 0, 8))
     block = bpy.context.object
@@ -270,7 +270,7 @@ def edges():
     yield 1
     gui.click(*PICK_BUTTON)
     yield 1
-    at = gui.view_point((0.8, 0.2, 9.0))
+    at = gui.view_point((0.85, 0.8, 9.0))
     gui.xdo("mousemove", *map(round, at))
     yield 2
     picture("edge_preview")
