@@ -126,6 +126,7 @@ def run_shell(bpy, command, line):
     words = shlex.split(line)
     at = words.index("-c")
     assert words[0] == "blender" and words[at + 1] == "tactile", line
+    bpy.ops.wm.read_homefile(use_empty=True)  # each line is a Blender of its own
     if words[1] == "-b":
         bpy.ops.wm.open_mainfile(filepath=str(Path(words[2]).resolve()))
     code, out, err = command(*words[at + 2 :])
