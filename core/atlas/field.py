@@ -115,8 +115,7 @@ def _mean(
     """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
 
     def total(values: Array) -> Array:
-        found: Array = np.bincount(place, w * values, count)  # type: ignore[assignment]
-        return found
+        return np.bincount(place, w * values, count).astype(np.float64)  # of nothing: whole numbers
 
     some = total(np.ones(len(w)))
     there = some > 0.0
