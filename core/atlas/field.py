@@ -115,8 +115,7 @@ def _mean(
     """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
 
     def total(values: Array) -> Array:
-        # Of nothing numpy counts integers.
-        return np.bincount(place, w * values, count).astype(np.float64)
+        return np.bincount(place, w * values, count).astype(np.float64)  # of nothing: whole numbers
 
     some = total(np.ones(len(w)))
     there = some > 0.0
