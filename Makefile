@@ -15,17 +15,20 @@ VENV := build/venv-$(PYTHON_VERSION)
 VENV_PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
 PEERS := $(VENV)/.peers
+CLUSTER := $(VENV)/.cluster
+SITE := build/site
 # Tests run beside each other, one process a processor, each with one thread.
 BESIDE := -n auto --dist worksteal
-test test-core: export OMP_NUM_THREADS = 1
-test test-core: export OPENBLAS_NUM_THREADS = 1
+test test-core test-cluster: export OMP_NUM_THREADS = 1
+test test-core test-cluster: export OPENBLAS_NUM_THREADS = 1
 
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
-	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
+	$(shell find core presets tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo test test-core fuzz chart paper stability zip zip-nowheels clean
+.PHONY: help demo dataset test test-core test-cluster fuzz chart paper stability site film lesson sample zip zip-nowheels \
+	release clean
 
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
@@ -35,8 +38,15 @@ help:
 	@echo 'make chart [QUICK=1]   draw speed against accuracy, beside what else one could take, in build/charts'
 	@echo 'make paper             repeat the experiments of the paper, beside its figures'
 	@echo 'make stability         lead everything to where it fails, and count who says so'
+	@echo 'make dataset           touch some objects with two workers, tabulate and draw what is found, in build'
+	@echo 'make test-cluster      the tests of data sets of touches, with Dask'
+	@echo 'make site              make the documentation'"'"'s site, in build/site/html'
+	@echo 'make film              draw the moving picture of the README anew'
+	@echo 'make lesson            draw the pictures of docs/lesson.md anew'
+	@echo 'make sample            make examples/sample.blend anew, in Blender 4.5'
 	@echo 'make zip               build the zip files of a release, one for each platform, in build/dist'
 	@echo 'make zip-nowheels      build the zip for a Blender whose own Python has scipy, in build/dist'
+	@echo 'make release           all files of a release, in build/release, if version, changelog and tag agree'
 	@echo 'make clean             remove build; the downloaded wheels stay'
 	@echo 'All take PYTHON=...: 3.11 (tests in Blender 4.5) or 3.13 (Blender 5.2).'
 
@@ -47,11 +57,17 @@ test: $(ZIP)
 	$(VENV_PY) -m ruff check
 	$(VENV_PY) -m ruff format --check
 	$(VENV_PY) -m mypy core
-	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE)
+	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) --ignore tests/cluster
 
 test-core: $(READY)
 	$(VENV_PY) -m mypy core
 	$(VENV_PY) -m pytest $(BESIDE) tests/core tests/test_rooms.py
+
+test-cluster: $(CLUSTER)
+	$(VENV_PY) -m pytest tests/cluster
+
+dataset: $(CLUSTER) $(PEERS)
+	$(VENV_PY) -m tools.dataset
 
 fuzz: $(ZIP)
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest --hypothesis-profile=long \
@@ -69,8 +85,25 @@ stability: $(ZIP) $(PEERS)
 	$(VENV_PY) -m benchmarks.stability
 	$(VENV_PY) -m benchmarks.refusals $(ZIP)
 
+site: $(SITE)/.ready
+	@NO_MKDOCS_2_WARNING=1 $(SITE)/bin/mkdocs build --quiet --strict
+	@$(SITE)/bin/python tools/check_site.py $(SITE)/html
+
+film: $(ZIP) $(PEERS)
+	$(VENV_PY) -m tools.film --zip $(ZIP)
+
+lesson: $(READY) $(PEERS)
+	$(VENV_PY) -m tools.lesson
+
+sample: $(ZIP)
+	$(VENV_PY) -m tools.sample --zip $(ZIP)
+
 zip: $(READY)
 	$(VENV_PY) tools/build.py --wheels all
+
+release: $(READY)
+	@$(VENV_PY) -m tools.release
+	@$(VENV_PY) -m tools.try_release
 
 zip-nowheels: $(READY)
 	$(VENV_PY) tools/build.py --wheels none
@@ -82,10 +115,21 @@ clean:
 $(ZIP): $(SOURCES) | $(READY)
 	@zip=$$($(VENV_PY) tools/build.py --output build) && mv "$$zip" $@
 
+$(SITE)/.ready: tools/site_requirements.txt
+	@echo 'Installing what the site is made with, in $(SITE): once.'
+	@'$(or $(PYTHON),python3)' -m venv $(SITE)
+	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
+	@touch $@
+
 # One by one: a chart goes without a peer that is not made for this Python or system.
 $(PEERS): benchmarks/requirements.txt $(READY)
 	@echo 'Installing what the charts are drawn with and compare to: once.'
 	@grep -v '^#' $< | xargs -n 1 $(VENV_PY) -m pip install --quiet --disable-pip-version-check || true
+	@touch $@
+
+$(CLUSTER): cluster/requirements.txt | $(READY)
+	@echo 'Installing what data sets are made with: once.'
+	@$(VENV_PY) -m pip install --quiet --disable-pip-version-check --requirement $<
 	@touch $@
 
 $(READY): tools/requirements.txt tools/check_bpy.py

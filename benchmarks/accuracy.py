@@ -210,7 +210,7 @@ def ours(case, **options):
     return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
 
-# Of what `--choose` tries the best in the mean of all.
+# The best, in the mean of all, of what `--choose` tries.
 SPLINES = {
     "RBF thin plate": {"kernel": "thin_plate_spline", "degree": 2, "smoothing": 0.1},
     "RBF cubic": {"kernel": "cubic", "degree": 2, "smoothing": 0.03},

@@ -110,7 +110,7 @@ def find(key):
     rng = np.random.default_rng(key)
     while True:
         surface, extent = accuracy._random_shape(rng), rng.uniform(10.0, 13.0)
-        # As curved as in accuracy.random_cases.
+        # Shapes are as curved as in accuracy.random_cases.
         kappas = None if surface is None else accuracy.darboux(surface)[1]
         if kappas is None or max(-kappas[0], kappas[1]) > 1.0 / 15.0:
             continue

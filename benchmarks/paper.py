@@ -51,7 +51,7 @@ SHORT = 0.75  # of an extent, to see what it does
 
 
 class Figures(NamedTuple):
-    """Of Figures 3 and 4: (6) on three and on nine curves, the total absolute curvature."""
+    """What Figures 3 and 4 have: (6) on three and on nine curves, the total absolute curvature."""
 
     three: float
     nine: float
@@ -59,7 +59,7 @@ class Figures(NamedTuple):
 
 
 class Row(NamedTuple):
-    """Of Table II; distances by method."""
+    """A row of Table II; distances by method."""
 
     contacts: float
     to_contacts: dict
@@ -124,7 +124,7 @@ def exact(name, surface, extent, steps):
 
 
 def exact_places():
-    """As curved and as large as the paper's objects may be; the neck is the paper's, as it gives it."""
+    """Surfaces as curved and as large as the paper's objects may be; the neck is as the paper gives it."""
     yield exact(NECK, surfaces.bottle_neck(), NECK_EXTENT, NECK_STEPS)
     like = (("torus outer", "shell", 16), ("pear", "pear", 10), ("ellipsoid", "pebble", 13))
     for name, stands_for, steps in like:

@@ -42,7 +42,7 @@ def save(figure, name, caption, header, rows):
 
 
 def dark(color):
-    """For text, which is thinner than a mark."""
+    """A color for text, which is thinner than a mark."""
     return tuple(0.72 * part for part in to_rgb(color))
 
 

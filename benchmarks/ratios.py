@@ -32,7 +32,7 @@ def compare(base, cases, tasks):
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         path = Path(folder, "cases")
         path.write_bytes(pickle.dumps(cases))
-        ours, theirs = (stack.enter_context(_worker(root, path)) for root in (ROOT, base))
+        ours, theirs = (stack.enter_context(worker("speed_worker.py", root, path)) for root in (ROOT, base))
         counts = {"batch": "batches", "planes": "touches", "touch": "touches", "fit": "fits"}
         rows = []
         for task in (task for task in counts if task in tasks):
@@ -48,7 +48,7 @@ def compare(base, cases, tasks):
 
 def _asked(ask, case, rounds):
     """The least seconds of each of (worker, task), by turns."""
-    return np.min([[_answer(worker, task, case) for worker, task in ask] for _ in range(rounds)], axis=0)
+    return np.min([[answer(each, f"{task} {case}") for each, task in ask] for _ in range(rounds)], axis=0)
 
 
 def _row(title, seconds, cases, task):
@@ -64,13 +64,15 @@ def _row(title, seconds, cases, task):
     ]
 
 
-def _worker(root, path):
-    command = [sys.executable, str(ROOT / "benchmarks" / "speed_worker.py"), str(root), str(path)]
+def worker(script, root, *arguments):
+    """A process in which a script of this folder times the checkout `root`."""
+    command = [sys.executable, str(ROOT / "benchmarks" / script), str(root), *map(str, arguments)]
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
-def _answer(worker, task, case):
-    worker.stdin.write(f"{task} {case}\n")
+def answer(worker, task):
+    """The seconds that a task takes there."""
+    worker.stdin.write(f"{task}\n")
     worker.stdin.flush()
     return float(worker.stdout.readline())
 

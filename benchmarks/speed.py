@@ -72,7 +72,7 @@ def problem(case):
 
 
 def minima(case):
-    """By solver and start; of a touch."""
+    """Minima of a touch, by solver and start."""
     objective, papers = problem(case)
 
     def value_and_gradient(a):

@@ -24,7 +24,7 @@ EVEN = [core.SamplingPlane(math.pi * i / 3) for i in range(3)]
 
 
 class Mesh:
-    """In Blender's tree."""
+    """A mesh in Blender's tree."""
 
     def __init__(self, points, faces):
         import bpy  # noqa: F401  # which brings mathutils

@@ -52,7 +52,7 @@ def main():
     import bpy
 
     addon, clock = extension.tactile_addon, Clock()
-    clock.wrap(addon.touch.detached_mesh.MeshSnapshot, "__init__", "snapshot")
+    clock.wrap(addon.touch.detached_mesh.DetachedMesh, "__init__", "snapshot")
     for name, stage in (("track", "tracking"), ("reconstruct_many", "fit"), ("with_height_stds", "fit")):
         clock.wrap(addon.stability_map.stability.core, name, stage)
     clock.wrap(addon.stability_map.stability.StabilityMap, "_note", "noting")

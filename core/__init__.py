@@ -36,8 +36,8 @@ from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
-from .scan.sampling import spaced, spaced_count
-from .scan.verification import reachable, verify
+from .scan.sampling import scattered, spaced, spaced_count
+from .scan.verification import reachable, verify, verifying
 
 __all__ = [
     "CREASE",
@@ -81,6 +81,7 @@ __all__ = [
     "reconstruct",
     "reconstruct_many",
     "register",
+    "scattered",
     "spaced",
     "spaced_count",
     "suggest_plane",
@@ -88,5 +89,6 @@ __all__ = [
     "touch_all_over",
     "track",
     "verify",
+    "verifying",
     "with_height_stds",
 ]

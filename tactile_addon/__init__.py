@@ -2,34 +2,47 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What knows Blender: surfaces to touch, probes, operators, panel, handles, patches and command line."""
 
+from pathlib import Path
+
 import bpy
 
 from . import command_line
 from .comparison import register_operator, verify_operator
-from .files import contact_operators
+from .files import contact_operators, export_operators
 from .probes import change_handlers, operators, probe, probe_operators
+from .report import report_operator
 from .scene import color_range
 from .sidebar import panel, preferences, rows
 from .stability_map import map_object, map_operator
-from .viewport import drag, gizmos, overlay, pick
+from .viewport import drag, gizmos, overlay, pick, tool
+from .whole_object import object_operator
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
     verify_operator.TACTILE_OT_verify,
     register_operator.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,
+    object_operator.TACTILE_OT_touch_all_over,
     pick.TACTILE_OT_pick,
     drag.TACTILE_OT_drag,
     gizmos.TACTILE_GGT_handles,
     *probe_operators.OPERATORS,
     *contact_operators.CLASSES,
+    *export_operators.CLASSES,
+    report_operator.TACTILE_OT_export_report,
     rows.TACTILE_OT_copy_value,
     *panel.PANELS,
     preferences.VIEW3D_MT_tactile,
     preferences.TactilePreferences,
 )
-MENUS = (*preferences.MENUS, *contact_operators.MENUS)
+MENUS = (
+    *preferences.MENUS,
+    *contact_operators.MENUS,
+    *export_operators.MENUS,
+    *report_operator.MENUS,
+)
 _commands, _drawings = [], []
+TOP = str(Path(__file__).resolve().parents[1])  # where presets/ is
 
 
 def register():
@@ -38,10 +51,12 @@ def register():
     map_object.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    tool.register()
     preferences.restore_tab()
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
     bpy.utils.register_manual_map(preferences.manual_map)
+    bpy.utils.register_preset_path(TOP)
     change_handlers.register()
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
     _drawings.extend(overlay.draw_handlers())
@@ -52,9 +67,11 @@ def unregister():
         bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
     change_handlers.unregister()
     bpy.utils.unregister_cli_command(_commands.pop())
+    bpy.utils.unregister_preset_path(TOP)
     bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)
+    tool.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     map_object.unregister()

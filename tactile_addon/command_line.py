@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c tactile reconstruct|fit|map FILE`: a patch or a stability map from the shell."""
+"""`blender -c tactile reconstruct|fit|object|map|table FILE`: patches, objects and maps from the shell."""
 
 import argparse
 import sys
@@ -10,6 +10,18 @@ from .command_run import Misuse, run, write
 from .files import contact_file
 from .touch.settings import METHODS, SOLVERS
 
+NOT_OF_ALL = (
+    "file",
+    "contacts",
+    "json",
+    "report",
+    "onto",
+    "verify",
+    "normal_std",
+    "degree",
+    "azimuths",
+    "tilts",
+)
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
 
@@ -37,10 +49,12 @@ def _parser():
     for name, add_arguments, help in (
         ("reconstruct", _add_reconstruct, "touch a mesh and rebuild the patch around a point"),
         ("fit", _add_fit, "rebuild the patch that measured contacts show"),
+        ("object", _add_object, "touch a whole object and join the patches to one surface"),
         ("map", _add_map, "touch a mesh all over and paint a copy by how well it goes"),
+        ("table", _add_table, "write what the patches of a scene have found, a row each"),
     ):
         add_arguments(commands.add_parser(name, help=help))
-    parser.set_defaults(**dict.fromkeys(("file", "contacts", "onto", "verify", "normal_std")))
+    parser.set_defaults(**dict.fromkeys(NOT_OF_ALL))
     return parser
 
 
@@ -80,25 +94,49 @@ def _add_map(command):
     _add_inputs(add)
 
 
+def _add_object(command):
+    add = command.add_argument
+    _add_target(add)
+    add("--location", **VECTOR, help="where to begin (default: any place that works)")
+    add("--tolerance", type=float, help="how well heights are to be known (size / 500)")
+    add("--edge", type=float, help="length of the triangles' edges (what the curvature asks)")
+    add("--most", type=int, help="touches, at most (1000)")
+    _add_sensor(add)
+    _add_output(add, "save the scene with the surface, .blend; the surface alone as .ply")
+
+
+def _add_table(command):
+    command.add_argument("file", nargs="?", type=Path, metavar="FILE", help=".blend; without, the open scene")
+    command.add_argument("--output", type=Path, metavar="OUT", required=True, help="the table, .csv")
+
+
 def _add_verify(add):
     add("--verify", type=Path, metavar="OUT", help="write the distances to the mesh as .csv")
 
 
 def _add_inputs(add):
     """What to touch, and how."""
-    help = ".blend, .ply, .stl or .obj; without, the open scene"
-    add("file", nargs="?", type=Path, metavar="FILE", help=help)
-    help = "object to touch (default: the active one, or the only mesh)"
-    add("--target", default="", metavar="NAME", help=help)
+    _add_target(add)
     degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
     add("--azimuths", **degrees, help="three to six plane directions (0 60 120)")
     add("--tilts", **degrees, help="as many plane tilts (0)")
     help = "length of each half curve (as far as a patch can be trusted; map: size / 8)"
     add("--extent", type=float, help=help)
     add("--step", type=float, help="distance between contacts (so many that more would tell little)")
+    _add_sensor(add)
+    _add_method(add)
+
+
+def _add_target(add):
+    help = ".blend, .ply, .stl or .obj; without, the open scene"
+    add("file", nargs="?", type=Path, metavar="FILE", help=help)
+    help = "object to touch (default: the active one, or the only mesh)"
+    add("--target", default="", metavar="NAME", help=help)
+
+
+def _add_sensor(add):
     add("--noise", type=float, help="standard deviation of the simulated sensor (0)")
     add("--seed", type=int, help="of the noise (0)")
-    _add_method(add)
 
 
 def _add_method(add):
@@ -108,9 +146,16 @@ def _add_method(add):
     add("--degree", type=str.strip, choices=["auto", *"23456"], help=help)
     add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000, 1e5)")
     add("--solver", choices=[name for name, _, _ in SOLVERS], help="of tagc (fast)")
+    _add_output(
+        add, "save the scene with the result, .blend; the result alone as .ply; a patch also as .json"
+    )
+
+
+def _add_output(add, help):
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
-    help = "save the scene with the result, .blend; the result alone as .ply; a patch also as .json"
     add("--output", type=Path, metavar="OUT", help=help)
+    help = "write a page for a browser: pictures, deviations, tolerance bands, settings, versions"
+    add("--report", type=Path, metavar="HTML", help=help)
 
 
 def _is_number(text):

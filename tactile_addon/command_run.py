@@ -15,11 +15,13 @@ import bpy
 from .comparison.register_operator import register_patch
 from .comparison.verification_wording import verification_columns
 from .comparison.verify_operator import verify_patch
-from .files import contact_file, measured, mesh_file, whole_file
+from .files import contact_file, measured, mesh_file, patch_table, whole_file
+from .report import report_operator
 from .scene import patch_record
 from .stability_map.map_report import map_readable
 from .touch.units import ADAPTIVE, METERS
 from .touch.wording import readable
+from .whole_object.object_report import object_readable
 
 
 class Misuse(ValueError):
@@ -41,13 +43,22 @@ class Command(NamedTuple):
 COMMANDS = {
     "reconstruct": Command("reconstruct", patch_record.RECORD, readable, {}),
     "fit": Command("import_contacts", patch_record.RECORD, readable, {}),
+    "table": Command("", "", lambda report: f"{report['rows']} rows written", {}),
+    "object": Command("touch_all_over", patch_record.ATLAS_RECORD, object_readable, {"progress": True}),
     "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
 }
 # What the operators take as it is given.
 PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
-PLAIN |= {"tolerance", "unit", "point", "flip", "radius"}
+PLAIN |= {"edge", "most", "tolerance", "unit", "point", "flip", "radius"}
 # Operators would take the nearest number they can have for others.
 NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
+
+
+# What --output may be.
+PATCH_FILES = (".blend", ".ply", ".json")
+MESH_FILES = (".blend", ".ply")
+KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
+KINDS |= {"object": MESH_FILES, "map": MESH_FILES}
 
 
 def _require_numbers(options):
@@ -91,6 +102,8 @@ def run(options):
     _require_outputs(options)
     if options.file is not None:
         mesh_file.open_file(options.file)
+    if options.command == "table":
+        return {"rows": _write_table(options.output)}
     arguments = _arguments(options)
     before = set(bpy.data.objects)
     command = COMMANDS[options.command]
@@ -103,6 +116,8 @@ def run(options):
     if options.contacts is not None:
         r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
+    if options.report is not None:
+        report_operator.write(options.report, made)
     if options.output is not None:
         _save(options.output, made)
     return report
@@ -110,7 +125,7 @@ def run(options):
 
 def _require_outputs(options):
     """Ends the command where a file to write is one to read, or cannot be one, before anything is done."""
-    given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify")}
+    given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify", "report")}
     outputs = {name: Path(path) for name, path in given.items() if path not in (None, "-")}
     scene = bpy.data.filepath and Path(bpy.data.filepath)
     inputs = [*vars(options).get("files", []), *filter(None, (options.file, options.onto, scene))]
@@ -123,9 +138,11 @@ def _require_outputs(options):
         taken[path.resolve()] = "writes"
         if not path.absolute().parent.is_dir():
             raise OSError(f'there is no folder "{path.parent}" to write "{path.name}" to')
-    kinds = [".blend", ".ply", *([".json"] if options.command != "map" else [])]
+    kinds = KINDS[options.command]
     if "output" in outputs and options.output.suffix.lower() not in kinds:
         raise Misuse(f"--output: wanted a file {' or '.join(kinds)}, got {options.output}")
+    if "report" in outputs and options.report.suffix.lower() != ".html":
+        raise Misuse(f"--report: wanted a file .html, got {options.report}")
 
 
 def _compare(patch, options):
@@ -168,6 +185,13 @@ def _save(path, made):
         mesh_file.write(path, made)
     else:
         mesh_file.save_scene(path)
+
+
+def _write_table(path):
+    """What the patches of the scene have found; returns how many there are."""
+    patches = patch_table.patches_of(bpy.context.view_layer.objects)
+    patch_table.write(path, patches, bpy.context.scene)
+    return len(patches)
 
 
 def _default_target():

@@ -47,7 +47,9 @@ def belongings():
 
 
 def _target():
-    return bpy.context.scene.objects.get(TARGET)
+    """What is touched, whatever its name has become."""
+    meshes = (obj for obj in bpy.context.scene.objects if obj.type == "MESH" and obj.name.startswith(TARGET))
+    return next((obj for obj in meshes if "tactile" not in obj and "tactile_contours" not in obj), None)
 
 
 def _select(obj):
@@ -118,7 +120,7 @@ def _pick(dice):
     place = target.matrix_world @ dice.choice(target.data.polygons).center
     new, parent = len(probes()) < 3, dice.random() < 0.7
     bpy.ops.tactile.pick(
-        "EXEC_DEFAULT", True, target=TARGET, location=place, extent=0.5, new=new, parent=parent
+        "EXEC_DEFAULT", True, target=target.name, location=place, extent=0.5, new=new, parent=parent
     )
 
 
@@ -134,9 +136,15 @@ def _update(dice):
 
 
 def _copy(dice):
+    """A probe, alone or with its patch."""
     if len(probes()) < 3:
-        _select(dice.choice(probes()))
-        bpy.ops.object.duplicate("EXEC_DEFAULT", True)
+        chosen, patch = dice.choice(probes()), None
+        if dice.random() < 0.5:
+            patch = patch_of(chosen)
+        _select(chosen)
+        for obj in filter(None, (patch, *(patch.children if patch else ()))):
+            obj.select_set(True)
+        bpy.ops.object.duplicate("EXEC_DEFAULT", True, linked=dice.random() < 0.3)
 
 
 def _frame(dice):
@@ -154,6 +162,12 @@ def _edit(dice):
     scale = dice.uniform(0.97, 1.03)
     bpy.ops.transform.resize("EXEC_DEFAULT", True, value=(scale, scale, scale))
     bpy.ops.object.mode_set("EXEC_DEFAULT", True, mode="OBJECT")
+
+
+def _rename(dice):
+    obj = dice.choice([*belongings(), *filter(None, [_target()])])
+    obj.name = f"{obj.name.partition('.')[0]}.{dice.randrange(100):03}"
+    _push("rename")
 
 
 def _undo(dice):
@@ -178,6 +192,7 @@ OF_PROBES = {
     "choose": _choose,
     "update": _update,
     "copy": _copy,
+    "rename": _rename,
 }
 RELOAD = "reload"  # which a window has to do by itself: it ends all timers
 
@@ -223,7 +238,12 @@ def _faults_of(probe):
         if (lines.matrix_world.translation - patch.matrix_world.translation).length > CLOSE * radius:
             faults.append(f"{lines.name} is not at its patch")
     addon = sys.modules[type(settings).__module__]
-    there = addon.reconstruction_of(patch).frame.origin
+    try:
+        there = addon.reconstruction_of(patch).frame.origin
+    except ValueError as error:
+        if record["status"] == "outdated" and settings.message and not record["is_verified"]:
+            return faults  # it was being dragged when nothing could be felt any more
+        return [*faults, f"{patch.name}, {record['status']}: {error}"]
     if max(abs(a - b) for a, b in zip(there, record["frame"]["origin"], strict=True)) > CLOSE * radius:
         faults.append(f"{patch.name} is not where its record says")
     if record["status"] == "outdated":

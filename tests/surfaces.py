@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Exact surfaces to touch, with their curvatures known in closed form; lengths read as millimeters."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,10 +17,11 @@ def planes(azimuths, tilts=0.0):
     return [core.SamplingPlane(azimuth, tilt) for azimuth, tilt in pairs]
 
 
+SHARES = np.linspace(0.0, 1.0, 41)
 UPRIGHT, TILTED = planes((13, 73, 133)), planes((13, 73, 133), (12, -18, 8))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Exact:
     """A level set F = 0, F > 0 outside, that answers rays; and a point on it where all is known.
 
@@ -50,19 +52,19 @@ class Exact:
 
     def ray_cast(self, origin, direction, distance):
         """First crossing along the ray: bracketed on 40 samples, then bisected by regula falsi (Illinois)."""
-        origin, direction = np.asarray(origin), np.asarray(direction)
-        t = np.linspace(0.0, distance, 41)
-        f = self.level(*(origin[:, None] + direction[:, None] * t))
+        (x, y, z), (u, v, w) = map(float, origin), map(float, direction)
+        t = float(distance) * SHARES
+        f = self.level(x + u * t, y + v * t, z + w * t)
         crossing = np.flatnonzero(np.sign(f[:-1]) * np.sign(f[1:]) <= 0)
         if not len(crossing):
             return None
-        a, b = t[crossing[0]], t[crossing[0] + 1]
-        fa, fb = f[crossing[0]], f[crossing[0] + 1]
+        a, b = t[crossing[0] : crossing[0] + 2].tolist()
+        fa, fb = f[crossing[0] : crossing[0] + 2].tolist()
         for _ in range(60):
             if fa == fb or abs(b - a) < 1e-15 * distance:
                 break
             c = b - fb * (b - a) / (fb - fa)
-            fc = self.level(*(origin + c * direction))
+            fc = float(self.level(x + u * c, y + v * c, z + w * c))
             if fc * fb < 0:
                 a, fa = b, fb
             else:
@@ -70,9 +72,9 @@ class Exact:
             b, fb = c, fc
             if fc == 0:
                 break
-        hit = origin + b * direction
+        hit = np.array([x + u * b, y + v * b, z + w * b])
         g = self.gradient(hit)
-        return hit, g / np.linalg.norm(g)
+        return hit, g / math.sqrt(g @ g)
 
 
 def plane():
@@ -137,21 +139,22 @@ def bottle_neck():
 def graph(terms):
     """z = sum c x^i y^j over {(i, j): c}, i + j >= 2, touched at the origin."""
 
-    def partial(x, y, dx, dy):
-        total = 0.0 * x * y
-        for (i, j), c in terms.items():
-            if i >= dx and j >= dy:
-                factor = np.prod(np.arange(i - dx + 1, i + 1)) * np.prod(np.arange(j - dy + 1, j + 1))
-                total = total + c * factor * x ** (i - dx) * y ** (j - dy)
-        return total
+    def partial(dx, dy):
+        left = [
+            (float(c) * math.perm(i, dx) * math.perm(j, dy), i - dx, j - dy)
+            for (i, j), c in terms.items()
+            if i >= dx and j >= dy
+        ]
+        return lambda x, y: sum((c * x**i * y**j for c, i, j in left), 0.0 * x * y)
 
+    height, along_x, along_y = partial(0, 0), partial(1, 0), partial(0, 1)
     hessian = [
         [2.0 * terms.get((2, 0), 0.0), terms.get((1, 1), 0.0)],
         [terms.get((1, 1), 0.0), 2.0 * terms.get((0, 2), 0.0)],
     ]
     return Exact(
-        lambda x, y, z: z - partial(x, y, 0, 0),
-        lambda p: np.array([-partial(p[0], p[1], 1, 0), -partial(p[0], p[1], 0, 1), 1.0]),
+        lambda x, y, z: z - height(x, y),
+        lambda p: np.array([-along_x(p[0], p[1]), -along_y(p[0], p[1]), 1.0]),
         np.zeros(3),
         *np.linalg.eigvalsh(hessian),
     )

@@ -18,6 +18,7 @@ import sys
 import tempfile
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import markdown
 
@@ -25,9 +26,10 @@ ROOT = Path(__file__).resolve().parents[1]
 MANIFEST = ROOT / "blender_manifest.toml"
 # Blender's pattern list can only exclude, so what ships is named: nothing else lying in a checkout,
 # an environment or a scan, can get into a release.
-SHIPPED = ("__init__.py", "LICENSE", "core", "tactile_addon")
-# The page that Blender's Online Manual opens, made into HTML, and its pictures.
-MANUAL = ROOT / "docs" / "viewport.md"
+SHIPPED = ("__init__.py", "LICENSE", "core", "presets", "tactile_addon")
+# The page that Blender's Online Manual opens, and those that it leads to, made into HTML with their pictures.
+DOCS = ROOT / "docs"
+MANUAL = ("viewport", "lesson", "messages")
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Tactile Patch</title>
 <style>body {{ max-width: 50em; margin: 2em auto; padding: 0 1em; font: 1rem/1.5 sans-serif; }}
 img {{ max-width: 100%; }} td, th {{ padding: 0.2em 1em 0.2em 0; text-align: left; }}
@@ -38,6 +40,8 @@ pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
 LEAD = """<!doctype html><meta charset="utf-8"><title>Tactile Patch</title>
 <meta http-equiv="refresh" content="0; url=viewport.html#{}">
 """
+# By the Python of the wheels, the first Blender that has it, and the first that has it no more.
+SERIES = {"311": ("4.5.0", "5.1.0"), "313": ("5.1.0",)}
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}
 
 
@@ -49,6 +53,9 @@ def main() -> None:
         default="host",
         help="all: a zip for every platform; host (default): one for this platform; "
         "none: one without scipy, for a Blender whose Python has it",
+    )
+    parser.add_argument(
+        "--each-series", action="store_true", help="a zip for each series of Blender too, of half the size"
     )
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "dist", metavar="DIR")
     args = parser.parse_args()
@@ -67,18 +74,39 @@ def main() -> None:
     for wheel in wheels:
         download(ROOT / wheel)
     args.output.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=args.output) as folder:
-        source, output = Path(folder, "source"), Path(folder, "zip")
+    if not args.each_series:
+        build(tool, manifest, platforms, wheels, args.output)
+        return
+    for python, series in SERIES.items():
+        of_python = [wheel for wheel in wheels if f"-cp{python}-" in wheel]
+        supported = {wheel_platform(wheel) for wheel in of_python}
+        chosen = [name for name in platforms if name in supported]
+        if chosen:
+            build(tool, manifest, chosen, of_python, args.output, series)
+
+
+def build(
+    tool: Path,
+    manifest: dict[str, Any],
+    platforms: list[str],
+    wheels: list[str],
+    folder: Path,
+    series: tuple[str, ...] = (),
+) -> None:
+    """Make a zip for each platform, for a series of Blender or all; for no platform one without wheels."""
+    with tempfile.TemporaryDirectory(dir=folder) as temporary:
+        source, output = Path(temporary, "source"), Path(temporary, "zip")
         output.mkdir()
-        stage(source, platforms, wheels)
+        stage(source, platforms, wheels, series)
         run(tool, "validate", source)
         if platforms:
             run(tool, "build", "--source-dir", source, "--output-dir", output, "--split-platforms")
         else:
             name = f"{manifest['id']}-{manifest['version']}-nowheels.zip"
             run(tool, "build", "--source-dir", source, "--output-filepath", output / name)
+        mark = f"-blender{series[0].removesuffix('.0')}" if series else ""
         for path in sorted(output.iterdir()):
-            print(shutil.move(path, args.output / path.name))
+            print(shutil.move(path, folder / f"{path.stem}{mark}.zip"))
 
 
 def host_platform() -> str:
@@ -125,8 +153,8 @@ def download(wheel: Path) -> None:
         Path(folder, wheel.name).replace(wheel)
 
 
-def stage(folder: Path, platforms: list[str], wheels: list[str]) -> None:
-    """Lay out what ships in `folder`, its manifest cut down to these platforms and wheels."""
+def stage(folder: Path, platforms: list[str], wheels: list[str], series: tuple[str, ...] = ()) -> None:
+    """Lay out what ships in `folder`, its manifest cut down to these platforms, wheels and Blenders."""
     for name in SHIPPED:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name)
@@ -144,6 +172,11 @@ def stage(folder: Path, platforms: list[str], wheels: list[str]) -> None:
         array = f"{key} = {json.dumps(values)}\n" if values else ""
         text = re.sub(rf"^{key} = \[[^]]*\]\n", array, text, flags=re.MULTILINE)
         expected[key] = values
+    limits = dict(zip(("blender_version_min", "blender_version_max"), series, strict=False))
+    if limits:
+        lines = "".join(f'{key} = "{value}"\n' for key, value in limits.items())
+        text = re.sub(r"^blender_version_min = .*\n", lines, text, flags=re.MULTILINE)
+        expected |= limits
     # The text is edited to keep all the rest as it is written; this notices if it was written so
     # that the edit missed.
     if tomllib.loads(text) != {key: value for key, value in expected.items() if value}:
@@ -152,16 +185,27 @@ def stage(folder: Path, platforms: list[str], wheels: list[str]) -> None:
 
 
 def write_manual(folder: Path) -> None:
-    """The manual as a page of HTML, with the pictures it shows."""
+    """The manual as pages of HTML, with the pictures they show."""
     folder.mkdir()
-    text = MANUAL.read_text(encoding="utf-8")
-    body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
-    (folder / "viewport.html").write_text(PAGE.format(body), encoding="utf-8")
-    # Windows opens files without what stands behind the "#", so each section has a page that leads to it.
-    for section in re.findall(r'<h[23] id="(.+?)"', body):
-        (folder / f"{section}.html").write_text(LEAD.format(section), encoding="utf-8")
-    for picture in re.findall(r"!\[.*?\]\((.+?)\)", text):
-        shutil.copy2(MANUAL.parent / picture, folder)
+    for name in MANUAL:
+        text = shipped_links((DOCS / f"{name}.md").read_text(encoding="utf-8"))
+        body = markdown.markdown(text, extensions=["tables", "fenced_code", "toc"])
+        (folder / f"{name}.html").write_text(PAGE.format(body), encoding="utf-8")
+        for picture in re.findall(r"!\[.*?\]\((.+?)\)", text):
+            shutil.copy2(DOCS / picture, folder)
+        # Windows opens files without what stands behind the "#", so each section has a page that leads to it.
+        for section in re.findall(r'<h[23] id="(.+?)"', body) if name == MANUAL[0] else []:
+            (folder / f"{section}.html").write_text(LEAD.format(section), encoding="utf-8")
+
+
+def shipped_links(text: str) -> str:
+    """Markdown whose links to other pages of the docs lead to HTML, or are words where those do not ship."""
+
+    def lead(found: re.Match[str]) -> str:
+        words, name, anchor = found.groups()
+        return f"[{words}]({name}.html{anchor})" if name in MANUAL else words
+
+    return re.sub(r"(?<!!)\[([^\]]+)\]\((\w+)\.md(#[\w-]+|)\)", lead, text)
 
 
 def run(tool: Path, *arguments: str | Path) -> None:

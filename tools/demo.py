@@ -68,10 +68,25 @@ def touch(extension, mesh=""):
 
 def compose(extension, patch, unit):
     """Camera, light, a color bar and labels for a picture of the patch, whose colors come out true."""
+    report = patch[extension.tactile_addon.scene.patch_record.RECORD].to_dict()
+    put, radius = stage(extension, report), report["radius"]
+    color_bar(extension, put, report["color_limit"], unit)
+    put.text(f"{report['source']}, touched at {report['contacts']} points", -3.3, 2.25, 0.21)
+    put.text(f"principal curvatures {report['k1']:.3g} and {report['k2']:.3g} 1/{unit}", -3.3, -2.25, 0.14)
+    if report["vertices"]:
+        off, std = (100.0 * report[key] / radius for key in ("vertex_distance_mean", "height_std"))
+        sentence = (
+            f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius in the mean, "
+            f"standard deviation {std:.1f} %"
+        )
+        put.text(sentence, -3.3, -2.48, 0.14)
+
+
+def stage(extension, report):
+    """Camera, light and the look of the scene around the patch of a report; what places labels there."""
     import bpy
     from mathutils import Matrix, Vector
 
-    report = patch[extension.tactile_addon.scene.patch_record.RECORD].to_dict()
     radius, scene = report["radius"], bpy.context.scene
     point, normal = Vector(report["frame"]["origin"]), Vector(report["frame"]["normal"])
     upright = Vector((0, 0, 1)) if abs(normal.z) < 0.9 else Vector((0, 1, 0))
@@ -91,21 +106,9 @@ def compose(extension, patch, unit):
     for obj in (camera, sun):
         scene.collection.objects.link(obj)
     scene.camera = camera
-
-    material = extension.tactile_addon.scene.mesh_data.emission
-    ink = material("Ink", color=(0.01, 0.01, 0.01, 1.0))
-    put = _Overlay(camera, radius, ink)
-    _color_bar(extension, put, report["color_limit"], unit)
-    put.text(f"{report['source']}, touched at {report['contacts']} points", -3.3, 2.25, 0.21)
-    put.text(f"principal curvatures {report['k1']:.3g} and {report['k2']:.3g} 1/{unit}", -3.3, -2.25, 0.14)
-    if report["vertices"]:
-        off, std = (100.0 * report[key] / radius for key in ("vertex_distance_mean", "height_std"))
-        sentence = (
-            f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius in the mean, "
-            f"standard deviation {std:.1f} %"
-        )
-        put.text(sentence, -3.3, -2.48, 0.14)
     look(scene, bpy.data.objects[report["source"]])
+    ink = extension.tactile_addon.scene.mesh_data.emission("Ink", color=(0.01, 0.01, 0.01, 1.0))
+    return _Overlay(camera, radius, ink)
 
 
 class _Overlay:
@@ -130,10 +133,10 @@ class _Overlay:
         text = bpy.data.curves.new("Label", "FONT")
         text.body, text.size = body, size
         text.materials.append(self.ink)
-        self.add("Label", text, x, y)
+        return self.add("Label", text, x, y)
 
 
-def _color_bar(extension, put, limit, unit):
+def color_bar(extension, put, limit, unit):
     """A strip with the patch's own material from -limit to limit, ticks and a title."""
     import bpy
 

@@ -6,6 +6,7 @@ A patch with a residual costs a kernel with each of its contacts at every place.
 cubic B-spline, which is C2 and off the patch by less than the residual's own grain.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cache, cached_property
@@ -15,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..contours.contour import Vector
 
 SIDE = 33  # knots of a table along each axis
 MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
 AZIMUTHS = 96  # samples of a domain's radius
 REACH = 0.5  # of the radius, that a place may be off its patch
+DISK = 36  # places of a disk around a place
 CHUNK = 200_000  # pairs at once
 
 
@@ -198,3 +201,16 @@ def _b_spline_tables() -> tuple[Array, Array]:
         / 6.0
     )
     return values, values[1:] * np.array([[1.0], [2.0], [3.0]])
+
+
+def disk_around(normal: Vector, ahead: Vector) -> Array:
+    """Places (DISK, 3) spread evenly over the unit disk across a normal: a sunflower's."""
+    i = np.arange(DISK) + 0.5
+    turn, out = math.pi * (3.0 - math.sqrt(5.0)) * i, np.sqrt(i / DISK)
+    e1 = np.cross(normal, ahead)
+    if not np.linalg.norm(e1) > 1e-3:
+        e1 = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    e1 /= np.linalg.norm(e1)
+    across = np.array([out * np.cos(turn), out * np.sin(turn)])
+    found: Array = across.T @ np.array([e1, np.cross(normal, e1)])
+    return found

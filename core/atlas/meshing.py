@@ -28,6 +28,7 @@ SPECK = 40  # triangles that a piece of the mesh has at least, beside the larges
 SMOOTHINGS, EVEN = 3, 0.6  # passes, and share of the way to the mean of its neighbors
 AT_ONCE = 8000  # places of the field in a step
 MOST_CELLS = 20_000_000
+SMALLEST = 1e-300  # that a vector is divided by
 FACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])  # corners of a face, from its center
 
 
@@ -38,6 +39,21 @@ class Mesh(NamedTuple):
     triangles: Indices
     std: Array
     patch: Indices
+
+    @property
+    def normals(self) -> Array:
+        """Outward unit normals of the vertices (n, 3): means of those of their triangles, by area."""
+        a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
+        normals = np.zeros_like(self.vertices)
+        np.add.at(normals, self.triangles, np.cross(b - a, c - a)[:, None])
+        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), SMALLEST)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether each edge of a triangle is one of another too."""
+        edges = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        counts = np.unique(edges, axis=0, return_counts=True)[1]
+        return bool((counts == 2).all())
 
 
 def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:

@@ -16,9 +16,11 @@ PRIOR_SCALE = 0.1
 WAVINESS = np.geomspace(0.15, 1.3, 6)
 USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
 NOISES = 5  # grid points, from the floor up
+UPWARD = np.arange(NOISES) / (NOISES - 1.0)
 FREE_PRECISION = 1e-4  # Prior precision of the five free terms: nearly none, it keeps the matrix invertible.
 ROUNDING = 1e-13  # Share of the trace of a system.
-GROUP = 4  # touches whose likelihoods are computed at once
+UNLIKELY = 1400.0  # -2 log likelihood beside the best, of which the exponential is still a number
+GROUP = 4  # touches whose likelihoods are computed at once (benchmarks.speed)
 
 
 class Restricted(NamedTuple):
@@ -35,20 +37,36 @@ class Restricted(NamedTuple):
 
 
 class Hyperparameters(NamedTuple):
-    """Waviness (b,), its geometric mean; prior variances (b, 22), averaged over it; and noise (b,)."""
+    """Prior variances (b, 22), of the mean waviness, typical, and averaged over it; and noise (b,)."""
 
-    waviness: Array
+    typical: Array
     variances: Array
     noise: Array
 
 
 class NormalEquations(NamedTuple):
-    """gram (b, 27, 27) @ coefficients ~ seen (b, 27), of data of this sum of squares (b,)."""
+    """gram @ coefficients ~ seen, of so many `contacts` (b,) of this sum of squares, as one matrix.
 
-    gram: Array
-    seen: Array
-    square: Array
-    contacts: Array = np.zeros(0)  # (b,), how many
+    bordered : (b, 28, 28), [[gram, seen], [seen', square]]
+    """
+
+    bordered: Array
+    contacts: Array
+
+    @property
+    def gram(self) -> Array:
+        """(b, 27, 27)."""
+        return self.bordered[:, :-1, :-1]
+
+    @property
+    def seen(self) -> Array:
+        """(b, 27)."""
+        return self.bordered[:, :-1, -1]
+
+    @property
+    def square(self) -> Array:
+        """(b,)."""
+        return self.bordered[:, -1, -1]
 
 
 def prior_variances(waviness: Array) -> Array:
@@ -57,29 +75,28 @@ def prior_variances(waviness: Array) -> Array:
 
 
 VARIANCES = prior_variances(WAVINESS)
+LOG_VARIANCES = np.log(VARIANCES)
 UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior
 
 
 def restricted(data: NormalEquations) -> Restricted:
     """What contacts say of the higher terms, by a Cholesky factor of their system bordered by the heights."""
-    b, size = data.seen.shape
-    bordered = np.empty((b, size + 1, size + 1))
-    bordered[:, :size, :size] = data.gram
-    bordered[:, :size, size] = bordered[:, size, :size] = data.seen
-    bordered[:, size, size] = data.square
+    bordered = data.bordered.copy()
     diagonal = np.einsum("bii->bi", bordered)  # a view
     # More than rounding takes from what no contact shows, and far less than noise hides.
-    diagonal += ROUNDING * np.cumsum(diagonal, axis=1)[:, [-2] * size + [-1]]
-    triangle: Array = np.swapaxes(np.linalg.cholesky(bordered), 1, 2)
+    whole = diagonal.cumsum(axis=1)
+    diagonal[:, :-1] += ROUNDING * whole[:, -2:-1]
+    diagonal[:, -1] += ROUNDING * whole[:, -1]
+    triangle: Array = np.linalg.cholesky(bordered).transpose(0, 2, 1)
     target, square = triangle[:, FREE:-1, -1], triangle[:, -1, -1] ** 2
     return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, data.contacts)
 
 
 def noises(data: Restricted, floor: Array) -> Array:
     """A grid of the noise, (b, 5), from the floor to beyond what the quadric leaves over."""
-    left = (data.target**2).sum(axis=1) + data.square
-    largest = 2.0 * floor + 3.0 * np.sqrt(left / data.contacts)
-    return floor[:, None] * (largest / floor)[:, None] ** (np.arange(NOISES) / (NOISES - 1.0))
+    left = np.einsum("bi,bi->b", data.target, data.target) + data.square
+    largest = 2.0 + 3.0 / floor * np.sqrt(left / data.contacts)
+    return floor[:, None] * largest[:, None] ** UPWARD
 
 
 def evidence(data: Restricted, noises: Array) -> Hyperparameters:
@@ -97,40 +114,35 @@ def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
     target ~ N(0, K), K = triangle prior triangle' + noise^2. One Cholesky factor of K bordered by the
     target, [[K, t], [t', c]], has log |K| in its diagonal and t' K^-1 t in the last of it.
     """
-    triangle, target = data.triangle, data.target
+    triangle, target, squares = data.triangle, data.target, noises**2
     b, size = target.shape
-    explained = (triangle[:, None] * VARIANCES[:, None]) @ np.swapaxes(triangle, 1, 2)[:, None]
-    corner = 2.0 * (target**2).sum(axis=1) / noises[:, 0] ** 2 + 1.0  # more than t' K^-1 t
-    bordered = np.zeros((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
+    explained = (triangle[:, None] * VARIANCES[:, None]) @ triangle.transpose(0, 2, 1)[:, None]
+    corner = 2.0 * np.einsum("bi,bi->b", target, target) / squares[:, 0] + 1.0  # more than t' K^-1 t
+    bordered = np.empty((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
     bordered[..., :size, :size] = explained[:, :, None]
     bordered[..., :size, size] = bordered[..., size, :size] = target[:, None, None]
-    bordered[..., size, size] = corner[:, None, None]
     # Beside the noise, what rounding leaves of contacts that are no surface.
-    rounding = 1e-13 * np.trace(explained, axis1=2, axis2=3)
+    rounding = ROUNDING * np.einsum("bwii->bw", explained)
     diagonal = np.einsum("...ii->...i", bordered)  # a view
-    diagonal[..., :size] += (noises[:, None] ** 2 + rounding[..., None])[..., None]
-    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
-    others = (data.contacts - len(TERMS))[:, None, None]  # directions no term explains
-    surprise = (
-        2.0 * np.log(factors[..., :size]).sum(axis=3)
-        + (corner[:, None, None] - factors[..., size] ** 2)
-        + others * np.log(noises[:, None] ** 2)
-        + (data.square[:, None] / noises**2)[:, None]
-    )
+    diagonal[..., :size] += (squares[:, None] + rounding[..., None])[..., None]
+    diagonal[..., size] = corner[:, None, None]
+    factors = np.einsum("...ii->...i", np.linalg.cholesky(bordered))
+    others = (data.contacts - len(TERMS))[:, None]  # directions no term explains
+    whole = others * np.log(squares) + data.square[:, None] / squares + corner[:, None]
+    surprise = 2.0 * np.log(factors[..., :size]).sum(axis=3) - factors[..., size] ** 2 + whole[:, None]
     return _averaged(surprise, noises)
 
 
 def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
     """Over a grid of waviness and noise, by -2 log likelihood there (b, 6, 5) and the waviness's prior."""
-    likelihood = -0.5 * (surprise + UNUSUAL[:, None])
-    with np.errstate(under="ignore"):  # what is that unlikely counts for nothing
-        weights = np.exp(likelihood - likelihood.max(axis=(1, 2), keepdims=True))
-        weights /= weights.sum(axis=(1, 2), keepdims=True)
-    by_waviness = weights.sum(axis=2)
+    surprise = (surprise + UNUSUAL[:, None]).reshape(len(noises), -1)
+    weights = np.exp(0.5 * np.maximum(surprise.min(axis=1)[:, None] - surprise, -UNLIKELY))
+    weights = (weights / weights.sum(axis=1)[:, None]).reshape(len(noises), len(WAVINESS), -1)
+    by_waviness, by_noise = weights.sum(axis=2), weights.sum(axis=1)
     return Hyperparameters(
-        np.exp(by_waviness @ np.log(WAVINESS)),
+        np.exp(by_waviness @ LOG_VARIANCES),
         by_waviness @ VARIANCES,
-        np.sqrt((weights.sum(axis=1) * noises**2).sum(axis=1)),
+        np.sqrt(np.einsum("bn,bn->b", by_noise, noises**2)),
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..arguments import Array
 from ..patch.monge import TERMS, derived_monomials
 
-SLOPE_MISFIT = 1e-2  # radians: no surface is a polynomial, so no slope is better known
+SLOPE_MISFIT = 1e-2  # radians: no surface is a polynomial, so no slope is better known (benchmarks.stability)
 
 
 def slope_equations(normals: Array, contacts: Array, weights: Array) -> tuple[Array, Array]:

@@ -13,11 +13,20 @@ from ..arguments import Array
 from ..patch.monge import DEGREE, TERMS, MongePatch, monomials
 
 ORDERS = TERMS.sum(axis=1).astype(float)
+WINDING = 1j * (TERMS[:, 0] - TERMS[:, 1])  # of z^i z'^j, z = x + iy
 FREE = 5  # x, y, x^2, xy, y^2 have no prior
+LEAST_DEGREE = 2  # of a patch
 DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L
-ALIKE = 0.05  # a difference of curvatures that makes no directions
+ALIKE = 0.05  # a difference of curvatures that makes no directions, as in the rule of benchmarks.stability
 CONFIDENCE = 0.95
+ROUND = 12.59  # quantile at CONFIDENCE of chi squared with six degrees of freedom
 INVISIBLE = 0.9  # A direction of which this share of the prior's variance is left is invisible.
+
+
+# What spheres and planes have not: a difference of curvatures, a mixed second derivative, third derivatives.
+_UNLIKE_SPHERE = np.zeros((6, len(TERMS)))
+_UNLIKE_SPHERE[0, [2, 4]] = -1.0, 1.0
+_UNLIKE_SPHERE[range(1, 6), [3, *range(FREE, FREE + 4)]] = 1.0
 
 
 class Posterior(NamedTuple):
@@ -103,11 +112,9 @@ class Posterior(NamedTuple):
         x, y, _ = contacts.T
         basis = monomials(x, y, TERMS)
         variance = np.einsum("ni,ni->", basis @ self.covariance, basis)
-        for degree in range(2, DEGREE):
-            off = basis @ (self.mean - coefficients_of(self.patch(degree)))
-            if off @ off <= 0.25 * variance:
-                return degree
-        return DEGREE
+        off = basis[:, FREE:] @ (_departures() @ self.mean[FREE:]).T
+        enough = np.flatnonzero(np.einsum("nk,nk->k", off, off) <= 0.25 * variance)
+        return LEAST_DEGREE + int(enough[0]) if len(enough) else DEGREE
 
     def turn(self, confidence: float = CONFIDENCE) -> float:
         """The angle (radians) that the Darboux frame is off by at most, with a probability of `confidence`.
@@ -126,6 +133,18 @@ class Posterior(NamedTuple):
         angles[2.0 * np.hypot(difference, mixed) <= ALIKE] = 0.0
         angle = float(np.sort(angles)[int(confidence * len(angles))])
         return math.hypot(angle, x, y, math.sqrt(c[0, 0] + c[1, 1])) if angle > 0.0 else 0.0
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it may be a sphere or a plane, as far as its terms to degree 3 tell with CONFIDENCE.
+
+        Then there are no principal directions. Curvatures known to no better than ALIKE do not tell.
+        """
+        if self.curvature_std() > ALIKE:
+            return False
+        apart = _UNLIKE_SPHERE @ self.mean
+        told = float(apart @ np.linalg.solve(_UNLIKE_SPHERE @ self.covariance @ _UNLIKE_SPHERE.T, apart))
+        return told <= ROUND
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin where it is known least."""
@@ -158,20 +177,24 @@ def _turn(angle: Array) -> Array:
 
     Of z = x + iy and its conjugate z' a turn changes nothing but the phase of the terms z^i z'^j.
     """
-    to_complex, from_complex = _complex_terms()
-    phases = np.exp(1j * np.asarray(angle)[..., None] * (TERMS[:, 0] - TERMS[:, 1]))
-    turn: Array = ((from_complex * phases[..., None, :]) @ to_complex).real
-    return turn.copy()  # The real parts among complex numbers are nothing that BLAS multiplies.
+    (parts, from_complex), angles = _complex_terms(), np.asarray(angle)[..., None]
+    turned = from_complex * np.exp(angles * WINDING)[..., None, :]
+    # Of the product only the real part, in real numbers.
+    turn: Array = np.concatenate([turned.real, turned.imag], axis=-1) @ parts
+    return turn
 
 
 @cache
-def _complex_terms() -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Coefficients of x^i y^j to those of z^i z'^j and back, (27, 27) each."""
+def _complex_terms() -> tuple[Array, NDArray[np.complex128]]:
+    """Coefficients of x^i y^j to those of z^i z'^j and back, (27, 27) each.
+
+    The former as their real and less their imaginary parts, (54, 27).
+    """
     x, y, _ = nodes()
     z, (i, j) = (x + 1j * y)[:, None], TERMS.T
     complex_terms: NDArray[np.complex128] = z**i * z.conj() ** j
     to_complex = np.linalg.lstsq(complex_terms, monomials(x, y, TERMS).astype(complex), rcond=None)[0]
-    return to_complex, np.linalg.inv(to_complex)
+    return np.vstack([to_complex.real, -to_complex.imag]), np.linalg.inv(to_complex)
 
 
 @cache
@@ -180,6 +203,17 @@ def _truncation(degree: int) -> Array:
     x, y, weights = nodes()
     basis = np.sqrt(weights)[:, None] * monomials(x, y, TERMS[FREE:])
     return np.linalg.lstsq(basis[:, : terms_to(degree) - FREE], basis, rcond=None)[0]
+
+
+@cache
+def _departures() -> Array:
+    """(4, 22, 22): what the terms of degree 3 to 6 are beside their truncations of degree 2 to 5."""
+    size = terms_to(DEGREE) - FREE
+    departures = np.tile(np.eye(size), (DEGREE - LEAST_DEGREE, 1, 1))
+    for k, departure in enumerate(departures):
+        truncation = _truncation(LEAST_DEGREE + k)
+        departure[: len(truncation)] -= truncation
+    return departures
 
 
 @cache

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether contacts ask for a residual, how large it is, and what they say of it.
 
-Where a sextic describes the contacts to their accuracy, or with white noise makes them as likely as a
-residual does, there is none. Otherwise its variances and the noise follow from the marginal likelihood on
-a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
+Where a sextic describes the contacts to their accuracy there is none; nor where it describes most of them,
+and makes all as likely, with outliers, as a residual does. Otherwise its variances and the noise follow from
+the marginal likelihood on a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
 """
 
 import math
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,27 +16,34 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..patch.monge import TERMS, monomials
-from ..patch.residual import Residual, cholesky, kernels, places_factor, solved
+from ..patch.residual import (
+    Residual,
+    cholesky,
+    cholesky_in_place,
+    kernels,
+    places_factor,
+    solved,
+    solved_definite,
+)
 from .evidence import USUAL_WAVINESS, prior_variances
 from .measured_slopes import slope_equations
-from .posterior import FREE, Posterior
+from .posterior import FREE
 
 # Chosen with benchmarks.real.
-ROUGH_MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
-FACETS = 1e-3  # Share of the radius: misfits of a smooth surface, whose curvatures a polynomial tells best.
-UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
+ROUGH_MISFIT = 5e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
 ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
 RESIDUAL_NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
+UPWARD = np.arange(RESIDUAL_NOISES) / (RESIDUAL_NOISES - 1.0)
 MOST_PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
 ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
-NEGLIGIBLE = 80.0  # -2 log likelihood beside the best, at which no other noise is tried
-FREE_VARIANCE = 0.03  # of slopes and second derivatives: where curves end early, of 100 they run away
+NEGLIGIBLE = 160.0  # -2 log likelihood beside the best, at which no other noise is tried
+FREE_VARIANCE = 0.06  # of slopes and second derivatives: where curves end early, of 100 they run away
 TEMPER = 0.15  # of the log likelihood: contacts side by side tell of waves between the curves no more
 
 
-class Touch(NamedTuple):
-    """A touch in unit radius and in a frame near to its Darboux frame.
+class Observations(NamedTuple):
+    """What a touch has felt, in unit radius and in a frame near to its Darboux frame.
 
     contacts : (n, 3)
     weights : (n,), above 0
@@ -49,7 +57,7 @@ class Touch(NamedTuple):
     most: float
     normals: Array | None
 
-    def moved(self, turn: Array, scale: float) -> "Touch":
+    def moved(self, turn: Array, scale: float) -> "Observations":
         """This touch in axes (3, 3), with lengths over `scale`."""
         return self._replace(
             contacts=self.contacts @ turn / scale,
@@ -57,15 +65,6 @@ class Touch(NamedTuple):
             most=self.most / scale,
             normals=None if self.normals is None else self.normals @ turn,
         )
-
-
-def asking(contacts: Array, weights: Array, posterior: Posterior, accuracy: Array) -> NDArray[np.intp]:
-    """Which of b touches have contacts (b, n, 3) that their sextics do not describe to an accuracy (b,)."""
-    flat = contacts.reshape(-1, 3)
-    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
-    off = contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0]
-    rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
-    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, FACETS))
 
 
 class System(NamedTuple):
@@ -80,18 +79,13 @@ class System(NamedTuple):
     kernels: list[Array]
 
 
-def system_of(touch: Touch) -> System:
+def system_of(touch: Observations) -> System:
     """What fits of the touch are made of."""
     flat = touch.contacts[:, :2]
     basis = monomials(flat[:, 0], flat[:, 1], TERMS)
-    places = _some(len(flat), MOST_PLACES)
+    m = min(len(flat), MOST_PLACES)  # evenly spread
+    places = np.arange(m) * len(flat) // m
     return System(basis, touch.contacts[:, 2], places, kernels(flat, flat[places]))
-
-
-def _some(count: int, most: int) -> NDArray[np.intp]:
-    """Indices (m,) of all of them, or of some, evenly spread, where they are more than `most`."""
-    m = min(count, most)
-    return np.arange(m) * count // m
 
 
 class Sizes(NamedTuple):
@@ -102,16 +96,14 @@ class Sizes(NamedTuple):
     asked: bool
 
 
-def sizes(touch: Touch, system: System) -> Sizes:
+def sizes(touch: Observations, system: System) -> Sizes:
     """By the marginal likelihood of the heights.
 
     Heights ~ N(0, K), K = basis prior basis' + v k + noise^2, by one Cholesky factor of K bordered by the
     heights, as in evidence.py; each contact's row times the root of its weight.
     """
     basis, heights, kernels_within = _weighted(touch, system)
-    noises = touch.least * (touch.most / touch.least) ** (
-        np.arange(RESIDUAL_NOISES) / (RESIDUAL_NOISES - 1.0)
-    )
+    noises = touch.least * (touch.most / touch.least) ** UPWARD
     with_it = _surprises(basis, heights, kernels_within, noises)
     without = _surprises_alone(basis / touch.most, heights / touch.most)
     without += 2.0 * len(heights) * math.log(touch.most)
@@ -122,7 +114,7 @@ def sizes(touch: Touch, system: System) -> Sizes:
     return Sizes(shares.sum(axis=2) @ AMPLITUDES**2, noise, bool(p.mean() > ODDS * p_alone.mean()))
 
 
-def _weighted(touch: Touch, system: System) -> tuple[Array, Array, list[Array]]:
+def _weighted(touch: Observations, system: System) -> tuple[Array, Array, list[Array]]:
     """Basis, heights and kernels of the places, rows times the roots of their weights."""
     if len(system.places) == len(touch.weights) and touch.weights.min() == 1.0:
         return system.basis, system.heights, system.kernels
@@ -147,35 +139,35 @@ def _surprises(basis: Array, heights: Array, kernels_within: list[Array], noises
     terms[:m, :m] = (basis * _prior(USUAL_WAVINESS)) @ basis.T
     terms[:m, m] = terms[m, :m] = heights
     found = np.full((len(kernels_within), size, RESIDUAL_NOISES), np.inf)
+    surprise = partial(_surprise, terms, work, 2.0 * float(heights @ heights))
+    squares, noise_squares = (AMPLITUDES**2).tolist(), (noises**2).tolist()
     for within, kernel, surprises in zip(kernels_within, kernels_of, found, strict=True):
         kernel[:m, :m] = within
         for side in (range(size // 2, size), range(size // 2 - 1, -1, -1)):
             before = surprises[side.start - side.step, MIDDLE]
             for at in side:
-                surprises[at, MIDDLE] = now = _surprise(terms, kernel, work, at, noises[MIDDLE])
+                surprises[at, MIDDLE] = now = surprise(kernel, squares[at], noise_squares[MIDDLE])
                 if now > max(before, found.min() + NEGLIGIBLE):
                     break
                 before = now
     for length, at in np.argwhere(found[..., MIDDLE] < found.min() + NEGLIGIBLE).tolist():
         for i in (i for i in range(RESIDUAL_NOISES) if i != MIDDLE):
-            found[length, at, i] = _surprise(terms, kernels_of[length], work, at, noises[i])
+            found[length, at, i] = surprise(kernels_of[length], squares[at], noise_squares[i])
     return found
 
 
-def _surprise(terms: Array, kernel: Array, work: Array, amplitude: int, noise: float) -> float:
-    """-2 log likelihood by terms that the heights border, (m + 1, m + 1), as are kernel and work."""
-    from scipy.linalg.blas import daxpy
-    from scipy.linalg.lapack import dpotrf
+def _surprise(terms: Array, work: Array, twice: float, kernel: Array, variance: float, noise: float) -> float:
+    """-2 log likelihood by terms that the heights border, (m + 1, m + 1), as are kernel and work.
 
-    flat, m, heights = work.reshape(-1), len(work) - 1, terms[-1, :-1]
-    flat[:] = terms.reshape(-1)
-    daxpy(kernel.reshape(-1), flat, a=AMPLITUDES[amplitude] ** 2)  # in place
-    diagonal = flat[:: m + 2]
-    diagonal += noise**2
-    # More than heights' K^-1 heights.
-    corner = diagonal[m] = 2.0 * float(heights @ heights) / noise**2 + 1.0
-    dpotrf(work.T, lower=1, clean=0, overwrite_a=1)  # in place
-    return float(2.0 * np.log(diagonal[:m]).sum() + corner - diagonal[m] ** 2)
+    twice : the heights' squares, summed twice; variance, noise : of the residual, and of a contact, squared
+    """
+    np.multiply(kernel, variance, out=work)
+    work += terms
+    diagonal = work.reshape(-1)[:: len(work) + 1]
+    diagonal += noise
+    corner = diagonal[-1] = twice / noise + 1.0  # more than heights' K^-1 heights
+    pivots = cholesky_in_place(work)
+    return 2.0 * float(np.log(pivots[:-1]).sum()) + corner - float(pivots[-1]) ** 2
 
 
 def _surprises_alone(basis: Array, heights: Array) -> Array:
@@ -183,35 +175,36 @@ def _surprises_alone(basis: Array, heights: Array) -> Array:
 
     By the terms' precision, bordered by what the heights say of them.
     """
-    m, rows = basis.shape[1], np.column_stack([basis, heights])
-    priors = np.array([_prior(waviness) for waviness in ALONE])
+    rows, (precisions, logs) = np.column_stack([basis, heights]), _priors_alone()
     bordered = np.tile(rows.T @ rows, (len(ALONE), 1, 1))
-    diagonal = np.einsum("kii->ki", bordered)  # a view
-    diagonal[:, :m] += 1.0 / priors
-    diagonal[:, m] += 1.0  # lest rounding leaves less than nothing over
-    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
-    explained = 2.0 * np.log(factors[:, :m]).sum(axis=1) + np.log(priors).sum(axis=1)
-    surprises: Array = explained + factors[:, m] ** 2 - 1.0
+    np.einsum("kii->ki", bordered)[:] += precisions  # a view
+    pivots = np.einsum("kii->ki", np.linalg.cholesky(bordered))
+    surprises: Array = 2.0 * np.log(pivots[:, :-1]).sum(axis=1) + logs + pivots[:, -1] ** 2 - 1.0
     return surprises
 
 
-def mean_given(touch: Touch, system: System, sizes: Sizes) -> Array:
-    """Means of the terms, and of what k(p, places) is multiplied with, (27 + m,)."""
-    from scipy.linalg.lapack import dposv
+@cache
+def _priors_alone() -> tuple[Array, Array]:
+    """Precisions of the terms for each of ALONE, and of the heights that border them; sums of logarithms."""
+    priors = np.array([_prior(waviness) for waviness in ALONE])
+    # One more, lest rounding leaves less than nothing over.
+    return np.column_stack([1.0 / priors, np.ones(len(ALONE))]), np.log(priors).sum(axis=1)
 
+
+def mean_given(touch: Observations, system: System, sizes: Sizes) -> Array:
+    """Means of the terms, and of what k(p, places) is multiplied with, (27 + m,), by one Cholesky factor."""
     if touch.normals is not None or len(system.places) < len(touch.weights):
         return fitted(touch, system, sizes.variances, sizes.noise).mean
-    # Heights ~ N(0, K), K as in `sizes`: the mean alone takes one Cholesky factor.
     (basis, heights, within), (one, other) = _weighted(touch, system), sizes.variances
     prior = _prior(USUAL_WAVINESS)
     matrix = (basis * prior) @ basis.T
     matrix += one * within[0] + other * within[1]
     matrix.flat[:: len(matrix) + 1] += sizes.noise**2
-    solution = dposv(matrix.T, heights, lower=1, overwrite_a=1)[1]
+    solution = solved_definite(matrix, heights)
     return np.concatenate([prior * (solution @ basis), np.sqrt(touch.weights) * solution])
 
 
-def fitted(touch: Touch, system: System, variances: Array, noise: float) -> Residual:
+def fitted(touch: Observations, system: System, variances: Array, noise: float) -> Residual:
     """What the contacts say, given these.
 
     The unknowns are the terms and what L^-1 k(u, p) is multiplied with: that makes the prior's precision 1
@@ -226,8 +219,7 @@ def fitted(touch: Touch, system: System, variances: Array, noise: float) -> Resi
     weighted = features * (np.sqrt(touch.weights) / noise)[:, None]
     precision = weighted.T @ weighted
     seen = weighted.T @ (system.heights * np.sqrt(touch.weights) / noise)
-    prior = 1.0 / _prior(USUAL_WAVINESS)
-    precision.flat[:: len(precision) + 1] += np.concatenate([prior, np.ones(len(index))])
+    precision.flat[:: len(precision) + 1] += np.append(1.0 / _prior(USUAL_WAVINESS), np.ones(len(index)))
     if touch.normals is not None:
         _add_slopes(touch, precision, seen)
     factor = cholesky(precision)
@@ -238,7 +230,7 @@ def fitted(touch: Touch, system: System, variances: Array, noise: float) -> Resi
     return residual
 
 
-def _add_slopes(touch: Touch, precision: Array, seen: Array) -> None:
+def _add_slopes(touch: Observations, precision: Array, seen: Array) -> None:
     """What measured normals add to the terms' part of the system."""
     assert touch.normals is not None
     given = touch.normals, touch.contacts, touch.weights

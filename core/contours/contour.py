@@ -23,6 +23,7 @@ from ..arguments import (
 MOST_ROUNDING = 0.01
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 UNEXPLAINED = "not explained"
+BRINKS = (NO_CONTACT, CREASE)  # stops where the surface ends
 
 Vector = tuple[float, float, float]
 

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import SMALLEST, Array
-from .contour import Contour, cross
+from .contour import Contour
 
-WINDOW = 10  # contacts "very close to p"; even, for on equal sides a cubic term does not bend the quadratic
+# Contacts "very close to p" (benchmarks.accuracy); even: a cubic term bends no quadratic over equal sides.
+WINDOW = 10
 LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
 RIDGE = 1e-12  # Share of the equations of r0, r1 and r2 that is added, for all s may be one.
 EXACT = 1e-6  # radians, of a measured normal: no less is told apart
@@ -42,6 +43,8 @@ class Curves:
 
     def at(self, index: int | list[int]) -> "Curves":
         """The curves of one touch, without the leading dimension, or of several."""
+        if index == [0] and len(self.points) == 1:
+            return self
         parts: list[Any] = [part if part is None else part[index] for part in vars(self).values()]
         return Curves(*parts)
 
@@ -81,22 +84,25 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
     r : (b, c, n, 3), contacts relative to the point; present : (b, c, n); normals as in Curves. s is
     the chord to the contact, the arc length up to its cube.
     """
-    shape, curve = present.shape, np.arange(present[..., 0].size)[:, None]
-    r, present = r.reshape(len(curve), -1, 3), present.reshape(len(curve), -1)
+    shape, each = present.shape, np.arange(present[..., 0].size)
+    r, present, curve = r.reshape(len(each), -1, 3), present.reshape(len(each), -1), each[:, None]
     distance, beside = besides_point(r)
     present = present & beside
-    distance = np.where(present, distance, np.inf)
-    near = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
-    counts = present.sum(axis=1)[:, None]
-    farthest = near[curve, np.clip(counts, 1, WINDOW) - 1]
-    along = np.copysign(np.where(present, distance, 0.0), np.einsum("cni,cji->cn", r, r[curve, farthest]))
-    given = np.cumsum(present, axis=1) - (counts + 1) / 2.0
-    along[np.einsum("cn,cn->c", given, along) < 0.0] *= -1.0
-    scale = np.where(counts > 0, distance[curve, farthest], 1.0)
+    far = np.where(present, distance, np.inf)
+    near = far.argsort(axis=1, kind="stable")[:, :WINDOW]
+    counts = present.sum(axis=1)
+    farthest = near[each, np.minimum(np.maximum(counts, 1), WINDOW) - 1]
+    ahead = (r @ r[each, farthest, :, None])[..., 0]
+    along = np.copysign(distance, ahead) * present
+    given = present.cumsum(axis=1) - 0.5 * (counts + 1)[:, None]
+    backward = np.einsum("cn,cn->c", given, along) < 0.0
+    if backward.any():
+        along[backward] *= -1.0
+    scale = np.where(counts > 0, far[each, farthest], 1.0)[:, None]
     tangents, curvatures = _parabola(along[curve, near] / scale, r[curve, near] / scale[..., None])
     speed = np.maximum(np.sqrt(np.einsum("ci,ci->c", tangents, tangents)), 1e-9)[:, None]  # 1 but for noise
     along[~present] = np.inf
-    order = np.argsort(along, axis=1, kind="stable")
+    order = along.argsort(axis=1, kind="stable")
     return Curves(
         r[curve, order].reshape(*shape, 3),
         present[curve, order].reshape(shape),
@@ -120,28 +126,30 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     (b, c, 3, 3), rows r0, r1 and r2, fitted to the nearest contacts, and (b, c). 0 where there are too
     few of them to tell.
     """
-    shape, curve = curves.present.shape, np.arange(curves.present[..., 0].size)[:, None]
-    present = curves.present.reshape(len(curve), -1)
+    shape = curves.present.shape
+    present = curves.present.reshape(-1, shape[-1])
+    curve = np.arange(len(present))[:, None]
     distance = np.where(present, np.abs(curves.along.reshape(present.shape)), np.inf)
-    order = np.argsort(distance, axis=1, kind="stable")[:, :WINDOW]
+    order = distance.argsort(axis=1, kind="stable")[:, :WINDOW]
     near = present[curve, order]
-    r = near[..., None] * curves.points.reshape(*present.shape, 3)[curve, order]
+    r = curves.points.reshape(*present.shape, 3)[curve, order]
+    r *= near[..., None]
     s = (r @ curves.tangents.reshape(-1, 3, 1))[..., 0]
     count, longest = near.sum(axis=1), np.abs(s).max(axis=1)
     told = (count > LEAST_CONTACTS) & (longest > 0.0)
     scale = np.where(told, longest, 1.0)[:, None]
-    basis = np.empty((*s.shape, 3))
-    basis[..., 0] = near & told[:, None]
-    np.multiply(basis[..., 0], s / scale, out=basis[..., 1])
-    np.multiply(basis[..., 1], s / scale, out=basis[..., 2])
-    turned = np.swapaxes(basis, 1, 2)
-    inverse = np.linalg.inv(turned @ basis + RIDGE * np.eye(3))
+    basis = np.empty((3, *s.shape))
+    basis[0], s = near & told[:, None], s / scale
+    np.multiply(basis[0], s, out=basis[1])
+    np.multiply(basis[1], s, out=basis[2])
+    turned = basis.transpose(1, 0, 2)
+    inverse = np.linalg.inv(turned @ basis.transpose(1, 2, 0) + RIDGE * np.eye(3))
     solution = inverse @ (turned @ r)
-    off = r - basis @ solution
+    off = r - basis.transpose(1, 2, 0) @ solution
     variance = np.einsum("cni,cni->c", off, off) / np.maximum(count - 3, 1)
     stds = np.where(told, np.sqrt(variance * inverse[:, 0, 0]), 0.0)
     solution /= (scale ** np.arange(3))[..., None]
-    solution[~told] = 0.0
+    solution *= told[:, None, None]
     return solution.reshape(*shape[:-1], 3, 3), stds.reshape(shape[:-1])
 
 
@@ -151,8 +159,13 @@ def misses(curves: Curves) -> Array:
     (b, c, 2): the part of r0 across the tangent. 0 where there are too few contacts to tell.
     """
     local, stds = local_curves(curves)
-    across = np.array(cross(np.moveaxis(local[..., 0, :], -1, 0), np.moveaxis(curves.tangents, -1, 0)))
-    return np.stack([np.sqrt((across**2).sum(axis=0)), stds], axis=-1)
+    foot = local[..., 0, :]
+    along = np.einsum("...i,...i->...", foot, curves.tangents)[..., None] * curves.tangents
+    across = foot - along
+    found = np.empty((*stds.shape, 2))
+    np.sqrt(np.einsum("...i,...i->...", across, across), out=found[..., 0])
+    found[..., 1] = stds
+    return found
 
 
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
@@ -160,12 +173,16 @@ def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
 
     Where all s are one the two cannot be told apart: then the shortest solution.
     """
-    powers = np.stack([s, 0.5 * s * s], axis=1)
-    gram = powers @ np.swapaxes(powers, 1, 2)
+    powers = np.empty((len(s), 2, s.shape[1]))
+    powers[:, 0] = s
+    np.multiply(s, 0.5 * s, out=powers[:, 1])
+    gram = powers @ powers.transpose(0, 2, 1)
     a, b, d = gram[:, 0, 0], gram[:, 0, 1], gram[:, 1, 1]
     det, square = a * d - b * b, np.maximum((a + d) ** 2, 1e-300)
     alike = det <= 1e-13 * square
-    adjugate = np.array([[d, -b], [-b, a]]).transpose(2, 0, 1)
-    inverse = np.where(alike[:, None, None], gram, adjugate) / np.where(alike, square, det)[:, None, None]
+    inverse = np.array([[d, -b], [-b, a]]).transpose(2, 0, 1)
+    if alike.any():
+        inverse, det = np.where(alike[:, None, None], gram, inverse), np.where(alike, square, det)
+    inverse = inverse / det[:, None, None]
     solution = inverse @ (powers @ r)
     return solution[:, 0], solution[:, 1]

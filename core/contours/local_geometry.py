@@ -13,6 +13,7 @@ from ..arguments import Array
 from .contour import Contour, cross
 from .curves import LEAST_CONTACTS, Curves
 
+# benchmarks.stability leads planes and tilts to where these refuse them.
 LEAST_ANGLE = math.radians(1.0)  # between tangents that count as distinct
 OFF_PLANE = math.sin(math.radians(25.0))  # Sine of the angle of a tangent and the tangent plane.
 UMBILIC = 1e-9  # the difference of curvatures, in unit radius, that is none
@@ -44,8 +45,8 @@ class Frame:
 
 def surface_normals(tangents: Array, outward: Array) -> Array:
     """The unit n (..., 3) that minimize sum (n . t)^2 over tangents (..., c, 3), on the side of `outward`."""
-    n = np.linalg.eigh(np.swapaxes(tangents, -1, -2) @ tangents)[1][..., 0]
-    return np.where((n * outward).sum(axis=-1, keepdims=True) >= 0.0, n, -n)
+    n: Array = np.linalg.eigh(np.swapaxes(tangents, -1, -2) @ tangents)[1][..., 0]
+    return np.copysign(1.0, np.einsum("...i,...i->...", n, outward))[..., None] * n
 
 
 def principal_curvatures(
@@ -59,8 +60,10 @@ def principal_curvatures(
     in unit radius) d1 is at angle 0.
     """
     phi, kappa = np.asarray(angles, dtype=float), np.asarray(curvatures, dtype=float)
-    rows = np.stack([known * f for f in (np.ones_like(phi), np.cos(2.0 * phi), np.sin(2.0 * phi))], axis=-2)
-    solution = np.linalg.solve(rows @ np.swapaxes(rows, -1, -2), rows @ kappa[..., None])
+    rows = np.empty((*phi.shape, 3))
+    rows[..., 0], rows[..., 1], rows[..., 2] = known, np.cos(2.0 * phi) * known, np.sin(2.0 * phi) * known
+    turned = np.swapaxes(rows, -1, -2)
+    solution = np.linalg.solve(turned @ rows, turned @ kappa[..., None])
     mean, a, b = solution[..., 0, 0], solution[..., 1, 0], solution[..., 2, 0]
     half = np.hypot(a, b)
     umbilic = half <= UMBILIC * np.maximum(1.0, np.abs(known * kappa).max(axis=-1))
@@ -74,13 +77,13 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
     largest distance of a contact from the point in the tangent plane.
     """
     tangents = curves.tangents
-    e1 = tangents[:, 0] - (tangents[:, 0] * n).sum(axis=1, keepdims=True) * n
-    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
-    e2 = np.array(cross(n.T, e1.T)).T
-    plane = np.array([e1.T, e2.T]).transpose(2, 1, 0)
+    e1 = tangents[:, 0] - np.einsum("bi,bi->b", tangents[:, 0], n)[:, None] * n
+    e1 /= np.sqrt(np.einsum("bi,bi->b", e1, e1))[:, None]
+    plane = np.empty((len(n), 3, 2))
+    plane[..., 0], plane[..., 1] = e1, np.array(cross(n.T, e1.T)).T
     flat = curves.points @ plane[:, None]
-    squares = np.einsum("...i,...i->...", flat, flat)
-    radius = np.sqrt(np.max(squares, axis=(1, 2), where=curves.present, initial=0.0))
+    squares = np.einsum("...i,...i->...", flat, flat) * curves.present
+    radius = np.sqrt(squares.reshape(len(n), -1).max(axis=1))
     # Meusnier with its sign: the normal curvature is the normal part of the curvature vector,
     # kappa' cos(theta) in the paper's words.
     kappas = radius[:, None] * np.einsum("bci,bi->bc", curves.curvatures, n)
@@ -88,8 +91,9 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
     angles = np.arctan2(flat[..., 1], flat[..., 0])
     k1, k2, theta = principal_curvatures(angles, kappas, curves.present.any(axis=2))
     c, s = np.cos(theta), np.sin(theta)
-    turn = np.array([[c, -s], [s, c]]).transpose(2, 0, 1)
-    return np.concatenate([plane @ turn, n[:, :, None]], axis=2), k1, k2, radius
+    axes = np.empty((len(n), 3, 3))
+    axes[..., :2], axes[..., 2] = plane @ np.array([[c, -s], [s, c]]).transpose(2, 0, 1), n
+    return axes, k1, k2, radius
 
 
 def degeneracy(

@@ -25,8 +25,10 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
 
     Runs as the contour does; noise and normal_std are those of the means.
     """
+    if len(contour.points) <= MOST_CONTACTS:
+        return contour, 1
     r = contour.points - point
-    beside = np.flatnonzero(besides_point(r)[1]) if len(r) > MOST_CONTACTS else np.arange(len(r))
+    beside = np.flatnonzero(besides_point(r)[1])
     size = math.ceil(len(beside) / MOST_CONTACTS)
     if size <= 1:
         return contour, 1

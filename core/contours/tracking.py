@@ -33,6 +33,7 @@ from .contour import (
     vector_of,
 )
 
+# What a crease is, and what is too steep: benchmarks.refusals counts what they refuse.
 MAX_TURN = math.cos(math.radians(45.0))  # between contacts; a sharper turn is a crease to a finger
 MAX_TILT = math.cos(math.radians(75.0))  # against the normal at the point; beyond, slopes exceed 3.7
 LEAST_IN_PLANE = 1e-3  # Least share of a surface normal in the sampling plane.
@@ -157,7 +158,7 @@ def _section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float
             return None
         try:
             (x, y, z), (nx, ny, nz) = hit
-            # Of NaN nothing is true.
+            # NaN fails every comparison, so it is refused too.
             sound = abs(x) + abs(y) + abs(z) <= LARGEST and abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-2
         except (TypeError, ValueError, OverflowError):
             sound = False

@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
+from ..bayes.roughness import roughness
 from ..contours.contour import EXTENT, UNEXPLAINED, Contour
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_STD
 
+# benchmarks.amount judges the numbers of contacts, benchmarks.extents how far curves grow.
 # Numbers of contacts of the longest half curve: the first that is enough is taken.
 CONTACT_COUNTS = (12, 24, 48)
 LEAST = 4  # contacts of the shortest half curve
@@ -30,6 +32,7 @@ GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underest
 STRETCH = 1.5  # A half curve grows by this factor at once.
 NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
+TOO_ROUGH = 0.0085  # Roughness of contacts whose fit ends growth, in all but one of a hundred
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
@@ -76,6 +79,13 @@ class Felt:
             first, last = (UNEXPLAINED if e else s for e, s in zip(end, contour.stops, strict=True))
             found.append(contour.part(which, (first, last)))
         return found
+
+    def roughness(self, counts: Counts) -> float:
+        """How far so many contacts are off any sextic: above 1 their fit would be in doubt."""
+        contours = self.shortened(counts, stride_of(counts))
+        points = np.vstack([contour.points for contour in contours])
+        noise = max(contour.noise or 0.0 for contour in contours)
+        return roughness(points - self.point, noise) / TOO_ROUGH
 
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
         """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
@@ -126,7 +136,8 @@ def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: f
     found = yield from _seed(felt, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
     noisy = found.result.accuracy > MISFIT and found is not list(known.values())[-1]
-    most = np.inf if noisy else NEAR if len(known) > 1 else 1.0
+    longest = (found.counts == np.minimum(SEEDS[0], felt.whole)).all()
+    most = np.inf if noisy else 1.0 if longest else NEAR
     growing = np.full(found.counts.shape, noisy or found.doubt <= 1.0)
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
@@ -148,19 +159,26 @@ def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: f
 
 def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
     """The longest of SEEDS that is in no doubt, or the one in the least; what is tried becomes `known`."""
-    error, seeds = None, list(SEEDS)
+    error, seeds, rough = None, list(SEEDS), []
     while seeds:
         counts = np.minimum(seeds.pop(0), felt.whole)
-        try:
-            trial = yield from tried(felt, counts)
-        except DegenerateCurvesError as why:
-            error = why
-            continue
-        known[counts.tobytes()] = trial
-        if trial.doubt <= 1.0:
-            break
-        if trial.spread > HOPELESS and len(seeds) > 1:
+        doubt = felt.roughness(counts) if seeds else 0.0  # the shortest are fitted however rough they are
+        if doubt <= 1.0:
+            try:
+                trial = yield from tried(felt, counts)
+            except DegenerateCurvesError as why:
+                error = why
+                continue
+            known[counts.tobytes()] = trial
+            if trial.doubt <= 1.0:
+                break
+            doubt = trial.spread
+        else:
+            rough.append(counts)
+        if doubt > HOPELESS and len(seeds) > 1:
             seeds.pop(0)
+    if not known and rough:  # where a shorter one carries no fit
+        known[rough[-1].tobytes()] = yield from tried(felt, rough[-1])
     if not known and error is not None:
         raise error
     return min(known.values(), key=lambda trial: (trial.doubt, trial.counts.max()))
@@ -168,12 +186,17 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
 
 def tried(felt: Felt, counts: Counts) -> Fits:
     """The fit of so many contacts, of which as few are fitted as most often are enough."""
-    stride = max(1, int(spacing(counts, CONTACT_COUNTS[0])))
+    stride = stride_of(counts)
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
     spread = r.mean_height_std / (felt.largest_std or GROWN_STD * r.radius)
     return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
+
+
+def stride_of(counts: Counts) -> int:
+    """One contact of so many is fitted."""
+    return max(1, int(spacing(counts, CONTACT_COUNTS[0])))
 
 
 def spacing(reaches: Array | Counts, count: int) -> float:

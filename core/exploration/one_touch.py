@@ -28,6 +28,7 @@ from .growth import (
     spacing,
 )
 
+# benchmarks.amount judges the first, benchmarks.speed --base what adding planes costs.
 NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
 HELPS = 0.1  # Share of it that one more plane must take off.
 

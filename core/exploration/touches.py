@@ -18,8 +18,11 @@ from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vect
 from ..contours.contour import EXTENT, Contour, SamplingPlane
 from ..contours.tracking import Surface, generator_of, track
 from ..reconstruction.deviations import with_height_stds
-from ..reconstruction.from_contours import reconstruct_many
+from ..reconstruction.from_contours import fitted, options_of
 from ..reconstruction.result import Reconstruction
+from ..reconstruction.stacks import Options
+from ..reconstruction.start import Given
+from ..reconstruction.strokes import gathered
 from .one_touch import Answer, Ask, Exploration, Steps, Touch
 
 MOST_EVEN = 24  # At most so many planes are laid out evenly.
@@ -151,7 +154,7 @@ def explore_many(
         noisy = partial(feel, noise=noise, rng=generator)
         return (yield from Touch(noisy, point, reference, **wanted | {"farthest": farthest}).steps())
 
-    fit = {"method": method, "degree": degree, "weight": weight, "solver": solver}
+    fit = options_of(method, degree, None, weight, solver)
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, fit)
 
 
@@ -201,7 +204,7 @@ def _given(name: str, length: float | str) -> float | None:
 
 
 def _side_by_side(
-    steps: Sequence[Steps], points: Array, outward: Array, fit: dict[str, Any]
+    steps: Sequence[Steps], points: Array, outward: Array, fit: Options
 ) -> list[Exploration | ValueError]:
     """What each of b touches comes to, at (b, 3) and (b, 3); the fits that they ask for in stacks."""
     found: dict[int, Exploration | ValueError] = {}
@@ -218,10 +221,10 @@ def _side_by_side(
         answers = {}
         for growing in (True, False):
             which = [i for i, ask in asked.items() if ask.growing is growing]
-            options = fit | ({"method": "bayes"} if growing else {})
-            contours = [asked[i].contours for i in which]
+            options = fit._replace(method="bayes") if growing else fit
+            touches = [Given(asked[i].contours, *gathered(())) for i in which]
             if which:
-                results = reconstruct_many(points[which], contours, outward=outward[which], **options)
+                results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, _with_stds(results), strict=True))
     return [found[i] for i in range(len(steps))]
 

@@ -14,7 +14,8 @@ from ..arguments import Array
 from ..patch.domain import Domain
 from .least_squares import Problem, on_grid
 
-# Of |D|, in shares of its mean at the start. At the last the minimum is within a millionth of the true one.
+# |D| is rounded by shares of its mean at the start; at the last the minimum is right to a millionth.
+# benchmarks.speed compares it, and what it costs, with that of L-BFGS-B.
 ROUNDINGS = np.geomspace(1.0, 1e-5, 14)
 SETTLED_OBJECTIVE = 1e-3  # Share of the objective that a step wins: it is time to round less.
 CONVERGED = 1e-8

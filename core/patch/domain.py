@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A)."""
+"""The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A).
+
+Where the surface itself ends the spline would bulge over what is not there: beside such ends it is straight.
+"""
 
 import math
 from dataclasses import dataclass
@@ -15,6 +18,9 @@ GRID = 600  # Points of the grid (8) over a domain.
 BOUNDARY_SAMPLES = 1024  # Samples of the boundary, whose radius is then good to 1e-5.
 AROUND = 32  # places on the hull of contacts that bound a domain
 INSIDE = 0.05  # of the radius, that the origin is inside such a hull at least
+QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])  # turns rows counterclockwise
+APART = 1e-3  # of the radius: ends that are nearer to each other, or to the origin, are one, or none
+BRINK = 0.01  # of the radius: where the surface ends at the origin, the domain ends as near
 GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
 
 
@@ -23,29 +29,48 @@ class Domain:
     """The part of the tangent plane a patch is meant for; star-shaped about the origin.
 
     ends : (m, 2), m >= 3, the projected ends of the contours, by azimuth
+    brinks : (m,), which of them are where the surface ends, by a crease or its border; None for none
     """
 
     ends: Array
+    brinks: NDArray[np.bool_] | None = None
+
+    def scaled(self, factor: float) -> "Domain":
+        """The domain with its lengths that many times as long."""
+        return Domain(factor * self.ends, self.brinks)
+
+    @cached_property
+    def _straight(self) -> NDArray[np.bool_]:
+        """Which pieces of the boundary, each from one end to the next, are straight, (m,)."""
+        none = np.zeros(len(self.ends), dtype=bool)
+        return none if self.brinks is None else self.brinks | np.roll(self.brinks, -1)
 
     @cached_property
     def _boundary(self) -> tuple[Array, Array]:
         """Lengths of the chords (m,), and the closed cubic spline over them: (4, m, 2), powers of the length.
 
-        Its slopes at the ends follow from the continuity of its second derivative.
+        Its slopes at the ends follow from the continuity of its second derivative. Beside straight pieces,
+        which are chords, it sets out across the ray to the end, as a circle does.
         """
-        chords = np.roll(self.ends, -1, axis=0) - self.ends
-        lengths = np.sqrt(chords[:, 0] ** 2 + chords[:, 1] ** 2)
-        m, before = len(lengths), np.roll(lengths, 1)
-        rise, rows = chords / lengths[:, None], np.arange(m)
-        system = np.zeros((m, m))
+        rows = np.arange(len(self.ends))
+        last, following = rows - 1, rows + 1 - len(rows)  # of them, in a circle
+        chords = self.ends[following] - self.ends
+        lengths = np.sqrt(np.einsum("mi,mi->m", chords, chords))
+        over, before = lengths[:, None], lengths[last]
+        rise = chords / over
+        system = np.zeros((len(rows), len(rows)))
         system[rows, rows] = 2.0 * (lengths + before)
-        system[rows, rows - 1], system[rows, rows + 1 - m] = lengths, before
-        right = lengths[:, None] * np.roll(rise, 1, axis=0) + before[:, None] * rise
-        slopes = np.linalg.solve(system, 3.0 * right)
-        bend = (slopes + np.roll(slopes, -1, axis=0) - 2.0 * rise) / lengths[:, None]
-        return lengths, np.array(
-            [self.ends, slopes, (rise - slopes) / lengths[:, None] - bend, bend / lengths[:, None]]
-        )
+        system[rows, last], system[rows, following] = lengths, before
+        right = 3.0 * (over * rise[last] + before[:, None] * rise)
+        beside = self._straight | self._straight[last]
+        system[beside], right[beside] = np.eye(len(rows))[beside], self.ends[beside] @ QUARTER
+        right[beside] /= np.linalg.norm(self.ends[beside], axis=1, keepdims=True)
+        slopes = np.linalg.solve(system, right)
+        bend = (slopes + slopes[following] - 2.0 * rise) / over
+        pieces = np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
+        pieces[1, self._straight] = rise[self._straight]
+        pieces[2:, self._straight] = 0.0
+        return lengths, pieces
 
     @cached_property
     def _polar(self) -> tuple[Array, Array]:
@@ -93,7 +118,15 @@ class Domain:
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 
     def _radius(self, azimuth: Array) -> Array:
-        return np.interp(azimuth, *self._polar, period=2.0 * np.pi)
+        """How far out the boundary is, by the chords of its samples: straight pieces are exact."""
+        azimuths, radii = self._polar
+        turns, turn = azimuths - azimuths[0], (azimuth - azimuths[0]) % (2.0 * np.pi)
+        before = np.searchsorted(turns, turn, side="right") - 1
+        after, gone = (before + 1) % len(turns), turn - turns[before]
+        width = np.maximum((turns[after] - turns[before]) % (2.0 * np.pi), 1e-12)
+        a, b = radii[before], radii[after]
+        radius: Array = a * b * np.sin(width) / (a * np.sin(gone) + b * np.sin(width - gone))
+        return radius
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether each (x, y) lies inside or on the boundary; booleans of the shape of x and y."""
@@ -116,8 +149,8 @@ class Domain:
     def area(self) -> float:
         """The area inside, in length^2."""
         azimuth, r = self._polar
-        turn, following = np.diff(azimuth, append=azimuth[0] + 2.0 * np.pi), np.roll(r, -1)
-        return float(np.sum(turn * (r**2 + r * following + following**2)) / 6.0)
+        turn = np.diff(azimuth, append=azimuth[0] + 2.0 * np.pi)
+        return float(np.sum(r * np.roll(r, -1) * np.sin(turn)) / 2.0)
 
     def grid(self, count: int) -> tuple[Array, float]:
         """The grid of (8): about `count` points (m, 2) inside with uniform spacing h, and h."""
@@ -144,21 +177,23 @@ def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
     )
 
 
-def closed_spline_domain(ends: ArrayLike, radius: float) -> Domain:
-    """The domain through projected curve ends (m, 2), in any order.
+def closed_spline_domain(ends: ArrayLike, radius: float, brinks: ArrayLike | None = None) -> Domain:
+    """The domain through projected curve ends (m, 2), in any order; `brinks` as in Domain.
 
-    Ends within 1e-3 radius of the origin (a curve that runs to one side only) or of another end
-    do not count. Raises ValueError where fewer than three are left.
+    Ends within APART of the origin (a curve that runs to one side only) or of another end do not count.
+    Raises ValueError where fewer than three are left.
     """
     x, y = np.asarray(ends, dtype=float).T
-    out = np.flatnonzero(x * x + y * y > (1e-3 * radius) ** 2)
-    x, y = np.array([x, y])[:, out[np.argsort(np.arctan2(y[out], x[out]), kind="stable")]]
+    is_brink = np.zeros(len(x), dtype=bool) if brinks is None else np.asarray(brinks, dtype=bool)
+    out = np.flatnonzero(x * x + y * y > (APART * radius) ** 2)
+    order = out[np.argsort(np.arctan2(y[out], x[out]), kind="stable")]
+    x, y, is_brink = x[order], y[order], is_brink[order]
     before = np.arange(-1, len(x) - 1)
-    apart = (x - x[before]) ** 2 + (y - y[before]) ** 2 > (1e-3 * radius) ** 2
+    apart = (x - x[before]) ** 2 + (y - y[before]) ** 2 > (APART * radius) ** 2
     count = np.count_nonzero(apart)
     if count < 3:
         raise ValueError(f"ends: wanted three or more apart from each other, got {count}")
-    return Domain(np.array([x[apart], y[apart]]).T)
+    return Domain(np.array([x[apart], y[apart]]).T, is_brink[apart] if is_brink.any() else None)
 
 
 def hull_domain(points: ArrayLike, radius: float) -> Domain:

@@ -78,7 +78,7 @@ class Geometry(HeightField):
             Frame(scale * turn @ self.frame.origin + shift, turn @ self.frame.axes),
             scale * self.radius,
             self.polynomial.scaled(scale),
-            Domain(scale * self.domain.ends),
+            self.domain.scaled(scale),
             self.residual,
         )
 

@@ -162,16 +162,21 @@ class MongePatch(HeightField):
         return self._evaluate(x, y, [(0, 0)])[0]
 
     def _evaluate(self, x: ArrayLike, y: ArrayLike, orders: list[tuple[int, int]]) -> Array:
-        """The derivatives of `orders` (dx, dy), (m, ...): rows x^i, times tables of a_ij, times y^j."""
-        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        powers = self.degree + 1
-        table = np.zeros((powers, powers))
+        """The derivatives of `orders` (dx, dy), (m, ...): tables of a_ij, times x^i, times y^j."""
+        x_array, y_array = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        if x_array.shape != y_array.shape:
+            x_array, y_array = np.broadcast_arrays(x_array, y_array)
+        count = self.degree + 1
+        table = np.zeros((count, count))
         i, j = exponents(2, self.degree).T
-        table[i, j] = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
-        tables = [_derive(powers, dx) @ table @ _derive(powers, dy).T for dx, dy in orders]
-        x_powers, y_powers = (np.vander(v.ravel(), powers, increasing=True) for v in (x_array, y_array))
-        rows = (x_powers @ np.hstack(tables)).reshape(-1, len(orders), powers)
-        return np.einsum("nmj,nj->mn", rows, y_powers).reshape(len(orders), *x_array.shape)
+        table[j, i] = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
+        tables = [_derive(count, dy) @ table @ _derive(count, dx).T for dx, dy in orders]
+        powers = np.ones((count, 2, x_array.size))
+        powers[1] = x_array.ravel(), y_array.ravel()
+        for k in range(2, count):
+            np.multiply(powers[k - 1], powers[1], out=powers[k])
+        rows = (np.concatenate(tables) @ powers[:, 0]).reshape(len(orders), count, -1)
+        return np.einsum("mjn,jn->mn", rows, powers[:, 1]).reshape(len(orders), *x_array.shape)
 
 
 @cache

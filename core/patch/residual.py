@@ -125,6 +125,35 @@ def cholesky(matrix: Array) -> Array:
     return lower
 
 
+def cholesky_in_place(matrix: Array) -> Array:
+    """The diagonal of a triangular factor, which takes the place of the matrix (m, m): its upper triangle."""
+    from scipy.linalg.lapack import dpotrf
+
+    dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    return matrix.reshape(-1)[:: len(matrix) + 1]
+
+
+def solved_definite(matrix: Array, right: Array) -> Array:
+    """matrix^-1 @ right, of a positive definite matrix (m, m), whose lower triangle is used up, and (m,)."""
+    from scipy.linalg.lapack import dposv
+
+    _, found, failed = dposv(matrix.T, right, lower=0, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    solution: Array = found
+    return solution
+
+
+def inverse_definite(matrix: Array) -> Array:
+    """matrix^-1 of a positive definite matrix (m, m), whose lower triangle is used up."""
+    from scipy.linalg.lapack import dpotri
+
+    upper: Array = dpotri(cholesky(matrix).T, lower=0, overwrite_c=1)[0]
+    upper += upper.T
+    upper.flat[:: len(upper) + 1] *= 0.5
+    return upper
+
+
 def whitened(places: Array, factor: Array, terms: Array, told: Array) -> tuple[Array, Array]:
     """Residual.whitened by the two factors, of terms (27, n) and k(places, p), (m, n), or of sums of such."""
     told = solved(places, told)

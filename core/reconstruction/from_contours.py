@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import (
     LARGEST,
+    Array,
     finite_array,
     list_of,
     number,
@@ -28,7 +29,7 @@ METHODS = ("bayes", *PAPER_METHODS)
 # lambda L^2: of TAGC the paper's 9.99/mm^2 at L = 10 mm; quadratic variation in the paper is subject to
 # f = 0, which 1e5 comes near.
 WEIGHTS = {"tagc": 1e3, "quadratic-variation": 1e5}
-STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache
+STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache (benchmarks.speed)
 
 
 def reconstruct(
@@ -69,7 +70,7 @@ def reconstruct(
     (-1.0, -1.0, 'ok')
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
-    options = _options(method, degree, noise, weight, solver, radius)
+    options = options_of(method, degree, noise, weight, solver, radius)
     touch = _given(list_of("contours", contours, Contour), strokes, options)
     (result,) = fitted_stack(p[None], [touch], up[None], options)
     if isinstance(result, DegenerateCurvesError):
@@ -98,7 +99,7 @@ def reconstruct_many(
     ValueError for bad arguments.
     """
     p = finite_array("points", points, (None, 3), LARGEST)
-    options = _options(method, degree, noise, weight, solver, radius)
+    options = options_of(method, degree, noise, weight, solver, radius)
     lists = list_of("contours_list", contours_list, Sequence)  # type: ignore[type-abstract]
     beside = [()] * len(lists) if strokes_list is None else list_of("strokes_list", strokes_list, Sequence)  # type: ignore[type-abstract]
     for name, given in (("contours_list", lists), ("strokes_list", beside)):
@@ -109,6 +110,13 @@ def reconstruct_many(
     touches = [
         _given(list_of("contours", c, Contour), s, options) for c, s in zip(lists, beside, strict=True)
     ]
+    return fitted(p, touches, up, options)
+
+
+def fitted(
+    points: Array, touches: Sequence[Given], outward: Array, options: Options
+) -> list[Reconstruction | DegenerateCurvesError]:
+    """What `reconstruct_many` gives for arguments that are in order, (n, 3), n touches and (n, 3)."""
     # Touches of like size together: a stack has room for its longest contour in all places.
     sizes = [touch.size for touch in touches]
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
@@ -120,19 +128,20 @@ def reconstruct_many(
         while order:
             count = max(1, STACK // max(sizes[order[0]], 1))
             chosen, order = order[:count], order[count:]
-            found = fitted_stack(p[chosen], [touches[i] for i in chosen], up[chosen], options)
+            found = fitted_stack(points[chosen], [touches[i] for i in chosen], outward[chosen], options)
             results.update(zip(chosen, found, strict=True))
-    return [results[i] for i in range(len(p))]
+    return [results[i] for i in range(len(touches))]
 
 
-def _options(
+def options_of(
     method: str,
     degree: int | str,
     noise: float | None,
     weight: float | None,
     solver: str,
-    radius: float | None,
+    radius: float | None = None,
 ) -> Options:
+    """The options of a fit. Raises ValueError for bad ones."""
     for name, value, choices in (("method", method, METHODS), ("solver", solver, SOLVERS)):
         if not isinstance(value, str) or value not in choices:
             raise ValueError(f"{name}: wanted one of {', '.join(choices)}, got {shown(value)}")
@@ -149,7 +158,7 @@ def _options(
 
 
 def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: Options) -> Given:
-    found = Given(contours, *gathered(strokes))
+    found = Given(contours, *gathered(strokes, contours))
     if len(found.strokes) and options.method != "bayes":
         raise ValueError(
             f'strokes: wanted none with "{options.method}", which is a method of contours: take "bayes"'

@@ -14,16 +14,16 @@ from ..bayes.contradiction import contradiction, measured_normals
 from ..bayes.joint_fit import posterior_of
 from ..bayes.posterior import FREE, Posterior, terms_to
 from ..contours.contour import Contour
-from ..contours.curves import besides_point, has_measured_normals
+from ..contours.curves import Curves, besides_point, curves_through, has_measured_normals, misses, stacked
 from ..contours.local_geometry import Frame
 from ..paper import least_squares
 from ..patch.domain import Domain
-from ..patch.geometry import Geometry, fit_error, similarity, total_absolute_curvature
+from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.residual import Residual
 from .status import doubt
 
-MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at most.
+MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at most (benchmarks.patch_mesh).
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +34,12 @@ class Reconstruction:
     patch : equation (1) of the degree asked for, in the frame
     contours : what was fitted, in the world
     strokes : contacts beside them that were fitted, in the world, (n, 3); means of neighbors, of many
-    misses : at which distance each of the c curves passes the reference point, and its deviation, (c, 2)
     accuracy : standard deviation of a contact, at least, in units of L
     method : of the fit
     converged : whether its solver did
     joint_posterior : what "bayes" has found
     known_height_std : mean_height_std, where it is known already
+    known_curves : the contours as Curves of one touch, in the world, where they are known already
 
     All else follows from these, once it is asked for.
     """
@@ -47,13 +47,13 @@ class Reconstruction:
     geometry: Geometry
     patch: MongePatch
     contours: tuple[Contour, ...]
-    misses: Array
     accuracy: float
     method: str
     converged: bool = True
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     joint_posterior: Posterior | None = None
     known_height_std: float | None = None
+    known_curves: Curves | None = None
 
     @property
     def frame(self) -> Frame:
@@ -81,6 +81,12 @@ class Reconstruction:
         curves = [contour.points - self.frame.origin for contour in self.contours]
         beside = self.strokes - self.frame.origin
         return np.vstack([*(r[besides_point(r)[1]] for r in curves), beside]) @ self.frame.axes
+
+    @cached_property
+    def misses(self) -> Array:
+        """At which distance each of the c curves passes the reference point, and its deviation, (c, 2)."""
+        curves = self.known_curves or curves_through(*stacked(self.frame.origin[None], [self.contours]))
+        return misses(curves)[0, : len(self.contours)]
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -168,15 +174,20 @@ class Reconstruction:
         return self.blind / terms_to(self.patch.degree)
 
     @cached_property
+    def _departures(self) -> Array:
+        """|dz| of the contacts, (n,)."""
+        x, y, z = self.contacts.T
+        return np.abs(self.height(x, y) - z)
+
+    @property
     def fit_error(self) -> float:
         """(6), the mean of |dz| over the contacts."""
-        return fit_error(self.geometry, self.contacts)
+        return float(self._departures.mean())
 
     @property
     def typical_miss(self) -> float:
         """The median of |dz| over the contacts, which outlying ones do not change."""
-        x, y, z = self.contacts.T
-        return float(np.median(np.abs(self.height(x, y) - z)))
+        return float(np.median(self._departures))
 
     @cached_property
     def total_absolute_curvature(self) -> float:
@@ -203,8 +214,8 @@ class Reconstruction:
             patch=self.patch.scaled(scale),
             contours=tuple(contour.moved(scale, turn, start, end) for contour in self.contours),
             strokes=end + scale * (self.strokes - start) @ turn.T,
-            misses=scale * self.misses,
             known_height_std=None,
+            known_curves=None,
         )
 
     @property
@@ -214,11 +225,12 @@ class Reconstruction:
 
     @property
     def message(self) -> str:
-        """The status in a sentence, with advice; and the blind directions."""
+        """The status in a sentence, with advice; and whether directions are undefined, or blind."""
         _, message = self._verdict
+        if self.posterior.is_round:
+            message += " The curvatures are alike, so there are no principal directions."
         if self.blind:
-            verb = "is" if self.blind == 1 else "are"
-            terms = terms_to(self.patch.degree)
+            verb, terms = "is" if self.blind == 1 else "are", terms_to(self.patch.degree)
             message += f" {self.blind} of {terms} coefficients {verb} invisible to these planes."
         return message
 

@@ -20,7 +20,7 @@ from .from_contours import METHODS
 from .result import Reconstruction
 
 VERSION = 2
-ORTHONORMAL = 1e-6
+ORTHONORMAL = 1e-6  # Axes of a file may be in single precision.
 LEAST_PIVOT = 1e-3  # A residual's factor has no smaller pivot; its priors leave ten times as much.
 COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Coefficients of the degrees there are.
 
@@ -46,11 +46,11 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
             "polynomial": _polynomial_dict(r.geometry.polynomial),
             "residual": None if residual is None else _residual_dict(residual),
             "domain": r.domain.ends.tolist(),
+            "brinks": None if r.domain.brinks is None else r.domain.brinks.tolist(),
         },
         "patch": _polynomial_dict(r.patch),
         "contours": [_plain(vars(contour)) for contour in r.contours],
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
-        "misses": r.misses.tolist(),
         "posterior": None if posterior is None else _plain(posterior._asdict()),
     }
 
@@ -88,7 +88,6 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         geometry=_geometry(_of(d, "geometry")),
         patch=_polynomial(_of(d, "patch")),
         contours=contours,
-        misses=finite_array("misses", _of(d, "misses") if contours else np.empty((0, 2)), (len(contours), 2)),
         accuracy=number("accuracy", _of(d, "accuracy"), least=0.0),
         method=method,
         converged=bool(_of(d, "converged")),
@@ -114,12 +113,15 @@ def _geometry(d: Any) -> Geometry:
     axes = finite_array("axes", _of(frame, "axes"), (3, 3))
     if np.abs(axes.T @ axes - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(axes) < 0.0:
         raise ValueError("axes: wanted a right-handed frame of unit vectors, got another matrix")
-    residual = _of(d, "residual")
+    residual, brinks = _of(d, "residual"), _of(d, "brinks")
+    ends = finite_array("domain", _of(d, "domain"), (None, 2))
+    if brinks is not None:
+        brinks = finite_array("brinks", brinks, (len(ends),)) != 0.0
     return Geometry(
         Frame(finite_array("origin", _of(frame, "origin"), (3,), LARGEST), axes),
         radius,
         _polynomial(_of(d, "polynomial")),
-        closed_spline_domain(finite_array("domain", _of(d, "domain"), (None, 2)), radius),
+        closed_spline_domain(ends, radius, brinks),
         None if residual is None else _residual(residual),
     )
 

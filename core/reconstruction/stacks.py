@@ -13,10 +13,10 @@ from ..bayes.joint_fit import joint_fit
 from ..bayes.posterior import Posterior
 from ..bayes.rough_fit import rough_fit
 from ..contours.contour import Contour
-from ..contours.curves import Curves, misses
+from ..contours.curves import Curves
 from ..contours.local_geometry import DegenerateCurvesError, Frame
 from ..paper.by_method import coefficients
-from ..patch.domain import Domain, hull_domain
+from ..patch.domain import hull_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import DEGREE, MongePatch
 from ..patch.residual import Residual
@@ -35,14 +35,14 @@ class Options(NamedTuple):
     radius: float | None  # of strokes alone
 
 
-class _Touch(NamedTuple):
+class _Parts(NamedTuple):
     """What a patch follows from: the curves of one touch, in the frame; all but the radius in its unit."""
 
     frame: Frame
     radius: float
     curves: Curves
     strokes: Array  # (m, 3)
-    misses: Array  # Distances of the curves from the point, and their deviations, (c, 2).
+    known: Curves  # The same as a stack of one, in the world.
     k1: float
     k2: float
     accuracy: float
@@ -76,21 +76,20 @@ def fitted_stack(
     return [error or _result(next(found), c, options) for error, c in zip(errors, contours, strict=True)]
 
 
-def _fitted(start: Start, options: Options) -> list[_Touch]:
+def _fitted(start: Start, options: Options) -> list[_Parts]:
     """Touches in the Darboux frames that the method finds."""
     fit, curves, places = _fit(start, options), start.curves, start.curves.present[0].size
     along = curves.along / fit.radii[:, None, None]
     curvatures = fit.radii[:, None, None] * (curves.curvatures @ fit.axes)
     local = fit.contacts[:, :places].reshape(curves.points.shape)
     curves = Curves(local, curves.present, along, fit.tangents, curvatures)
-    missed = misses(curves)
     return [
-        _Touch(
+        _Parts(
             Frame(fit.points[i], fit.axes[i]),
             float(fit.radii[i]),
             curves.at(i),
             fit.contacts[i, places : places + len(start.strokes[i])],
-            missed[i],
+            start.curves.at([i]),
             float(start.k1[i]),
             float(start.k2[i]),
             float(start.stds[i] / fit.radii[i]),
@@ -136,6 +135,7 @@ def _with_residuals(start: Start, fit: _Fit, posteriors: Posterior, weights: Arr
         weights,
         posteriors.scaled(1.0 / farthest),
         start.stds / radii,
+        start.told,
         (start.tangents[:, None] @ axes)[:, 0],
         _normals(start.curves, axes, contacts),
         through=not start.alone,
@@ -181,10 +181,10 @@ def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
 
 
 def _result(
-    touch: _Touch, contours: Sequence[Contour], options: Options
+    touch: _Parts, contours: Sequence[Contour], options: Options
 ) -> Reconstruction | DegenerateCurvesError:
     try:
-        domain = domain_of(touch.curves) if contours else hull_domain(touch.strokes[:, :2], 1.0)
+        domain = domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)
     except ValueError:
         return DegenerateCurvesError(
             "the curves end in fewer than three places apart from each other, so they bound no patch: "
@@ -201,15 +201,15 @@ def _result(
         patch = touch.posterior.patch(touch.degree)
     scale = touch.radius
     surface = patch if touch.posterior is None else touch.posterior.patch(DEGREE)
-    domain = Domain(domain.ends * scale)
+    domain = domain.scaled(scale)
     return Reconstruction(
         Geometry(touch.frame, scale, surface.scaled(scale), domain, touch.residual),
         patch.scaled(scale),
         tuple(contours),
-        scale * touch.misses[: len(contours)],
         accuracy=touch.accuracy,
         method=options.method,
         converged=converged,
         strokes=touch.frame.to_world(scale * touch.strokes),
         joint_posterior=touch.posterior,
+        known_curves=touch.known,
     )

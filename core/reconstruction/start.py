@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.posterior import Posterior
-from ..contours.contour import Contour
+from ..contours.contour import BRINKS, Contour
 from ..contours.curves import Curves, curves_through, stacked
 from ..contours.local_geometry import (
     DegenerateCurvesError,
@@ -21,9 +21,9 @@ from ..contours.local_geometry import (
     surface_normals,
 )
 from ..contours.thinning import thinned
-from ..patch.domain import Domain, closed_spline_domain
+from ..patch.domain import BRINK, Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
-from .strokes import STRIPS, FirstFrame, first_frame, means
+from .strokes import STRIPS, FirstFrame, first_frame, means, unit_in
 
 MOST_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
 
@@ -59,6 +59,7 @@ class Start(NamedTuple):
     curves: Curves  # relative to the points, in the world
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
+    told: NDArray[np.bool_]  # (b,), whether these are known to be all their noise; of means it is more
 
     @property
     def alone(self) -> bool:
@@ -97,17 +98,22 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     curves = curves.at(good)
     axes, k1, k2, radii = darboux_frames(curves, normals[good])
     local = curves.points @ axes[:, None] / radii[:, None, None, None]
-    strokes, stds = [], []
+    strokes, stds, told = [], [], []
     for row, i in enumerate(good):
         beside, size = given[i].strokes, 1
         if len(beside):
             beside = (beside - points[i]) @ axes[row] / radii[row]
-            beside, size = means(beside[_over(curves.at(row), local[row], beside)])
+            turned = replace(curves.at(row), points=local[row], tangents=curves.tangents[row] @ axes[row])
+            along = unit_in(axes[row], curves.tangents[row, 0])
+            beside, size = means(beside[_over(turned, touches[i], beside)], along)
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
         stds.append(_std(noise, max(size, min(sizes)), [*known, given[i].noise / math.sqrt(size)]))
-    first = Start(points[good], axes, k1, k2, radii, curves.tangents[:, 0], curves, strokes, np.array(stds))
+        told.append(not len(beside) and (noise is not None or None not in [c.noise for c in touches[i]]))
+    tangents = curves.tangents[:, 0]
+    noises = np.array(stds), np.array(told)
+    first = Start(points[good], axes, k1, k2, radii, tangents, curves, strokes, *noises)
     return first, touches, errors
 
 
@@ -116,10 +122,10 @@ def _std(noise: float | None, size: int, known: list[float]) -> float:
     return max(known) if noise is None else noise / math.sqrt(size)
 
 
-def _over(curves: Curves, local: Array, strokes: Array) -> NDArray[np.bool_]:
+def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArray[np.bool_]:
     """Which strokes (n, 3) are over the domain of curves, all in unit radius; none where they bound none."""
     try:
-        domain = domain_of(replace(curves, points=local))
+        domain = domain_of(curves, contours)
     except ValueError:
         return np.zeros(len(strokes), dtype=bool)
     return domain.contains(strokes[:, 0], strokes[:, 1]) & (np.abs(strokes[:, 2]) <= 1.0)
@@ -129,33 +135,30 @@ def strokes_start(
     points: Array, given: Sequence[Given], outward: Array, noise: float | None, radius: float | None
 ) -> Started:
     """What `curves_start` gives, of strokes alone."""
-    found = [
+    frames = [
         first_frame(touch.strokes - point, up, radius)
         for point, touch, up in zip(points, given, outward, strict=True)
     ]
     for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
-        first = found[i]
+        first = frames[i]
         if isinstance(first, FirstFrame) and gap > MOST_ROUNDING * first.radius:
-            found[i] = _coarse(gap, first.radius)
-    errors = [None if isinstance(first, FirstFrame) else first for first in found]
-    firsts = {i: first for i, first in enumerate(found) if isinstance(first, FirstFrame)}
+            frames[i] = _coarse(gap, first.radius)
+    errors = [None if isinstance(first, FirstFrame) else first for first in frames]
+    firsts = {i: first for i, first in enumerate(frames) if isinstance(first, FirstFrame)}
     none: list[list[Contour]] = [[] for _ in given]
     if not firsts:
         return None, none, errors
     good = list(firsts)
-    thin = [means(first.contacts) for first in firsts.values()]
+    thin = [means(first.contacts, first.along) for first in firsts.values()]
     stds = [
         _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
     ]
     axes = np.array([first.axes for first in firsts.values()])
     k1, k2, radii = np.array([(first.k1, first.k2, first.radius) for first in firsts.values()]).T
     curves = curves_through(*stacked(points[good], [[]] * len(good)))
-    strokes = [beside for beside, _ in thin]
-    return (
-        Start(points[good], axes, k1, k2, radii, axes[:, :, 0], curves, strokes, np.array(stds)),
-        none,
-        errors,
-    )
+    strokes, told = [beside for beside, _ in thin], np.zeros(len(good), dtype=bool)
+    start = Start(points[good], axes, k1, k2, radii, axes[:, :, 0], curves, strokes, np.array(stds), told)
+    return start, none, errors
 
 
 def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
@@ -167,13 +170,23 @@ def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
     return found
 
 
-def domain_of(curves: Curves) -> Domain:
-    """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing."""
+def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
+    """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing.
+
+    Where the surface ended before the first contact of a side, it ends at the point.
+    """
     last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
-    rows = np.arange(len(last))
-    before, after = curves.present[:, 0] & (curves.along[:, 0] < 0.0), curves.along[rows, last] > 0.0
-    ends = np.vstack([curves.points[before, 0], curves.points[rows, last][after & curves.present[:, 0]]])
-    return closed_spline_domain(ends[:, :2], 1.0)
+    rows, ahead = np.arange(len(last)), curves.tangents[:, :2]
+    there = curves.present[:, 0]
+    felt = np.array([there & (curves.along[:, 0] < 0.0), there & (curves.along[rows, last] > 0.0)])
+    ends = np.array([curves.points[rows, 0, :2], curves.points[rows, last, :2]])
+    brinks = np.zeros_like(felt)
+    for i, contour in enumerate(contours):
+        brinks[:, i] = [stop in BRINKS for stop in contour.stops or ("", "")]
+    at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
+    ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
+    counted = felt | at_point
+    return closed_spline_domain(ends[counted], 1.0, brinks[counted])
 
 
 def _coarse(gap: float, size: float) -> DegenerateCurvesError:

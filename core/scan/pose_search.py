@@ -21,7 +21,7 @@ from .sampling import spaced
 from .scanned_mesh import Mesh, corners_of, mesh_distances, mesh_of
 
 # What was felt is an array (2, n, 3): contacts, and the patch's unit normals there, in the frame.
-# Lengths are in units of the patch's radius.
+# Lengths are in units of the patch's radius. benchmarks.registration judges these and those of the mesh.
 SPACING = 0.1  # Spacing of the points that a polynomial is fitted to.
 MOST_POINTS = 400
 PLACE_SPACING = 0.2  # between the places that are tried

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points thinned to an even spacing: where to touch, for touches all over a surface."""
+"""Points at random or of an even spacing: where to touch, for touches all over a surface."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 
-SORTED_AT_ONCE = 100_000  # points that are sorted at once
+SORTED_AT_ONCE = 100_000  # points that are sorted at once (benchmarks.stability_map)
 JAMMED = 0.575  # points in a square of the spacing, once no more have room
 CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
 
@@ -45,6 +45,28 @@ def spaced_count(area: float, spacing: float) -> int:
     Random sequential adsorption), or 0.70 points in a square of the spacing; the grid leaves out a sixth.
     """
     return max(1, round(JAMMED * area / spacing**2))
+
+
+def scattered(
+    points: Array, triangles: NDArray[np.intp], count: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """`count` random points of a mesh, evenly by area, and its unit normals there, (count, 3) each.
+
+    points : (n, 3); triangles : (m, 3), counterclockwise from outside
+
+    Raises ValueError for a mesh without area.
+    """
+    corner, *others = (points[triangles[:, i]] for i in range(3))
+    sides = [other - corner for other in others]
+    normals = np.cross(*sides)
+    areas = np.linalg.norm(normals, axis=1)
+    if not areas.sum() > 0.0:
+        raise ValueError("triangles: wanted some with an area, got none")
+    chosen = rng.choice(len(areas), count, p=areas / areas.sum())
+    shares = rng.random((count, 2))
+    shares = np.where(shares.sum(axis=1, keepdims=True) > 1.0, 1.0 - shares, shares)
+    along = (share[:, None] * side[chosen] for share, side in zip(shares.T, sides, strict=True))
+    return sum(along, corner[chosen]), normals[chosen] / areas[chosen, None]
 
 
 def _one_a_cell(points: Array, size: float) -> NDArray[np.intp]:

@@ -4,6 +4,7 @@
 
 import heapq
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,8 +17,10 @@ from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 
 EXTRA = 9  # contours, as in the paper's Fig. 3
+# benchmarks.scans prints what is found with these.
 STEPS_A_RADIUS = 12  # Steps of such a contour in a radius.
 REACHES = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
+AT_ONCE = 5000  # vertices whose distances are found in one step, in some hundredths of a second
 HAIR = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.
 
 
@@ -51,21 +54,36 @@ def verify(
 
     Raises ValueError for bad numbers.
     """
+    *_, found = verifying(r, surface, vertices, extra=extra)
+    return found
+
+
+def verifying(
+    r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
+) -> Iterator[dict[str, float]]:
+    """`verify` step by step, none of them long: each yields what is known so far, the last all of it."""
     local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
+    found: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
+    found |= _spread("contact", distances(r.geometry, r.contacts))
+    misses = np.empty(len(local))
+    for start in range(0, len(local), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
+        misses[some] = distances(r.geometry, local[some])
+        yield found
     contours = _extra_contours(r, surface, extra)
     points = np.concatenate([np.empty((0, 3)), *contours])
-    found = {
-        **_spread("contact", distances(r.geometry, r.contacts)),
-        **_spread("vertex", distances(r.geometry, local)),
+    found |= {
+        **_spread("vertex", misses),
         "fit_error": r.fit_error,
         "extra_contours": sum(len(contour) > 0 for contour in contours),
         "extra_points": len(points),
         "total_absolute_curvature": r.total_absolute_curvature,
-        "overlap": _overlap(r, surface),
     }
+    yield found
+    found["overlap"] = _overlap(r, surface)
     if len(points):
         found["extra_fit_error"] = fit_error(r.geometry, points)
-    return {"contacts": len(r.contacts), "vertices": len(local)} | found
+    yield found
 
 
 def _spread(name: str, misses: Array) -> dict[str, float]:

@@ -12,14 +12,15 @@ from mathutils import Matrix
 
 from ... import core
 from ..probes import probe
-from ..probes.operators import is_unlocked, report_error, target_object
+from ..probes.in_slices import InSlices
+from ..probes.operators import is_unlocked, target_object
 from ..scene import patch_record
 from ..touch.surface import MeshSurface
 from ..touch.wording import registration_summary
 from .verify_operator import chosen_mesh
 
 POSES = 5
-HURRY = 0.1  # seconds between two looks at whether it is done
+HURRY = 0.02  # seconds between two looks at whether it is done
 
 
 class Search:
@@ -34,7 +35,7 @@ class Search:
         vertices, faces = MeshSurface(target, depsgraph).triangles()
         given = patch_record.reconstruction_of(patch), vertices, faces
         self.patch, self.target, self._matrix = patch.name, target.name, patch.matrix_world.copy()
-        self._found, self._error = None, None
+        self._found, self._error, self._begun = None, None, perf_counter()
         self._thread = threading.Thread(target=self._run, args=given, daemon=True)
         self._thread.start()
 
@@ -52,6 +53,15 @@ class Search:
         """Waits so long, or to the end; whether it is done."""
         self._thread.join(seconds)
         return not self._thread.is_alive()
+
+    def steps(self):
+        """Waits to the end; a generator, between whose steps a window may draw."""
+        while not self.wait(HURRY):
+            yield
+
+    @property
+    def seconds(self):
+        return perf_counter() - self._begun
 
     @property
     def poses(self):
@@ -91,7 +101,7 @@ def register_patch(patch, target, depsgraph, pose=1):
     return search.put(pose)
 
 
-class TACTILE_OT_register(bpy.types.Operator):
+class TACTILE_OT_register(InSlices, bpy.types.Operator):
     """Find where on a mesh the active patch belongs, by its contacts alone, and move it there"""
 
     bl_idname = "tactile.register"
@@ -119,54 +129,17 @@ class TACTILE_OT_register(bpy.types.Operator):
             return False
         return is_unlocked(cls, context)
 
-    def invoke(self, context, event):
-        try:
-            self._begin(context)
-        except ValueError as error:
-            return report_error(self, error)
-        self._timer = context.window_manager.event_timer_add(HURRY, window=context.window)
-        self._begun = perf_counter()
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        if event.type == "ESC":
-            self.cancel(context)
-            self.report({"INFO"}, "Stopped: the patch stays where it was")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        seconds = perf_counter() - self._begun
-        words = f'Looking for the patch on "{self._search.target}": {seconds:.0f} s     Esc: Stop'
-        context.workspace.status_text_set(words)
-        if not self._search.wait(0.0):
-            return {"RUNNING_MODAL"}
-        self.cancel(context)
-        return self._finish()
-
-    def cancel(self, context):
-        """Takes away all that shows that it is going on."""
-        context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
-
-    def execute(self, context):
-        try:
-            self._begin(context)
-        except ValueError as error:
-            return report_error(self, error)
-        self._search.wait()
-        return self._finish()
-
     def _begin(self, context):
         patch = probe.patch_near(context.view_layer.objects.active)
         target = target_object(context, self.target or chosen_mesh(context, patch))
         self._search = Search(patch, target, context.evaluated_depsgraph_get())
+        self._steps = self._search.steps()
 
-    def _finish(self):
-        try:
-            found = self._search.put(self.pose)
-        except ValueError as error:
-            return report_error(self, error)
+    def _done(self):
+        return f'Looking for the patch on "{self._search.target}": {self._search.seconds:.0f} s', None
+
+    def _finish(self, context):
+        found = self._search.put(self.pose)
         self.report({"WARNING"} if found["is_ambiguous"] else {"INFO"}, registration_summary(found))
         return {"FINISHED"}
 

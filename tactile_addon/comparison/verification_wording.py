@@ -43,14 +43,15 @@ def verification_columns(report):
 
 
 def verification_table(found, unit):
-    """Rows of a label and what a verification found for the mesh and for the contacts."""
+    """Rows of a label and what was found for the mesh and for the contacts, lengths without unit."""
+    symbol, bare = units.symbol(1, unit), ("", unit[1])
 
     def lengths(key):
-        return (_length(found, f"{what}_distance_{key}", unit) for what in ("vertex", "contact"))
+        return (_length(found, f"{what}_distance_{key}", bare) for what in ("vertex", "contact"))
 
     names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
     return [
-        ("Distance", "Mesh", "Contacts"),
+        (f"in {symbol}" if symbol else "Distance", "Mesh", "Contacts"),
         *((name, *lengths(key)) for name, key in names),
         ("Points", str(found["vertices"]), str(found["contacts"])),
     ]

@@ -9,12 +9,82 @@ from bpy.props import StringProperty
 from ... import core
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
-from ..probes.operators import is_unlocked, report_error, target_object
+from ..probes.in_slices import InSlices
+from ..probes.operators import is_unlocked, target_object
 from ..scene import mesh_data, patch_object, patch_record
 from ..touch.surface import MeshSurface
-from ..touch.touch_object import reachable
 from ..touch.touch_report import judgment
 from .verification_wording import verification_summary
+
+AT_ONCE = 2000  # vertices that are looked at in one step
+
+
+class Verification:
+    """The comparison of a patch object with a mesh object, in steps; nothing is changed before `write`.
+
+    done, count : how many of the vertices near the patch have been looked at, and how many there are
+
+    Raises ValueError, with a sentence, where that cannot be done.
+    """
+
+    def __init__(self, patch, target):
+        probe.require_unlocked(patch)
+        self._r = patch_record.reconstruction_of(patch)
+        self._patch, self.patch, self.target = patch.session_uid, patch.name, target.name
+        self._target, self._given = target.session_uid, _inputs(patch, target)
+        self._surface, self._found, self.done, self.count = None, {}, 0, 0
+
+    def look(self, depsgraph):
+        """Has the steps go on in the scene as it is now. Raises ValueError where it is another by now."""
+        patch, target = self._objects()
+        if _inputs(patch, target) != self._given:
+            raise ValueError(
+                f'"{self.patch}" or "{self.target}" was changed while it was verified: start again'
+            )
+        # Blender frees what it has evaluated when it evaluates again.
+        self._surface = MeshSurface(target, depsgraph, sound=self._surface is not None)
+
+    def ray_cast(self, *ray):
+        """Of the target, as MeshSurface has it."""
+        return self._surface.ray_cast(*ray)
+
+    def steps(self):
+        """Does all of it; a generator, which yields each few hundredths of a second."""
+        r = self._r
+        _, vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
+        self.count, seen = len(vertices), [np.empty((0, 3))]
+        yield
+        for start in range(0, self.count, AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            over = core.reachable(r.geometry, self, vertices[some], normals[some])
+            seen.append(vertices[some][over])
+            self.done = min(start + AT_ONCE, self.count)
+            yield
+        for found in core.verifying(r, self, np.vstack(seen)):
+            self._found = found
+            yield
+
+    def write(self):
+        """Gives the patch what was found: its deviations, and `verification` in its record."""
+        (patch, _), r, surface = self._objects(), self._r, self._surface
+        record = patch[patch_record.RECORD]
+        points, normals = _vertices(patch.data, r, r.radius / record["radius"])
+        deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
+        mesh_data.own_mesh(patch)
+        mesh_data.write(patch.data, "deviation", "FLOAT", deviations)
+        patch_object.recolor(patch)
+        record["verification"] = {"target": self.target, **self._found}
+        if record["status"] != "outdated":
+            mean = self._found.get("vertex_distance_mean", 0.0)
+            record.update(judgment(r, mean, record["ended"], self._found["vertices"]))
+        return record.to_dict()
+
+    def _objects(self):
+        """Patch and target. Raises ValueError where they are no longer there."""
+        found = {obj.session_uid: obj for obj in bpy.data.objects}
+        if self._patch not in found or self._target not in found:
+            raise ValueError(f'"{self.patch}" or "{self.target}" was deleted while it was verified')
+        return found[self._patch], found[self._target]
 
 
 def verify_patch(patch, target, depsgraph):
@@ -22,20 +92,18 @@ def verify_patch(patch, target, depsgraph):
 
     Raises ValueError, with a sentence and nothing changed, where that cannot be done.
     """
-    probe.require_unlocked(patch)
-    patch_record.require_whole(patch)
-    r, surface = patch_record.reconstruction_of(patch), MeshSurface(target, depsgraph)
-    _, vertices = reachable(surface, r)
-    found = core.verify(r, surface, vertices)
-    record = patch[patch_record.RECORD]
-    points, normals = _vertices(patch.data, r, r.radius / record["radius"])
-    deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
-    mesh_data.own_mesh(patch)
-    mesh_data.write(patch.data, "deviation", "FLOAT", deviations)
-    patch_object.recolor(patch)
-    record["verification"] = {"target": target.name, **found}
-    if record["status"] != "outdated":
-        record.update(judgment(r, found.get("vertex_distance_mean", 0.0), record["ended"]))
+    verification = Verification(patch, target)
+    verification.look(depsgraph)
+    for _ in verification.steps():
+        pass
+    verification.write()
+
+
+def _inputs(patch, target):
+    """What must stay while it goes on."""
+    return patch[patch_record.RECONSTRUCTION], *(
+        tuple(map(tuple, obj.matrix_world)) for obj in (patch, target)
+    )
 
 
 def _vertices(mesh, r, scale):
@@ -46,7 +114,7 @@ def _vertices(mesh, r, scale):
     return points, r.geometry.normal(points[:, 0], points[:, 1])
 
 
-class TACTILE_OT_verify(bpy.types.Operator):
+class TACTILE_OT_verify(InSlices, bpy.types.Operator):
     """Measure how far the active patch is from the mesh it was touched on, or from another selected mesh"""
 
     bl_idname = "tactile.verify"
@@ -69,17 +137,25 @@ class TACTILE_OT_verify(bpy.types.Operator):
             return False
         return is_unlocked(cls, context)
 
-    def execute(self, context):
+    def _begin(self, context):
         obj = context.view_layer.objects.active
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         if found is not None and is_pending(found):  # Completing it later would undo the verification.
             touch_again.refresh(found, context)
-        try:
-            target = target_object(context, self.target or chosen_mesh(context, patch))
-            verify_patch(patch, target, context.evaluated_depsgraph_get())
-        except ValueError as error:
-            return report_error(self, error)
-        record = patch[patch_record.RECORD].to_dict()
+        target = target_object(context, self.target or chosen_mesh(context, patch))
+        self._verification = Verification(patch, target)
+        self._steps = self._verification.steps()
+
+    def _check(self, context):
+        self._verification.look(context.evaluated_depsgraph_get())
+
+    def _done(self):
+        done, count = self._verification.done, self._verification.count
+        share = done / count if count else None
+        return f'Comparing with "{self._verification.target}": {done} of {count} vertices', share
+
+    def _finish(self, context):
+        record = self._verification.write()
         doubt, summary = verification_summary(record)
         self.report({"WARNING"} if doubt else {"INFO"}, summary)
         return {"FINISHED"}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured contours in and patches out: File > Import, File > Export, and files dropped into a viewport."""
+"""Measured contours in: File > Import, and files dropped into a viewport."""
 
 from pathlib import Path
 
@@ -13,11 +13,10 @@ from bpy.props import (
     FloatVectorProperty,
     StringProperty,
 )
-from bpy_extras.io_utils import ExportHelper, ImportHelper
+from bpy_extras.io_utils import ImportHelper
 
-from ..probes import probe
-from ..probes.operators import make_active, report_error
-from ..scene import patch_object, patch_record
+from ..probes.operators import is_in_object_mode, make_active, report_error
+from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_solver
 from ..touch.units import length
 from ..touch.wording import fit_summary
@@ -45,16 +44,12 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
     unit: EnumProperty(name="Unit", description="What the numbers of the file measure", items=UNITS)
-    use_point: BoolProperty(
-        name="Given Reference Point",
-        description="Not the point nearest to all curves",
-        options={"SKIP_PRESET"},
-    )
     point: FloatVectorProperty(
         name="Reference Point",
         subtype="TRANSLATION",
-        description="Where the curves meet, exact, or a place among strokes; in units of the scene",
-        options={"SKIP_PRESET"},
+        description="Where the curves meet, exact, or a place among strokes; until it is set "
+        "that of the file, or the point nearest to all curves",
+        options={"SKIP_SAVE", "SKIP_PRESET"},
     )
     strokes: BoolProperty(
         name="Strokes",
@@ -68,17 +63,11 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         min=0.0,
         precision=4,
     )
-    use_outward: BoolProperty(
-        name="Given Outward Direction",
-        description="Not the mean of the normals, nor the side to which the surface bulges",
-        options={"SKIP_PRESET"},
-    )
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="A direction on the outer side of the surface",
-        default=(0.0, 0.0, 1.0),
-        options={"SKIP_PRESET"},
+        description="A direction on the outer side of the surface, for scripts; Flip chooses the other side",
+        options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
     )
     flip: BoolProperty(name="Flip", description="The other side is the outer one")
     noise: FloatProperty(
@@ -98,7 +87,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None
+        return is_in_object_mode(cls, context, "Contacts are imported")
 
     def invoke(self, context, event):
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.
@@ -128,81 +117,19 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         report = touched.report
         summary = fit_summary(report)
         if "misses" in report:
-            summary += f", their common point by {length(max(report['misses']))} at most"
+            summary += f"; curves miss their common point by {length(max(report['misses']))} at most"
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
     def _given(self, name):
-        """The vector, where its box is ticked or, by a script, it is set."""
-        use = f"use_{name}"
-        given = (
-            getattr(self, use)
-            if self.properties.is_property_set(use)
-            else self.properties.is_property_set(name)
-        )
-        return list(getattr(self, name)) if given else None
+        return list(getattr(self, name)) if self.properties.is_property_set(name) else None
 
     def draw(self, context):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(self, "unit")
-        for name in ("point", "outward"):
-            layout.prop(self, f"use_{name}")
-            if getattr(self, f"use_{name}"):
-                layout.prop(self, name)
-        for name in ("strokes", "radius", "flip", "noise", "normal_std"):
+        for name in ("unit", "point", "strokes", "radius", "flip", "noise", "normal_std"):
             layout.prop(self, name)
         draw_solver(layout, self)
-
-
-class _PatchExport(ExportHelper):
-    """Mixed into what writes the active patch, which may be active by its probe or contours."""
-
-    @classmethod
-    def poll(cls, context):
-        if probe.patch_near(context.view_layer.objects.active) is None:
-            cls.poll_message_set("Select a patch, its probe or its contours first")
-            return False
-        return True
-
-    def invoke(self, context, event):
-        if not self.filepath:
-            patch = probe.patch_near(context.view_layer.objects.active)
-            self.filepath = bpy.path.clean_name(patch.name) + self.filename_ext
-        return super().invoke(context, event)
-
-    def execute(self, context):
-        try:
-            self.write(probe.patch_near(context.view_layer.objects.active))
-        except (OSError, ValueError) as error:
-            return report_error(self, error)
-        self.report({"INFO"}, f'Wrote "{Path(self.filepath).name}"')
-        return {"FINISHED"}
-
-
-class TACTILE_OT_export_contacts(_PatchExport, bpy.types.Operator):
-    """Write the contacts of the active patch as CSV, in the scene's units"""
-
-    bl_idname = "tactile.export_contacts"
-    bl_label = "Export Contact Data"
-    filename_ext = ".csv"
-    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
-
-    def write(self, patch):
-        r = patch_record.reconstruction_of(patch)
-        contact_file.write(self.filepath, contact_file.contacts_of(r))
-
-
-class TACTILE_OT_export_patch(_PatchExport, bpy.types.Operator):
-    """Write the active patch as JSON: polynomial, frame, domain, covariance; as core.from_dict reads it"""
-
-    bl_idname = "tactile.export_patch"
-    bl_label = "Export Patch"
-    filename_ext = ".json"
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
-
-    def write(self, patch):
-        contact_file.write_patch(self.filepath, patch_record.reconstruction_of(patch))
 
 
 class TACTILE_FH_contacts(bpy.types.FileHandler):
@@ -220,15 +147,5 @@ def draw_import(self, context):
     self.layout.operator(TACTILE_OT_import_contacts.bl_idname, text="Contact Data (.csv, .ply)")
 
 
-def draw_export(self, context):
-    self.layout.operator(TACTILE_OT_export_contacts.bl_idname, text="Contact Data (.csv)")
-    self.layout.operator(TACTILE_OT_export_patch.bl_idname, text="Tactile Patch (.json)")
-
-
-CLASSES = (
-    TACTILE_OT_import_contacts,
-    TACTILE_OT_export_contacts,
-    TACTILE_OT_export_patch,
-    TACTILE_FH_contacts,
-)
-MENUS = (("TOPBAR_MT_file_import", draw_import), ("TOPBAR_MT_file_export", draw_export))
+CLASSES = (TACTILE_OT_import_contacts, TACTILE_FH_contacts)
+MENUS = (("TOPBAR_MT_file_import", draw_import),)

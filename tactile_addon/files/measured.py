@@ -106,24 +106,24 @@ def _fit(source, contacts, point, outward, flip, normal_std, options):
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     require_single(result)
-    seconds, axes = perf_counter() - start, reference_axes(result.frame.axes[:, 2])
-    report = {
-        "source": source,
-        "method": options["method"],
+    given = {"source": source, "unit": unit, "curves": len(contours), "strokes": len(strokes)}
+    missed = {} if distances is None else {"misses": distances.tolist()}
+    seconds = {"fit": perf_counter() - start}
+    return Touched(None, result, given | _report(result, options["method"]) | missed | {"seconds": seconds})
+
+
+def _report(result, method):
+    """What the fit has found, as a report of a touch has it."""
+    axes = reference_axes(result.frame.axes[:, 2])
+    return {
+        "method": method,
         "degree": result.patch.degree,
         **reconstruction_report(result),
-        "unit": unit,
-        "curves": len(contours),
-        "strokes": len(strokes),
         "axes": axes.tolist(),
         "vertices": 0,
         **measures(result),
         "suggested_plane": suggestion_report(result, axes),
-        "seconds": {"fit": seconds},
     }
-    if distances is not None:
-        report["misses"] = distances.tolist()
-    return Touched(None, result, report)
 
 
 def _mean_normal(contours):

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contacts of a .ply file: its vertices, with normals, curves and times where it has them."""
+"""Contacts of a .ply file: its vertices, with normals, curves and times where it has them.
+
+Blender's own import keeps these attributes too, but in single precision, and takes NaN and words for 0.
+"""
 
 import numpy as np
 
@@ -24,7 +27,24 @@ PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">
 
 def read(name, path):
     """The Contacts of a file. Raises ValueError, with its name and place, for what is none."""
-    data = path.read_bytes()
+    table = _vertices(name, path.read_bytes())
+    points = np.column_stack([table[key] for key in POINT_COLUMNS])
+    wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN is nowhere
+    if wild.any():
+        at = f"{name}, contact {np.argmax(wild) + 1}"
+        raise ValueError(f"{at}: wanted finite coordinates up to {LARGEST:g}, got others")
+    normals = (
+        np.column_stack([table[key] for key in NORMAL_COLUMNS]) if set(NORMAL_COLUMNS) <= set(table) else None
+    )
+    labels, titles = _in_order(table.get("curve", np.ones(len(points))))
+    contours = contact_rows.contours(name, labels, points, normals, table.get("time"), titles)
+    if not {"curve", "time"} & set(table):  # bare points, in no order
+        return Contacts([], "", strokes=tuple(contours))
+    return Contacts(contours, "")
+
+
+def _vertices(name, data):
+    """The values of each property of the vertices, by its name."""
     end = data.find(b"end_header")
     lines = [line.split() for line in data[: max(end, 0)].decode("latin-1").splitlines()]
     order = PLY_ORDERS.get(lines[1][1]) if len(lines) > 1 and len(lines[1]) > 1 else None
@@ -41,20 +61,7 @@ def read(name, path):
         rows = np.frombuffer(data, fields, count, below + start)
     else:
         rows = _ply_rows(name, len(lines) + 2 + start, text[start : start + count], fields)
-    table = {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
-    points = np.column_stack([table[key] for key in POINT_COLUMNS])
-    wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN is nowhere
-    if wild.any():
-        at = f"{name}, contact {np.argmax(wild) + 1}"
-        raise ValueError(f"{at}: wanted finite coordinates up to {LARGEST:g}, got others")
-    normals = (
-        np.column_stack([table[key] for key in NORMAL_COLUMNS]) if set(NORMAL_COLUMNS) <= set(table) else None
-    )
-    labels, titles = _in_order(table.get("curve", np.ones(count)))
-    contours = contact_rows.contours(name, labels, points, normals, table.get("time"), titles)
-    if not {"curve", "time"} & set(table):  # bare points, in no order
-        return Contacts([], "", strokes=tuple(contours))
-    return Contacts(contours, "")
+    return {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
 
 
 def _in_order(labels):

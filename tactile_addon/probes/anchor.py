@@ -61,7 +61,7 @@ def is_carried(probe):
     if not is_attached(probe) or probe.constraints or probe.animation_data:
         return False
     own, there = np.array(probe.matrix_basis), np.array(probe.matrix_world)
-    return not np.allclose(own, there, rtol=1e-6, atol=1e-6 * np.abs(there).max())
+    return not np.abs(own - there).max() <= 2e-6 * np.abs(there).max()
 
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
@@ -94,7 +94,8 @@ def seat(probe, extent):
     now = _seat(to_world, place) if can_have_children(probe) else np.full(SEAT, np.nan)
     rounding = np.finfo(np.float32).eps * np.abs([to_world[:3, 3], place[:3, 3]]).max()
     off = np.linalg.norm(to_world[:3, :3] @ (now[:3] - kept[:3]))
-    is_there = off <= CLOSE * extent + 8.0 * rounding and np.allclose(now[3:], kept[3:], atol=CLOSE)
+    is_turned = not np.abs(now[3:] - kept[3:]).max() <= CLOSE  # of NaN too
+    is_there = off <= CLOSE * extent + 8.0 * rounding and not is_turned
     return kept.tolist() if is_there else now.tolist()
 
 
@@ -117,6 +118,11 @@ def keep(probe, patch):
     patch[BASE] = [*_numbers(target.matrix_world), *_numbers(patch_record.matrix_of(axes, origin))]
 
 
+def let_go(patch):
+    """The target of the probe is another now, which does not carry a patch of the one before."""
+    patch.pop(BASE, None)
+
+
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def carry(probe, patch):
     """Where the target was moved since, the patch's record is that of a patch that was moved with it.
@@ -124,8 +130,10 @@ def carry(probe, patch):
     Not where the probe has been left behind, as one that is not the target's child.
     """
     target, report, base = probe.tactile_probe.target, patch_record.report_of(patch), patch.get(BASE)
-    if target is None or report is None or base is None or report["source"] != target.name:
+    if target is None or report is None or base is None:
         return
+    if report["source"] != target.name:  # it was renamed
+        report["source"] = target.name
     if not is_attached(probe) and seat(probe, report.get("extent", 0.0)) != list(probe.tactile_probe.seat):
         return
     before, frame = np.reshape(base, (2, 4, 4))

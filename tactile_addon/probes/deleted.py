@@ -21,16 +21,12 @@ def forget_target(probe):
     """
     settings = probe.tactile_probe
     target = settings.target
+    if target is None or target.users_scene:
+        return
+    if not target.is_editable or target.override_library is not None:
+        _follow(probe, target)
+        return
     # One that has never been touched is a script's, which may be about to put it into the scene.
-    # A library's is not deleted by being in no scene of this file.
-    if target is None or target.users_scene or not target.is_editable:
-        return
-    if target.override_library is not None:
-        # One that was made for the probe's sake and is in no scene: the library's own is there to be touched.
-        if target.override_library.reference.users_scene:
-            with silent():
-                settings.target = target.override_library.reference
-        return
     if not settings.digest:
         return
     settings.lost = f"{target.session_uid} {int(anchor.is_attached(probe))} {target.name}"
@@ -40,6 +36,26 @@ def forget_target(probe):
     if not target.users:
         _deleted.add(target.session_uid)
         _remove_soon()
+
+
+def _follow(probe, target):
+    """A library's object is not deleted by being in no scene of this file: its override may be, or its own.
+
+    The override takes the place of the object it is of, unless it was made for the probe's sake alone.
+    """
+    if target.override_library is not None:
+        there = [target.override_library.reference]
+    else:
+        overrides = (obj for obj in bpy.data.objects if obj.override_library is not None)
+        there = [obj for obj in overrides if obj.override_library.reference == target]
+    found = next((obj for obj in there if obj.users_scene), None)
+    if found is None:
+        return
+    was_attached = anchor.is_attached(probe)
+    with silent():
+        probe.tactile_probe.target = found
+    if was_attached:
+        anchor.attach(probe, found)
 
 
 def _remove_soon():

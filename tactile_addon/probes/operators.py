@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator behind the menu entry, the scripts and the command line."""
 
+from contextlib import contextmanager
+
 import bpy
 from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 
@@ -47,21 +49,21 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None
+        return is_in_object_mode(cls, context, "Patches are fitted") and has_target(cls, context)
 
     def execute(self, context):
         given = self.properties.is_property_set
         depsgraph = context.evaluated_depsgraph_get()
         try:
-            obj = target_object(context, self.target)
-            touched = touch(
-                obj,
-                depsgraph,
-                list(self.location) if given("location") else list(context.scene.cursor.location),
-                outward=list(self.outward) if given("outward") else None,
-                tolerance=self.tolerance if given("tolerance") else None,
-                **touch_arguments(self),
-            )
+            with waiting(context):
+                touched = touch(
+                    target_object(context, self.target),
+                    depsgraph,
+                    list(self.location) if given("location") else list(context.scene.cursor.location),
+                    outward=list(self.outward) if given("outward") else None,
+                    tolerance=self.tolerance if given("tolerance") else None,
+                    **touch_arguments(self),
+                )
         except ValueError as error:
             return report_error(self, error)
         touched = completed(touched)
@@ -89,9 +91,9 @@ def report_error(operator, error):
 
 
 def target_object(context, name):
-    """The object to touch: by name, or the active one, or what the active patch or map was touched on."""
+    """The object to touch: by name, or the active one, or what the active patch, map or surface is of."""
     obj = context.view_layer.objects.active
-    record, found = record_of(obj) or (obj and obj.get(patch_record.MAP_RECORD)), probe_of(obj)
+    record, found = record_of(obj) or patch_record.touched_record(obj), probe_of(obj)
     if not name and found is not None and found.tactile_probe.target is not None:
         return found.tactile_probe.target
     if not name and record is not None:
@@ -105,6 +107,41 @@ def target_object(context, name):
             else "No object is active: select the mesh object to touch"
         )
     return obj
+
+
+@contextmanager
+def waiting(context):
+    """Shows in a window that it takes a while: the first touch of a large mesh builds a tree of its faces."""
+    if bpy.app.background or context.window is None:
+        yield
+        return
+    context.window.cursor_modal_set("WAIT")
+    try:
+        yield
+    finally:
+        context.window.cursor_modal_restore()
+
+
+def is_in_object_mode(operator, context, what):
+    """For its poll, where a person would start it; a script may leave any mode alone."""
+    if context.area is None or context.mode == "OBJECT":
+        return True
+    operator.poll_message_set(f"{what} in Object Mode: leave this mode first")
+    return False
+
+
+def has_target(operator, context):
+    """For its poll in a 3D viewport: whether the active object can be touched, or leads to one that can."""
+    if context.area is None or context.area.type != "VIEW_3D":  # a script may name one
+        return True
+    try:
+        obj = target_object(context, "")
+    except ValueError as error:
+        operator.poll_message_set(sentence(error))
+        return False
+    if obj.type != "MESH":
+        operator.poll_message_set("Select the mesh object to touch")
+    return obj.type == "MESH"
 
 
 def is_unlocked(operator, context):

@@ -20,8 +20,8 @@ from bpy.props import (
 
 from ..scene import patch_object, patch_record
 from ..scene.family import children_of
-from ..touch.settings import OVERRIDABLE, TouchSettings, changed
-from . import anchor
+from ..touch.settings import OVERRIDABLE, TouchSettings, changed, is_silent
+from . import anchor, number_fields
 
 DIGEST = "tactile_digest"
 
@@ -46,9 +46,16 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     )
     live: BoolProperty(
         name="Live",
-        description="Touch again whenever the probe, its target or a number changes",
+        description="Touch again whenever the probe, its target or a number changes. Off, the patch is "
+        "frozen: it stays as it is until Touch Again, the button beside this",
         default=True,
         update=changed,
+        override=OVERRIDABLE,
+    )
+    show_handles: BoolProperty(
+        name="Handles",
+        description="Show what is dragged: the point, the sampling planes and the extent",
+        default=True,
         override=OVERRIDABLE,
     )
     active_plane: IntProperty(
@@ -92,11 +99,17 @@ def _appointed(settings, context):
 
 def _chosen(settings, context):
     """A probe that was a child of its target is one of the new target."""
+    if is_silent():  # it is the one that it was, come back, or under another roof
+        forget_targets()
+        return
     settings.lost, probe, record = "", settings.id_data, record_of(settings.id_data)
     before = None if record is None else bpy.data.objects.get(record["source"])
     if settings.target not in (None, before) and before is not None and probe.parent == before:
         anchor.attach(probe, settings.target)
     settings.digest = ""  # Nothing has been felt of this one.
+    patch = patch_of(probe)
+    if patch is not None and patch.is_editable and settings.target != before:
+        anchor.let_go(patch)
     _appointed(settings, context)
 
 
@@ -105,8 +118,9 @@ def is_probe(obj):
 
 
 def is_result(obj):
-    """Whether it is a patch, the contours of one, or a map."""
-    return any(key in obj for key in (patch_record.RECORD, patch_record.CONTOURS, patch_record.MAP_RECORD))
+    """Whether it is a patch, the contours of one, a map or a whole object that was touched."""
+    keys = patch_record.RECORD, patch_record.CONTOURS, patch_record.MAP_RECORD, patch_record.ATLAS_RECORD
+    return any(key in obj for key in keys)
 
 
 def patch_of(probe):
@@ -188,16 +202,18 @@ def make(context, target):
 def _show(obj):
     """Colors a patch by what it is set to show now; the range of what it showed is none of that."""
     obj.pop(patch_record.RANGE, None)
-    if patch_record.RECORD not in obj or not obj.is_editable:
-        return
-    try:
-        patch_record.require_whole(obj)
-    except ValueError:  # Verifying and exporting it say so.
-        return
-    patch_object.recolor(obj)
+    if obj.is_editable and patch_record.is_colored(obj):  # else verifying and exporting it say so
+        patch_object.recolor(obj)
+
+
+def _found(probe, name):
+    """What the last touch had in the place of a length that is 0."""
+    record = record_of(probe)
+    return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
 
 
 def register():
+    TactileProbe.__annotations__.update(number_fields.annotations(_found))
     bpy.utils.register_class(TactileProbe)
     bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
     bpy.types.Object.tactile_colors = EnumProperty(

@@ -13,7 +13,7 @@ from ..touch import units
 from ..touch.settings import MOST_PLANES
 from ..touch.wording import added_planes
 from . import probe, touch_again
-from .operators import is_unlocked, report_error
+from .operators import is_unlocked, report_error, waiting
 
 
 class _ProbeOperator:
@@ -101,7 +101,7 @@ def _add(settings, suggested):
 
 
 class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
-    """Feel along one plane less"""
+    """Remove this sampling plane"""
 
     bl_idname = "tactile.remove_plane"
     bl_label = "Remove Plane"
@@ -120,6 +120,11 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
     def execute(self, context):
         found = probe.probe_of(context.view_layer.objects.active)
         settings = found.tactile_probe
+        count = settings.plane_count
+        if self.plane >= count:
+            return report_error(
+                self, ValueError(f"There are {count} planes, 0 to {count - 1}: take one of them")
+            )
         for name in ("azimuths", "tilts"):
             values = list(getattr(settings, name))
             values.append(values.pop(self.plane))
@@ -137,7 +142,8 @@ class TACTILE_OT_update(_ProbeOperator, bpy.types.Operator):
 
     def execute(self, context):
         found = probe.probe_of(context.view_layer.objects.active)
-        touch_again.refresh(found, context)
+        with waiting(context):
+            touch_again.refresh(found, context)
         if found.tactile_probe.message:
             self.report({"WARNING"}, found.tactile_probe.message)
         return {"FINISHED"}

@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..scene import patch_object, patch_record
-from ..touch.evaluated_mesh import checksum_of, is_disabled
+from ..touch.evaluated_mesh import checksum_of, is_disabled, require_invertible
 from ..touch.settings import touch_arguments
 from ..touch.touch_object import completed, touch
 from ..touch.wording import sentence
@@ -99,7 +99,8 @@ def _left_contours(probe):
     """The contours of a patch that was deleted, where they are still there."""
     lines = (obj for obj in bpy.data.objects if patch_record.CONTOURS in obj and obj.parent is None)
     own = (obj for obj in lines if obj.is_editable and obj.data is not None)
-    return next((obj for obj in own if obj.data.get(DIGEST) == probe.tactile_probe.digest), None)
+    touched, _ = _signed(probe.tactile_probe)
+    return next((obj for obj in own if obj.data.get(DIGEST) == touched), None)
 
 
 def touch_at(probe, depsgraph, complete, **more):
@@ -111,6 +112,8 @@ def touch_at(probe, depsgraph, complete, **more):
         raise ValueError(
             f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
         )
+    if anchor.is_attached(probe):  # what is scaled to nothing there is so here
+        require_invertible(settings.target.name, np.array(settings.target.matrix_world)[:3, :3])
     if not anchor.can_have_children(probe):
         raise ValueError("the probe is scaled to nothing, or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)
@@ -130,26 +133,36 @@ def touch_at(probe, depsgraph, complete, **more):
 
 
 def _is_there(target, depsgraph):
-    return depsgraph.view_layer.objects.get(target.name) == target
+    objects = depsgraph.view_layer.objects
+    named = objects.get(target.name)
+    # A library's object and its override may both be there, under one name.
+    return named == target or (named is not None and any(obj == target for obj in objects))
 
 
 def may_be_outdated(probe, there):
-    """Whether something it belongs to has been taken away or back; `there`: what is in the view layer."""
-    settings, made = probe.tactile_probe, _made(probe)
+    """Whether something it belongs to has been taken away or back, or has another name.
+
+    there : what is in the view layer
+    """
+    settings, made, record = probe.tactile_probe, _made(probe), record_of(probe)
     return (
         bool(settings.message)
         or not made
+        or (record is not None and settings.target is not None and record["source"] != settings.target.name)
         or settings.target not in there
         or is_disabled(settings.target)
-        or any(block.get(DIGEST) != settings.digest for block in made)
+        or any(block.get(DIGEST) != _signed(settings)[0] for block in made)
     )
 
 
 def is_outdated(probe, depsgraph):
     """Whether its patch is another than its inputs ask for, by the probe or by what it is made of."""
-    digest = _digest(probe, depsgraph)
-    stored = [probe.tactile_probe.digest, *(block.get(DIGEST) for block in _made(probe))]
-    return any(other != digest for other in stored)
+    (touched, name), made = _signed(probe.tactile_probe), _made(probe)
+    meshes = patch_object.meshes(patch_of(probe))
+    if name != probe.name and (not meshes or any(mesh.users > 1 for mesh in meshes)):
+        return True  # a copy, which has no patch yet, or none of its own
+    digest = _digest(probe, depsgraph, anchor.seat(probe, _extent_of(probe)))
+    return any(other != digest for other in (touched, *(block.get(DIGEST) for block in made)))
 
 
 def _made(probe):
@@ -161,27 +174,36 @@ def _made(probe):
 def _sign(probe, depsgraph):
     measure_shape(probe.tactile_probe, depsgraph)
     probe.tactile_probe.seat = anchor.seat(probe, _extent_of(probe))
-    digest = _digest(probe, depsgraph)
-    probe.tactile_probe.digest = digest
+    digest = _digest(probe, depsgraph, list(probe.tactile_probe.seat))
+    probe.tactile_probe.digest = f"{digest} {probe.name}"
     for block in _made(probe):
         block[DIGEST] = digest
 
 
-def _digest(probe, depsgraph):
-    """The digest of all inputs of a touch, and of the probe's name, which a copy does not share.
+def _signed(settings):
+    """The digest of the last touch, and the name of the probe then, which a copy does not share."""
+    digest, _, name = settings.digest.partition(" ")
+    return digest, name
+
+
+def _digest(probe, depsgraph, seat):
+    """The digest of all inputs of a touch; names are none of them.
+
+    seat : where it is on its target, see anchor.seat
 
     The checksum of the target's vertices is dear, so it is kept, and taken anew where they may have changed.
     """
     settings, target = probe.tactile_probe, probe.tactile_probe.target
-    inputs = [probe.name, *anchor.seat(probe, _extent_of(probe)), touch_arguments(settings)]
+    inputs = [*seat, touch_arguments(settings)]
     if target is not None:
-        inputs += [_is_there(target, depsgraph), is_disabled(target), settings.shape]
+        _, _, checksum = settings.shape.partition(" ")
+        inputs += [_is_there(target, depsgraph), is_disabled(target), checksum]
     return hashlib.sha1(repr(inputs).encode()).hexdigest()
 
 
 def _extent_of(probe):
-    record = record_of(probe)
-    return 0.0 if record is None else record.get("extent", 0.0)
+    patch = patch_of(probe)
+    return 0.0 if patch is None else patch_record.extent_of(patch)
 
 
 def measure_shape(settings, depsgraph, reshaped=None):
@@ -190,7 +212,7 @@ def measure_shape(settings, depsgraph, reshaped=None):
     reshaped : a dict, which gets the checksum of each that is asked for, so that it is taken once
     """
     target, reshaped = settings.target, {} if reshaped is None else reshaped
-    if target is None or (settings.shape.startswith(f"{target.name} ") and target not in reshaped):
+    if target is None or (settings.shape.startswith(f"{target.session_uid} ") and target not in reshaped):
         return
     checksum = reshaped.get(target)
     if checksum is None:
@@ -200,7 +222,7 @@ def measure_shape(settings, depsgraph, reshaped=None):
             checksum = 0
         if target in reshaped:
             reshaped[target] = checksum
-    settings.shape = f"{target.name} {checksum:08x}"
+    settings.shape = f"{target.session_uid} {checksum:08x}"
 
 
 def refresh(probe, context):

@@ -49,7 +49,8 @@ def _is_whole(obj):
 
 def _get(obj):
     power, unit = unit_of_range(obj, bpy.context.scene)
-    return obj.get(RANGE, 0.0) / unit[1] ** power
+    limit = obj.get(RANGE) or (report_of(obj) or {}).get("color_limit", 0.0)
+    return limit / unit[1] ** power
 
 
 def _set(obj, value):
@@ -63,6 +64,7 @@ def register():
         description="Where the colors of the patch end, in the unit of the legend; 0 for what its values ask",
         min=0.0,
         precision=4,
+        step=0.1,  # small beside what is common in a unit that suits the patch
         get=_get,
         set=_set,
     )

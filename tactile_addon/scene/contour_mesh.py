@@ -2,11 +2,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The contours as a mesh, tubes and contacts; the contacts of strokes; and the rim of the patch."""
 
+from functools import lru_cache
+from typing import NamedTuple
+
 import numpy as np
 
-from .mesh_data import fill
+from .mesh_data import fill, write
 
 CORNERS, RIM = 96, 0.6  # points around a patch, and how thick its rim is beside a contour
+CONTACT = 3.6  # how far the tips of a contact are from it, beside the thickness of a contour
+TIPS = np.vstack([np.eye(3), -np.eye(3)])
+FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
+SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # of a square tube
+
+
+class _Form(NamedTuple):
+    """What is alike in all such meshes of so many contacts.
+
+    before, after : of each point of a path, in the row of all paths, those that its tube runs between
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    triangles: np.ndarray
+    contour: np.ndarray
+    contact: np.ndarray
 
 
 def fill_contours(mesh, touched):
@@ -16,30 +36,39 @@ def fill_contours(mesh, touched):
     `contact` the contacts along one, and is -1 on the tubes and the rim. They show what the
     patch keeps in its reconstruction.
     """
-    frame, thickness = touched.result.frame, 0.009 * touched.result.radius
-    parts = []  # (number of the contour, points, triangles, index of the contact)
-    for number, contour in enumerate(touched.result.contours):
-        path = frame.to_local(contour.points)
-        across = frame.axes.T @ contour.plane_normal if contour.plane_normal is not None else _across(path)
-        parts.append((number, *_tube(path, across, thickness), np.full(4 * len(path), -1)))
-        parts.append((number, *_contacts(path, thickness)))
-    if len(touched.result.strokes):
-        parts.append((-1, *_contacts(frame.to_local(touched.result.strokes), thickness)))
-    rim = _rim(touched.result)  # by which a flat patch is told from a flat face below it
-    parts.append((-1, *_tube(rim, np.array([0.0, 0.0, 1.0]), RIM * thickness), np.full(4 * len(rim), -1)))
-    points, triangles, contour_index, contact_index = [], [], [], []
-    count = 0
-    for number, mesh_points, mesh_triangles, contact in parts:
-        points.append(mesh_points)
-        triangles.append(mesh_triangles + count)
-        contour_index.append(np.full(len(mesh_points), number))
-        contact_index.append(contact)
-        count += len(mesh_points)
-    attributes = [
-        ("contour", "INT", np.concatenate(contour_index)),
-        ("contact", "INT", np.concatenate(contact_index)),
+    result = touched.result
+    frame, thickness = result.frame, 0.009 * result.radius
+    contours, strokes = [frame.to_local(each.points) for each in result.contours], result.strokes
+    across = [
+        _across(path) if contour.plane_normal is None else frame.axes.T @ contour.plane_normal
+        for path, contour in zip(contours, result.contours, strict=True)
     ]
-    fill(mesh, np.vstack(points), np.vstack(triangles), attributes)
+    paths = [*contours, _rim(result)]  # by which a flat patch is told from a flat face below it
+    form = _form(tuple(len(path) for path in paths), len(strokes))
+    lengths = [len(path) for path in paths]
+    sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM]), lengths)
+    tubes = _tubes(np.vstack(paths), np.repeat([*across, (0.0, 0.0, 1.0)], lengths, axis=0), sizes, form)
+    contacts = np.vstack([*contours, frame.to_local(strokes)])
+    octahedra = contacts[:, None] + CONTACT * thickness * TIPS
+    points = np.vstack([tubes, octahedra.reshape(-1, 3)])
+    if _has_form(mesh, form):
+        write(mesh, "position", "FLOAT_VECTOR", points)
+        mesh.update()
+    else:
+        attributes = [("contour", "INT", form.contour), ("contact", "INT", form.contact)]
+        fill(mesh, points, form.triangles, attributes)
+
+
+def _has_form(mesh, form):
+    """Whether it is of contours of as many contacts: then its points are all that changes."""
+    contact = mesh.attributes.get("contact")
+    if contact is None or (contact.data_type, contact.domain) != ("INT", "POINT"):
+        return False
+    if (len(contact.data), len(mesh.loops)) != (len(form.contact), form.triangles.size):
+        return False
+    found = np.empty(len(form.contact), dtype=np.int32)
+    contact.data.foreach_get("value", found)
+    return np.array_equal(found, form.contact)
 
 
 def _rim(result):
@@ -49,33 +78,42 @@ def _rim(result):
     return np.column_stack([edge, result.height(*edge.T)])
 
 
-def _tube(path, across, thickness):
-    """A square tube along a path (n, 3) in the plane normal to `across`: points (4n, 3) and triangles."""
-    ahead = np.vstack([path[1:], path[-1:]]) - np.vstack([path[:1], path[:-1]])
-    up = np.cross(across, ahead)
-    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-30)
-    corners = [path + thickness * (a * up + b * across) for a, b in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
-    ring = np.arange(4)
-    a = (4 * np.arange(len(path) - 1)[:, None] + ring).ravel()
-    b = (4 * np.arange(len(path) - 1)[:, None] + (ring + 1) % 4).ravel()
-    triangles = np.vstack([np.column_stack([a, b, b + 4]), np.column_stack([a, b + 4, a + 4])])
-    return np.stack(corners, axis=1).reshape(-1, 3), triangles
-
-
 def _across(path):
     """A direction in the tangent plane across a path (n, 3) that is in no plane."""
     x, y, _ = path[-1] - path[0]
     return np.array([-y, x, 0.0]) / max(np.hypot(x, y), 1e-30)
 
 
-def _contacts(path, thickness):
-    """Octahedra at contacts (n, 3): points, triangles, and which contact each point is of."""
-    return *_octahedra(path, 3.6 * thickness), np.repeat(np.arange(len(path)), 6)
+def _tubes(paths, across, sizes, form):
+    """The corners (4n, 3) of square tubes along paths (n, 3), in the planes normal to `across` (n, 3)."""
+    ahead = paths[form.after] - paths[form.before]
+    up = np.cross(across, ahead)
+    up *= (sizes / np.maximum(np.linalg.norm(up, axis=1), 1e-30))[:, None]
+    aside = sizes[:, None] * across
+    return (paths[:, None] + SIDES[:, :1] * up[:, None] + SIDES[:, 1:] * aside[:, None]).reshape(-1, 3)
 
 
-def _octahedra(centers, radius):
-    """An octahedron at each of centers (n, 3): points (6n, 3) and triangles (8n, 3)."""
-    tips = radius * np.vstack([np.eye(3), -np.eye(3)])
-    faces = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
-    offsets = 6 * np.arange(len(centers))
-    return (centers[:, None] + tips).reshape(-1, 3), (offsets[:, None, None] + faces).reshape(-1, 3)
+@lru_cache(maxsize=8)
+def _form(lengths, strokes):
+    """Of contours of these numbers of contacts, and a rim, the last; and of so many strokes."""
+    paths = [slice(end - n, end) for n, end in zip(lengths, np.cumsum(lengths), strict=True)]
+    at, felt = np.arange(sum(lengths)), lengths[:-1]
+    before, after, quads = at - 1, at + 1, []
+    for path in paths:
+        before[path.start], after[path.stop - 1] = path.start, path.stop - 1
+        a = 4 * at[path][:-1, None] + np.arange(4)
+        b = 4 * at[path][:-1, None] + np.roll(np.arange(4), -1)
+        quads += [np.stack([a, b, b + 4], axis=-1), np.stack([a, b + 4, a + 4], axis=-1)]
+    count = sum(felt) + strokes
+    octahedra = 4 * len(at) + 6 * np.arange(count)[:, None, None] + FACES
+    of_felt = np.repeat(np.arange(len(felt)), np.array(felt, dtype=np.intp))
+    of_tubes = np.concatenate([of_felt, np.full(lengths[-1], -1)])
+    of_contacts = np.concatenate([of_felt, np.full(strokes, -1)])
+    number = np.concatenate([np.arange(n) for n in (*felt, strokes)])
+    return _Form(
+        before,
+        after,
+        np.vstack([each.reshape(-1, 3) for each in (*quads, octahedra)]),
+        np.concatenate([np.repeat(of_tubes, 4), np.repeat(of_contacts, 6)]),
+        np.concatenate([np.full(4 * len(at), -1), np.repeat(number, 6)]),
+    )

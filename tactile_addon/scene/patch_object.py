@@ -14,6 +14,7 @@ from .contour_mesh import fill_contours
 from .family import add
 from .mesh_data import emission, fill, own_mesh, values, write
 from .patch_record import (
+    ATLAS_RECORD,
     COLOR,
     CONTOURS,
     POWERS,
@@ -105,10 +106,10 @@ def meshes(patch):
 
 
 def recolor(patch):
-    """Colors the patch by what it is set to show, and keeps their range in its record."""
+    """Colors a patch or whole object by what it is set to show, and keeps their range in its record."""
     own_mesh(patch)
     shown, mesh = patch.tactile_colors, patch.data
-    shades, record = values(mesh, shown), patch[RECORD]
+    shades, record = values(mesh, shown), patch[RECORD if RECORD in patch else ATLAS_RECORD]
     floor = FLOOR * record["radius"] ** POWERS[shown]
     limit = patch.get(RANGE) or colors.symmetric_range(shades, floor)
     mesh.attributes[COLOR].data.foreach_set("color", colors.diverging(shades, limit).ravel())

@@ -16,6 +16,7 @@ VERDICT = "tactile_verdict"  # and the one with its status and message while the
 COLOR = "curvature_color"
 RANGE = "tactile_color_range"  # and the one with the range of its colors, where that is given
 MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
+ATLAS_RECORD = "tactile_object"  # The one of a whole object that holds the report of its touches.
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
 QUANTITIES = [
@@ -51,10 +52,30 @@ def report_of(patch):
     return report if good and numbers[0] > 0.0 and all(isinstance(word, str) for word in words) else None
 
 
+def extent_of(patch):
+    """The extent in its report, which needs not be whole; 0 where there is none."""
+    try:
+        extent = patch[RECORD]["extent"]
+    except (KeyError, TypeError):
+        return 0.0
+    return extent if isinstance(extent, float) else 0.0
+
+
 def require_whole(patch):
     """Raises ValueError where the patch object has been edited into what is none."""
     if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
         raise ValueError(f'"{patch.name}" was edited, and is no whole patch any more: touch again')
+
+
+def is_colored(obj):
+    """Whether it is a patch or a whole object that can show its colors, as nobody has edited it."""
+    is_one = ATLAS_RECORD in obj or (RECORD in obj and report_of(obj) is not None)
+    return is_one and obj.type == "MESH" and _is_whole(obj.data)
+
+
+def touched_record(obj):
+    """The report of touches all over an object, a map's or a whole one's; None for all else."""
+    return None if obj is None else obj.get(MAP_RECORD) or obj.get(ATLAS_RECORD)
 
 
 def _is_whole(mesh):

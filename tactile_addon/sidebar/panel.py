@@ -7,28 +7,30 @@ import bpy
 from ..comparison.register_operator import TACTILE_OT_register
 from ..comparison.verification_wording import verification_rows, verification_table
 from ..comparison.verify_operator import TACTILE_OT_verify
-from ..probes import probe
+from ..probes import number_fields, probe
 from ..probes.probe_operators import (
     TACTILE_OT_add_plane,
-    TACTILE_OT_add_planes,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
     TACTILE_OT_share_range,
     TACTILE_OT_show_colors,
     TACTILE_OT_update,
 )
-from ..scene import color_range, patch_record
+from ..scene import patch_record
 from ..scene.viewports import shows_colors
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
 from ..touch.settings import draw_chosen, draw_sensor, draw_solver
-from ..touch.wording import registration_summary
+from ..touch.wording import registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
-from .patch_rows import found_values, main_rows, other_rows, plane_rows, verdict
+from ..whole_object.object_operator import TACTILE_OT_touch_all_over
+from ..whole_object.object_report import object_rows
+from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
+HELP = "Click a mesh: a probe feels it there, and keeps a patch of its surface with its curvatures"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
 
 
@@ -50,6 +52,8 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         found = probe.probe_of(obj)
         if found is None:
             layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
+            if obj is None or not probe.is_result(obj):
+                draw_sentence(context, layout, HELP, "INFO")
             return
         row = layout.row(align=True)
         move = row.row(align=True)
@@ -59,17 +63,27 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         row.operator(TACTILE_OT_delete.bl_idname, text="", icon="TRASH")
         settings = found.tactile_probe
         layout.prop(settings, "target")
-        chosen = found_values(probe.record_of(found), context.scene)
-        draw_chosen(layout, settings, "extent", chosen)
+        record = probe.record_of(found)
+        chosen = found_values(record, context.scene)
+        fields = {}  # The override of a library's probe keeps numbers, not ways to show them.
+        if found.override_library is None:
+            fields = number_fields.fields(_size_of(settings.target, record))
+        draw_chosen(layout, settings, "extent", chosen, fields)
         _draw_planes(layout, settings)
         row = layout.row()
-        row.prop(settings, "live")
+        row.prop(settings, "live", text="Live" if settings.live else "Live (Frozen)")
         row.operator(TACTILE_OT_update.bl_idname, text="", icon="FILE_REFRESH")
         for identifier, title, draw in (("sensor", "Sensor", draw_sensor), ("solver", "Fit", draw_solver)):
             header, body = layout.panel(f"TACTILE_PT_{identifier}", default_closed=True)
             header.label(text=title)
             if body:
-                draw(body, settings, chosen)
+                draw(body, settings, chosen, fields)
+
+
+def _size_of(target, record):
+    if target is not None:
+        return max(target.dimensions)
+    return 0.0 if record is None else record["radius"]
 
 
 def _draw_planes(layout, settings):
@@ -77,7 +91,7 @@ def _draw_planes(layout, settings):
     heading = column.row(align=True)
     for text in ("Azimuth", "Tilt"):
         heading.label(text=text)
-    heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
+    heading.label(icon="BLANK1")  # above the buttons of the rows
     for i in range(settings.plane_count):
         row = column.row(align=True)
         row.use_property_split = False
@@ -113,8 +127,11 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if is_outdated and found is not None:
             layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
         _draw_colors(context, layout, patch, "tactile_colors")
-        _draw_range(context, layout, patch, record)
-        draw_rows(layout, main_rows(record, unit), active=not is_outdated)
+        _draw_range(layout, patch)
+        _draw_shown(layout, found, patch)
+        if is_outdated:  # of these numbers
+            layout.label(text="Last Touch")
+        draw_rows(context, layout, main_rows(record, unit), active=not is_outdated)
         _draw_details(context, layout, record, unit)
         layout.operator(TACTILE_OT_verify.bl_idname, icon="VIEWZOOM")
         if found is None:
@@ -123,11 +140,25 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if "registration" in record:
             draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
         if "verification" in record:
-            _draw_verification(layout, record["verification"], unit)
+            column = layout.column()
+            column.active = not is_outdated
+            _draw_verification(context, column, record["verification"], unit)
         if found is not None:
-            draw_rows(layout, plane_rows(record, unit), active=not is_outdated)
+            draw_rows(context, layout, plane_rows(record, unit), active=not is_outdated)
             layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
-            layout.operator(TACTILE_OT_add_planes.bl_idname, icon="PLUS")
+
+
+class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
+    bl_idname = "TACTILE_PT_object"
+    bl_label = "Whole Object"
+
+    def draw_active(self, context, layout, obj):
+        layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
+        if obj is None or patch_record.ATLAS_RECORD not in obj:
+            return
+        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on It", icon="EYEDROPPER").new = True
+        _draw_colors(context, layout, obj, "tactile_colors")
+        draw_rows(context, layout.box(), object_rows(obj[patch_record.ATLAS_RECORD]))
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
@@ -138,14 +169,15 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
         if obj is None or patch_record.MAP_RECORD not in obj:
             return
+        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Map", icon="EYEDROPPER").new = True
         _draw_colors(context, layout, obj, "tactile_map_colors")
         record = obj[patch_record.MAP_RECORD]
         box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
-        draw_rows(box, map_rows(record, unit))
+        draw_rows(context, box, map_rows(record, unit))
         medians = median_rows(record, unit)
         if medians:
             box.label(text="Medians of the Patches")
-            draw_rows(box, medians)
+            draw_rows(context, box, medians)
 
 
 def _draw_details(context, layout, record, unit):
@@ -157,7 +189,7 @@ def _draw_details(context, layout, record, unit):
     header, body = layout.panel("TACTILE_PT_numbers", default_closed=True)
     header.label(text="More Numbers")
     if body:
-        draw_rows(body, other_rows(record, unit), active=record["status"] != "outdated")
+        draw_rows(context, body, other_rows(record, unit), active=record["status"] != "outdated")
 
 
 def _draw_colors(context, layout, obj, name):
@@ -167,18 +199,26 @@ def _draw_colors(context, layout, obj, name):
         layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
 
 
-def _draw_range(context, layout, patch, record):
+def _draw_range(layout, patch):
     """Where the colors end, and a button for one range on all patches."""
-    power, unit = color_range.unit_of_range(patch, context.scene)
     row = layout.row(align=True)
     row.use_property_split = False
-    word = "Range" if patch_record.RANGE in patch else "Range (Auto)"
-    ends = units.say(record["color_limit"], power, unit)
-    row.prop(patch, "tactile_range", text=f"{word} {ends}", translate=False)
+    row.prop(patch, "tactile_range", text="Range" if patch_record.RANGE in patch else "Range (Auto)")
     row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
 
 
-def _draw_verification(layout, found, unit):
+def _draw_shown(layout, found, patch):
+    """What is drawn with a patch, and may hide it."""
+    lines = patch_record.contours_of(patch)
+    row = layout.row(align=True)
+    row.use_property_split = False
+    if lines is not None:
+        row.prop(lines, "hide_viewport", text="Contours", toggle=1, invert_checkbox=True)
+    if found is not None:
+        row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)
+
+
+def _draw_verification(context, layout, found, unit):
     layout.label(text=found["target"], icon="MESH_DATA", translate=False)
     column = layout.column(align=True)
     for label, *values in verification_table(found, unit):
@@ -187,7 +227,7 @@ def _draw_verification(layout, found, unit):
         row = row.row(align=True)
         for value in values:
             row.label(text=value)
-    draw_rows(layout, verification_rows(found, unit))
+    draw_rows(context, layout, verification_rows(found, unit))
 
 
-PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_map)
+PANELS = (TACTILE_PT_probe, TACTILE_PT_result, TACTILE_PT_object, TACTILE_PT_map)

@@ -1,33 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the sidebar says of a patch: a verdict in plain words, the numbers that matter, and all others."""
-
-from collections import Counter
+"""The numbers that the sidebar says of a patch: those that matter, and all others."""
 
 from ..touch import units
-from ..touch.touch_report import ENDS
 
 FLAT = 2.0  # A curvature within so many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 NOTHING = 1e-6  # of a number in unit radius
-
-
-def verdict(record, unit):
-    """Whether a patch is good, and what to do where it is not, in a sentence."""
-    if record["status"] == "outdated":
-        return "Outdated: touch again"
-    if record["status"] != "ok":
-        doubt = record["message"].partition(". ")[0].rstrip(".")
-        return f"Doubtful: {doubt.rpartition(': ')[2]}"
-    stops = Counter(stop for pair in record.get("stops", ()) for stop in pair)
-    early = [(count, ENDS[stop]) for stop, count in stops.most_common() if ENDS.get(stop, "").endswith(SHORT)]
-    if early:
-        count, where = early[0]
-        return f"Good, with {count} of {stops.total()} half curves cut short {where}"
-    return f"Good: heights to ± {units.say(record['height_std'], 1, unit)}"
-
-
-SHORT = ("edge", "crease", "turns away")  # what ends a curve that could be felt on
 
 
 def main_rows(record, unit):
@@ -36,10 +15,11 @@ def main_rows(record, unit):
     if record["is_verified"]:
         mesh = _said(record, "vertex_distance_mean", 1, unit) if record["vertices"] else "–"
     return [
-        ("κ1 Curvature", _measured(record, "k1", -1, unit)),
-        ("κ2 Curvature", _measured(record, "k2", -1, unit)),
+        ("Principal Curvatures", ""),
+        ("κ1", _measured(record, "k1", -1, unit)),
+        ("κ2", _measured(record, "k2", -1, unit)),
         ("Height", "± " + units.say(record["height_std"], 1, unit)),
-        ("Mesh to Patch", mesh),
+        ("Misfit", mesh),
     ]
 
 
@@ -54,7 +34,7 @@ def other_rows(record, unit):
         ("Fit Error", _said(record, "fit_error", 1, unit)),
     ]
     if record["is_verified"] and record["vertices"]:
-        rows.append(("Farthest Vertex", _said(record, "vertex_distance_max", 1, unit)))
+        rows.append(("Farthest", _said(record, "vertex_distance_max", 1, unit)))
     lengths = ("extent", "step") if "step" in record else ("radius",)
     rows += [(key.title(), units.say(record[key], 1, unit)) for key in lengths]
     return [*rows, ("Degree", str(record["degree"])), ("Contacts", str(record["contacts"]))]
@@ -98,4 +78,4 @@ def _radii(record, unit):
     for number in (1, 2):
         k, std = record[f"k{number}"], record[f"k{number}_std"]
         if abs(k) > FLAT * std and abs(k) * record["radius"] > FLATTEST:
-            yield f"1/κ{number} Radius", units.say(1.0 / k, 1, unit, std / k**2)
+            yield f"1/κ{number}", units.say(1.0 / k, 1, unit, std / k**2)

@@ -56,6 +56,7 @@ def manual_map():
         "bpy.ops.tactile.pick": "the-first-patch.html",
         "bpy.ops.tactile.verify": "verify.html",
         "bpy.ops.tactile.register": "register.html",
+        "bpy.ops.tactile.export_report": "report.html",
         "bpy.ops.tactile.stability_map": "stability-map.html",
         "bpy.types.object.tactile_map_colors": "stability-map.html",
         "bpy.ops.tactile*": "probe.html",

@@ -9,22 +9,22 @@ import bpy
 from bpy.props import StringProperty
 
 TIPS = {
-    "κ1 Curvature": "The smaller principal curvature at the point; below 0 the surface bulges outward",
-    "κ2 Curvature": "The larger principal curvature at the point; below 0 the surface bulges outward",
+    "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
+    "κ2": "The larger principal curvature at the point; below 0 the surface bulges outward",
     "Height": "Standard deviation of the patch's height: how well the contacts determine it",
-    "Mesh to Patch": "Mean distance of the mesh's vertices over the patch from it; … until you let go",
-    "1/κ1 Radius": "Radius of the circle that bends like the surface along the first principal direction",
-    "1/κ2 Radius": "Radius of the circle that bends like the surface along the second principal direction",
+    "Misfit": "Mean distance of the mesh's vertices over the patch from it; … until you let go",
+    "1/κ1": "Radius of the circle that bends like the surface along the first principal direction",
+    "1/κ2": "Radius of the circle that bends like the surface along the second principal direction",
     "K Gaussian": "Gaussian curvature, κ1 times κ2: above 0 on domes and bowls, below 0 on saddles",
     "H Mean": "Mean curvature, the mean of κ1 and κ2",
     "Shape Index": "1 on caps, 0.5 on ridges, 0 on saddles, -0.5 in ruts, -1 in cups",
     "Curvedness": "How strongly the surface bends, whatever its shape",
     "Fit Error": "Mean distance in height of the contacts from the patch",
-    "Farthest Vertex": "Greatest distance of the mesh's vertices over the patch from it",
+    "Farthest": "Greatest distance of the mesh's vertices over the patch from it",
     "Extent": "How far the longest half curve reaches from the point",
     "Radius": "How far the contacts reach from the point",
     "Step": "Distance between contacts",
-    "Degree": "Of the polynomial that describes the patch",
+    "Degree": "Degree of the polynomial that describes the patch",
     "Contacts": "How many contacts the patch was fitted to",
     "Suggested Plane": "Azimuth of the sampling plane that tells most of what is still open",
     "Would Bring": "Standard deviation of the height to expect with the suggested plane",
@@ -32,9 +32,14 @@ TIPS = {
     "Error on … More": "The same over contacts of more contours between the sampling planes, felt on it",
     "Total |K|": "Absolute Gaussian curvature summed over the patch: 0 where it is flat or rolled",
     "Overlap": "Share of the patch's area that has mesh below it",
+    "Touches": "How many touches the object took",
+    "Surface": "Closed where the object was felt all round",
+    "Rims Left": "Places from which touches could go on",
+    "Tolerance": "How well the height of each patch was to be known",
     "Points": "How many points of the mesh were touched",
     "Spacing": "Distance between the points that were touched",
     "Patches": "How many touches gave a patch",
+    "No Patch": "How many touches gave none, by the reason",
     "… in Doubt": "How many of these patches are in doubt",
 }
 
@@ -64,12 +69,17 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def draw_rows(layout, rows, active=True):
-    """Labels and values side by side, gray where they are not active."""
+def draw_rows(context, layout, rows, active=True):
+    """Labels and values side by side, gray where they are not active; a heading has no value."""
+    longest = max((len(label) for label, value in rows if value), default=0)
+    share = min(max((longest + 4) / _letters(context), 0.34), 0.66)
     column = layout.column(align=True)
     column.active = active
     for label, value in rows:
-        split = column.split(factor=0.43, align=True)
+        if not value:
+            column.label(text=label)
+            continue
+        split = column.split(factor=share, align=True)
         left = split.row(align=True)
         left.alignment = "LEFT"
         copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
@@ -78,9 +88,13 @@ def draw_rows(layout, rows, active=True):
 
 
 def draw_sentence(context, layout, sentence, icon):
-    """As many lines as the sidebar's width needs."""
-    letters = context.region.width / (6.5 * context.preferences.system.ui_scale) - 8.0
+    """Draws a sentence in as many lines as the sidebar's width needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for i, line in enumerate(textwrap.wrap(sentence, max(16, int(letters)))):
+    for i, line in enumerate(textwrap.wrap(sentence, max(16, int(_letters(context))))):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
+
+
+def _letters(context):
+    """How many stand beside each other in the sidebar, about."""
+    return context.region.width / (6.5 * context.preferences.system.ui_scale) - 8.0

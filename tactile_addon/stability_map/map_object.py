@@ -11,11 +11,12 @@ from bpy.props import EnumProperty
 from ..scene import colors, patch_object, patch_record
 from ..scene.mesh_data import emission
 from ..scene.viewports import show_colors
+from ..touch.settings import MOST_PLANES
 from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
 
 COLOR = "stability_color"
 SHADES = 256
-ABOVE = 2e-3  # of the object's size
+ABOVE = 5e-3  # of the object's size; 20000 clip starts away, as a scan in mm is, less flickers
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
 SHOWN = [
     ("error", "Error", "How far patch and mesh are apart, in height", 1),
@@ -113,6 +114,20 @@ def swatches(painted):
         return [(f"No Patch: {refused}", REFUSED)] if refused else []
     names = zip(REASONS, REASON_COLORS, strict=True)
     return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
+
+
+def inputs_of(painted):
+    """What a map was touched with, as TouchSettings has it: a probe with it finds what the map shows."""
+    record = painted[patch_record.MAP_RECORD].to_dict()
+    angles = np.radians(record["planes"] + [[0.0, 0.0]] * (MOST_PLANES - len(record["planes"])))
+    names = ("extent", "step", "noise", "seed", "method", "solver")
+    return {name: record[name] for name in names} | {
+        "plane_count": len(record["planes"]),
+        "azimuths": angles[:, 0].tolist(),
+        "tilts": angles[:, 1].tolist(),
+        "degree": 0 if record["degree"] == "auto" else record["degree"],
+        "weight": record.get("weight") or 0.0,
+    }
 
 
 def register():

@@ -9,7 +9,8 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..probes import probe
-from ..probes.operators import make_active, report_error, target_object
+from ..probes.in_slices import InSlices
+from ..probes.operators import has_target, make_active, report_error, target_object
 from ..scene import patch_record
 from ..touch.settings import NAMES, TouchSettings, draw_all, draw_chosen, touch_arguments
 from ..touch.wording import sentence
@@ -17,12 +18,11 @@ from . import map_object
 from .map_report import map_summary
 from .stability import StabilityMap, expected_count
 
-SLICE = 0.05  # seconds of work between two events
 SAY = 1.0  # seconds between two lines of progress
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
 
-class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
+class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     """Touch a mesh all over and paint a copy of it: where a patch can be trusted, and where there is none"""
 
     bl_idname = "tactile.stability_map"
@@ -42,18 +42,19 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
     )
     progress: BoolProperty(
         name="Progress",
-        description="Say on standard error how far it is, where there is no window to show it",
+        description="Print progress to stderr, where there is no window to show it",
         options={"HIDDEN", *UNSAVED},
     )
 
-    _timer = None  # while it is running in a window
+    stop = "Stop and Keep"
+    meanwhile = {"PASS_THROUGH"}  # the touches are in a snapshot
 
     @classmethod
     def poll(cls, context):
         if context.mode != "OBJECT":
             cls.poll_message_set("Maps are made in Object Mode: leave this mode first")
             return False
-        return True
+        return has_target(cls, context)
 
     def invoke(self, context, event):
         if bpy.app.background:
@@ -70,19 +71,19 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
 
     def execute(self, context):
         try:
-            target = target_object(context, self.target)
-            self._begin(context, target)
+            self._begin(context)
         except ValueError as error:
             return report_error(self, error)
-        if not getattr(self, "_in_window", False):
-            self._run()
+        if getattr(self, "_in_window", False):
+            return self._go_on(context)
+        self._run()
+        try:
             return self._finish(context)
-        self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
-        context.workspace.status_text_set(_progress(self._map))
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        except ValueError as error:
+            return report_error(self, error)
 
-    def _begin(self, context, target):
+    def _begin(self, context):
+        target = target_object(context, self.target)
         # No reference to the target: whatever happens to the scene, the touches go on in a snapshot of it.
         self._name, self._uid = target.name, target.session_uid
         self._map = StabilityMap(
@@ -98,24 +99,6 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
                 said = perf_counter()
                 print(f"{self._map.done} of {len(self._map.chosen)} points", file=sys.stderr, flush=True)
 
-    def modal(self, context, event):
-        if event.type == "ESC" and event.value == "PRESS":
-            return self._stopped(context)
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        try:
-            self._target(context)
-            end = perf_counter() + SLICE
-            for _ in self._steps:
-                if perf_counter() > end:
-                    context.workspace.status_text_set(_progress(self._map))
-                    return {"PASS_THROUGH"}
-        except ValueError as error:
-            self._leave(context)
-            return report_error(self, error)
-        self._leave(context)
-        return self._finish(context)
-
     def _stopped(self, context):
         """Esc ends it with what there is so far."""
         if not self._map.done:
@@ -124,16 +107,12 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         self._steps = self._map.spread()  # the rest is done as before
         return {"RUNNING_MODAL"}
 
-    def _leave(self, context):
-        """Takes away all that shows that it is going on."""
-        context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
+    def _done(self):
+        done, count = self._map.done, len(self._map.chosen)
+        return f"Stability Map: {done} of {count} points", done / max(count, 1)
 
-    def cancel(self, context):
-        """Blender's, where it ends the operator itself: by the dialog, a new file or a closed window."""
-        if self._timer is not None:
-            self._leave(context)
-            print("Stability Map: stopped, for the file or the window was closed", file=sys.stderr)
+    def _check(self, context):
+        self._target(context)
 
     def _target(self, context):
         """The target, if it is still what it was when it was first touched; raises ValueError if not."""
@@ -147,11 +126,8 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         return found
 
     def _finish(self, context):
-        try:
-            target = self._target(context)
-            self._map.require_same(target, context.evaluated_depsgraph_get())
-        except ValueError as error:
-            return report_error(self, error)
+        target = self._target(context)
+        self._map.require_same(target, context.evaluated_depsgraph_get())
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
         record = painted[patch_record.MAP_RECORD].to_dict()
@@ -176,20 +152,3 @@ class TACTILE_OT_stability_map(TouchSettings, bpy.types.Operator):
         draw_chosen(layout, self, "spacing")
         layout.separator()
         draw_all(layout, self)
-
-
-def _progress(touched):
-    """What draws the status bar meanwhile; it may outlive the operator by a redraw."""
-
-    def draw(header, context):
-        layout, count = header.layout, len(touched.chosen)
-        layout.label(text="", icon="EVENT_ESC")
-        layout.label(text=" Stop and Keep")
-        row = layout.row()
-        row.ui_units_x = 16
-        row.progress(
-            factor=touched.done / max(count, 1), text=f"Stability Map: {touched.done} of {count} points"
-        )
-        layout.separator_spacer()
-
-    return draw

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is said of a stability map, in the panel and in the shell."""
 
+import bpy
+
 from ..touch import units
 from ..touch.wording import table
 from . import map_object
@@ -10,18 +12,22 @@ from .stability import REASONS
 
 def map_readable(record):
     """Lines of label and value; lengths in the unit of the scene or file."""
+    return table(map_table_rows(record))
+
+
+def map_table_rows(record):
+    """(label, value) of all that a map has to say."""
     refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
-    names = [key for key in record if key.endswith("_median")]
-    return table(
-        [
-            ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
-            ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
-            ("refused", refused),
-            ("fit", f"{record['method']}, degree {record['degree']}"),
-            ("spacing, extent, step", ", ".join(f"{record[k]:.4g}" for k in ("spacing", "extent", "step"))),
-            *((f"median {name.removesuffix('_median')}", f"{record[name]:.4g}") for name in names),
-        ]
-    )
+    unit = units.unit_of(bpy.context.scene, record["spacing"])
+    lengths = ("spacing", "extent", "step")
+    return [
+        ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
+        ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
+        ("refused", refused),
+        ("fit", f"{record['method']}, degree {record['degree']}"),
+        (", ".join(lengths), ", ".join(units.say(record[name], 1, unit) for name in lengths)),
+        *((f"median {name}", value) for name, _, value in _medians(record, unit)),
+    ]
 
 
 def map_summary(record):
@@ -33,17 +39,24 @@ def map_summary(record):
 
 def map_rows(record, unit):
     """(label, value) of how many patches a stability map has, and why not more."""
-    names = {key: f"No Patch: {name}" for key, name, _ in REASONS}
+    names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
     return [
         ("Points", str(record["touched"])),
         ("Spacing", units.say(record["spacing"], 1, unit)),
         ("Patches", str(record["patches"])),
         ("… in Doubt", str(record["in_doubt"])),
-        *((names[key], str(count)) for key, count in record["refused"].items() if count),
+        *([("No Patch", str(sum(count for _, count in refused)))] if refused else []),
+        *((names[key], str(count)) for key, count in refused if count),
     ]
 
 
 def median_rows(record, unit):
     """(label, value) of the medians over the patches of a stability map."""
-    quantities = [(title, f"{name}_median", power) for name, title, _, power in map_object.SHOWN]
-    return [(title, units.say(record[key], power, unit)) for title, key, power in quantities if key in record]
+    return [(title, value) for _, title, value in _medians(record, unit)]
+
+
+def _medians(record, unit):
+    """(attribute, title, value) of each that is known."""
+    for name, title, _, power in map_object.SHOWN:
+        if f"{name}_median" in record:
+            yield name, title, units.say(record[f"{name}_median"], power, unit)

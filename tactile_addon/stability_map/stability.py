@@ -9,7 +9,7 @@ from statistics import median
 import numpy as np
 
 from ... import core
-from ..touch.detached_mesh import MeshSnapshot
+from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import coordinates, evaluated_object, size_of
 from ..touch.touch_object import LEAST_STEPS, require_fine, require_lengths
 from ..touch.units import length
@@ -61,7 +61,7 @@ class StabilityMap:
         """
         import scipy.spatial  # noqa: F401  # takes half a second once: not between two redraws
 
-        self.surface = MeshSnapshot(obj, depsgraph)
+        self.surface = DetachedMesh(obj, depsgraph)
         if not spacing >= 0.0:  # NaN is none
             raise ValueError(f"The spacing is a length of 0 or more, got {length(spacing)}")
         self.extent = extent or EXTENT_SHARE * self.surface.size
@@ -208,7 +208,7 @@ class _Plane:
     """An ideal surface."""
 
     def ray_cast(self, origin, direction, distance):
-        """As a Surface of core has it."""
+        """What core asks of a Surface."""
         if direction[2] == 0.0 or not 0.0 <= -origin[2] / direction[2] <= distance:
             return None
         gone = -origin[2] / direction[2]

@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mesh to be touched many times, whatever happens to the scene meanwhile."""
 
-import math
 import zlib
 
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from .evaluated_mesh import coordinates, disabled, evaluated_object, product, size_of
+from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 
 
-class MeshSnapshot:
+class DetachedMesh(PlacedMesh):
     """The evaluated mesh of an object as it was, to be touched many times; nothing in it is Blender's scene.
 
     All is in the directions of the world, from the object's origin: so rounding knows no place in the world.
@@ -39,31 +38,21 @@ class MeshSnapshot:
         self.points, self.normals = co @ linear.T, normals @ np.linalg.inv(linear)
         self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1, keepdims=True), 1e-30)
         try:
-            self._cast = BVHTree.FromObject(obj, depsgraph).ray_cast  # half the time of the object's own
+            self._tree = BVHTree.FromObject(obj, depsgraph)  # its rays take half the time of the object's own
         except ValueError as error:
             raise disabled(obj) from error
-        if not np.array_equal(linear, np.eye(3)):
-            self.ray_cast = _transformed(self._cast, linear)
+        rays = self._tree.ray_cast
+        super().__init__(linear, np.zeros(3), lambda *ray: rays(*ray)[:2])
 
-    def ray_cast(self, origin, direction, distance):
-        """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
-        point, normal, _, _ = self._cast(origin, direction, distance)
-        return (point, normal) if point is not None and any(normal) else None
+    @property
+    def origin(self):
+        """Where all begins, in the world."""
+        return np.array(self.matrix.translation)
 
+    def project(self, location):
+        """A point of the mesh near a place, and the unit normal there."""
+        point, normal = self._nearest(self._to_local(location))
+        return self._to_world(point), self._normal_to_world(normal)
 
-def _transformed(cast, linear):
-    """MeshSnapshot.ray_cast for an object that is turned or scaled, whose own rays are `cast`."""
-    inverse = np.linalg.inv(linear)
-    rows, back, normal_rows = (array.tolist() for array in (linear, inverse, inverse.T))
-
-    def ray_cast(origin, direction, distance):
-        local = product(back, *direction)
-        found = cast(product(back, *origin), local, distance * math.hypot(*local))
-        point, (x, y, z) = found[0], found[1] or (0.0, 0.0, 0.0)
-        if point is None or not (x or y or z):
-            return None
-        x, y, z = product(normal_rows, x, y, z)
-        length = math.hypot(x, y, z)
-        return product(rows, *point), (x / length, y / length, z / length)
-
-    return ray_cast
+    def _nearest(self, local):
+        return self._tree.find_nearest(local)[:2]

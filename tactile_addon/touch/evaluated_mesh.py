@@ -53,7 +53,7 @@ def evaluated_object(obj, depsgraph):
         evaluated.to_mesh()
         evaluated.to_mesh_clear()
     matrix = np.array(evaluated.matrix_world, dtype=float)
-    _require_invertible(obj.name, matrix[:3, :3])
+    require_invertible(obj.name, matrix[:3, :3])
     if not len(evaluated.data.polygons):
         raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
     return evaluated, matrix[:3, :3], matrix[:3, 3]
@@ -91,10 +91,80 @@ def _coordinates(mesh):
     return co
 
 
-def _require_invertible(name, linear):
+def require_invertible(name, linear):
+    """Raises ValueError, with a sentence, where the linear part (3, 3) of a transform has no inverse."""
     lengths = np.linalg.norm(linear, axis=0)
     if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
         raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')
+
+
+class PlacedMesh:
+    """A mesh that is touched in other axes than its own: rays into it, what they find out of it.
+
+    The transform runs in Python floats: mathutils rounds to float32, which far from the world's
+    origin is coarser than the mesh, and a numpy call would cost more than the cast.
+
+    linear, origin : (3, 3) and (3,), the transform
+    cast : as ray_cast, in the mesh's own coordinates; its point is None where it meets nothing
+
+    What inherits it has `_nearest`: the (point, normal) nearest to a point, in the mesh's own coordinates.
+    """
+
+    def __init__(self, linear, origin, cast):
+        self._linear, self._origin, self._cast = linear, origin, cast
+        self._inverse = np.linalg.inv(linear)
+        self._rows, self._inverse_rows, self._normal_rows, self._at = (
+            array.tolist() for array in (linear, self._inverse, self._inverse.T, origin)
+        )
+        # Scans mostly are neither moved, turned nor scaled.
+        self._is_in_place = np.array_equal(linear, np.eye(3)) and not origin.any()
+
+    def ray_cast(self, origin, direction, distance):
+        """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
+        if self._is_in_place:
+            point, normal = self._cast(origin, direction, distance)
+            return None if point is None or not any(normal) else (point, normal)
+        back, (x, y, z) = self._inverse_rows, self._at
+        local = product(back, *direction)
+        start = product(back, origin[0] - x, origin[1] - y, origin[2] - z)
+        point, normal = self._cast(start, local, distance * math.hypot(*local))
+        # A face of no area has no normal, and nothing of it can be felt.
+        if point is None or not any(normal):
+            return None
+        return self._to_world(point), self._normal_to_world(normal)
+
+    def deviations(self, points, normals, reach):
+        """Signed distances (n,) of world points to the mesh, positive outside it.
+
+        Measured along the unit normals (n, 3) either way, up to `reach`; to the nearest point of the
+        mesh where they meet nothing, as over a hole.
+        """
+        pairs = zip(points.tolist(), normals.tolist(), strict=True)
+        return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
+
+    def _deviation(self, point, normal, reach):
+        found = []
+        for sign in (-1.0, 1.0):
+            hit = self.ray_cast(point, [-sign * v for v in normal], reach)
+            if hit is not None:
+                found.append(sign * math.dist(point, hit[0]))
+        if found:
+            return min(found, key=abs)
+        foot = self._to_world(self._nearest(self._to_local(point))[0])
+        return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
+
+    def _to_world(self, point):
+        x, y, z = product(self._rows, *point)
+        return x + self._at[0], y + self._at[1], z + self._at[2]
+
+    def _to_local(self, point):
+        return self._inverse @ np.subtract(point, self._origin)
+
+    def _normal_to_world(self, normal):
+        """The normal by the inverse transpose: outward stays outward under any scale, a mirroring one too."""
+        x, y, z = product(self._normal_rows, *normal)
+        length = math.hypot(x, y, z)
+        return x / length, y / length, z / length
 
 
 def product(rows, x, y, z):

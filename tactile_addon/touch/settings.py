@@ -42,6 +42,8 @@ AUTO = {  # literals, to be translated
     "step": "Step (Auto)",
     "degree": "Degree (Auto)",
     "spacing": "Spacing (Auto)",
+    "tolerance": "Tolerance (Auto)",
+    "edge": "Edge Length (Auto)",
 }
 MOST_PLANES = 6
 STEEPEST = math.radians(60)  # Greatest tilt by mouse.
@@ -60,6 +62,10 @@ def silent():
         yield
     finally:
         _is_silent = False
+
+
+def is_silent():
+    return _is_silent
 
 
 def changed(settings, context):
@@ -190,10 +196,16 @@ def touch_arguments(settings):
     }
 
 
-def draw_chosen(layout, settings, name, found=None):
-    """A number that the surface chooses where it is 0, which the label says, with what it has `found`."""
+def draw_chosen(layout, settings, name, found=None, fields=None):
+    """A number that the surface chooses where it is 0, which the label says, with what it has `found`.
+
+    fields : other properties by which lengths are shown, by name, with what was found for their value
+    """
+    shown = (fields or {}).get(name, name)
     if getattr(settings, name):
-        layout.prop(settings, name)
+        layout.prop(settings, shown)
+    elif shown != name:  # its value is what was found
+        layout.prop(settings, shown, text=AUTO[name])
     elif found and found.get(name):
         row = layout.row()
         row.use_property_split = False  # for the label, which takes the width it needs
@@ -202,16 +214,16 @@ def draw_chosen(layout, settings, name, found=None):
         layout.prop(settings, name, text=AUTO[name])
 
 
-def draw_sensor(layout, settings, found=None):
-    draw_chosen(layout, settings, "step", found)
-    layout.prop(settings, "noise")
+def draw_sensor(layout, settings, found=None, fields=None):
+    draw_chosen(layout, settings, "step", found, fields)
+    layout.prop(settings, (fields or {}).get("noise", "noise"))
     if settings.noise:
         layout.prop(settings, "seed")
 
 
-def draw_solver(layout, settings, found=None):
+def draw_solver(layout, settings, found=None, fields=None):
     layout.prop(settings, "method")
-    draw_chosen(layout, settings, "degree", found)
+    draw_chosen(layout, settings, "degree", found, fields)
     if settings.method in ("tagc", "quadratic-variation"):
         layout.prop(settings, "weight")
 

@@ -7,63 +7,41 @@ from functools import cached_property
 
 import numpy as np
 
-from .evaluated_mesh import coordinates, disabled, evaluated_object, product, size_of
+from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 
 SOME = 8  # times as many vertices as are wanted, that are looked at before all of them are
 WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
 
 
-class MeshSurface:
+class MeshSurface(PlacedMesh):
     """The evaluated mesh of an object; core.track touches it through `ray_cast`.
 
     sound : whether all its vertices are known to be at finite places, which takes time to see
     size : the longest edge of its bounding box, in the world
-
-    The transform runs in Python floats: mathutils rounds to float32, which far from the world's
-    origin is coarser than the mesh.
     """
 
     def __init__(self, obj, depsgraph, sound=False):
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
         try:
-            evaluated, self._linear, self._origin = evaluated_object(obj, depsgraph)
+            evaluated, linear, origin = evaluated_object(obj, depsgraph)
             if not sound:
                 self._co = coordinates(obj.name, evaluated)
             evaluated.ray_cast((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), distance=1e-30, depsgraph=depsgraph)
         except RuntimeError as error:
             raise disabled(obj) from error
-        self._inverse = np.linalg.inv(self._linear)
-        # ray_cast takes these, for a numpy call would cost more than the cast.
-        self._rows, self._inverse_rows, self._normal_rows, self._at = (
-            array.tolist() for array in (self._linear, self._inverse, self._inverse.T, self._origin)
-        )
+        rays = evaluated.ray_cast
+
+        def cast(start, direction, distance):
+            hit, point, normal, _ = rays(start, direction, distance=distance, depsgraph=depsgraph)
+            return (point, normal) if hit else (None, None)
+
+        super().__init__(linear, origin, cast)
         self._mesh, self._object, self._depsgraph = evaluated.data, evaluated, depsgraph
-        self._ray_cast = evaluated.ray_cast
-        # Scans mostly are neither moved, turned nor scaled.
-        self._is_in_place = np.array_equal(self._linear, np.eye(3)) and not self._origin.any()
-        self.size = size_of(evaluated, self._linear)
+        self.size = size_of(evaluated, linear)
 
     @cached_property
     def _co(self):
         return coordinates(self._object.name, self._object)
-
-    def ray_cast(self, origin, direction, distance):
-        """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
-        if self._is_in_place:
-            hit, point, normal, _ = self._ray_cast(
-                origin, direction, distance=distance, depsgraph=self._depsgraph
-            )
-            return (point, normal) if hit and any(normal) else None
-        back, (x, y, z) = self._inverse_rows, self._at
-        local = product(back, *direction)
-        hit, point, normal, _ = self._ray_cast(
-            product(back, origin[0] - x, origin[1] - y, origin[2] - z),
-            local,
-            distance=distance * math.hypot(*local),
-            depsgraph=self._depsgraph,
-        )
-        # A face of no area has no normal, and nothing of it can be felt.
-        return (self._to_world(point), self._normal_to_world(normal)) if hit and any(normal) else None
 
     def vertices_near(self, point, radius, most=None):
         """Indices, world coordinates and normals of any length of vertices within `radius` of a world point.
@@ -131,26 +109,6 @@ class MeshSurface:
         point = self._to_world(point)
         return point, self._normal_to_world(normal), math.dist(location, point)
 
-    def deviations(self, points, normals, reach):
-        """Signed distances (n,) of world points to the mesh, positive outside it.
-
-        Measured along the unit normals (n, 3) either way, up to `reach`; to the nearest point of the
-        mesh where they meet nothing, as over a hole.
-        """
-        pairs = zip(points.tolist(), normals.tolist(), strict=True)
-        return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
-
-    def _deviation(self, point, normal, reach):
-        found = []
-        for sign in (-1.0, 1.0):
-            hit = self.ray_cast(point, [-sign * v for v in normal], reach)
-            if hit is not None:
-                found.append(sign * math.dist(point, hit[0]))
-        if found:
-            return min(found, key=abs)
-        foot = self._to_world(self._nearest(self._to_local(point))[0])
-        return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
-
     def spacing(self, point):
         """How far apart neighboring float32 numbers are at a world point, in the world and in the mesh."""
         scale = np.linalg.norm(self._linear, axis=0).max()
@@ -159,22 +117,15 @@ class MeshSurface:
         )
         return float(max(world, scale * local))
 
+    def facet(self, point):
+        """The longest edge of the face nearest to a world point."""
+        _, _, _, number = self._object.closest_point_on_mesh(self._to_local(point), depsgraph=self._depsgraph)
+        corners = self._co[list(self._mesh.polygons[number].vertices)] @ self._linear.T
+        return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max())
+
     def _nearest(self, local):
         """(point, normal) in object coordinates."""
         found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
         if not found:
             raise ValueError("The location is too far away to be measured: set it on the surface")
         return point, normal
-
-    def _to_local(self, point):
-        return self._inverse @ np.subtract(point, self._origin)
-
-    def _to_world(self, point):
-        x, y, z = product(self._rows, *point)
-        return x + self._at[0], y + self._at[1], z + self._at[2]
-
-    def _normal_to_world(self, normal):
-        """The normal by the inverse transpose: outward stays outward under any scale, a mirroring one too."""
-        x, y, z = product(self._normal_rows, *normal)
-        length = math.hypot(x, y, z)
-        return x / length, y / length, z / length

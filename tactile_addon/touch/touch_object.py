@@ -27,6 +27,7 @@ FARTHEST_SHARE = 1.0 / 2.0  # Share of the object's size: a half contour that en
 AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where no extent is given.
 FINEST_STEP = 1.0 / 128.0  # Share of it: the step where neither is given.
 LEAST_STEPS = 12  # Least steps of a half contour, where no step is given.
+LARGE_FACET = 4.0  # Steps: the finger feels facets that are longer, and creases between them.
 MOST_ROUNDING = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
 
 
@@ -89,7 +90,7 @@ def touch(
         "step": step or "auto",
     }
     sensor = {"noise": noise, "rng": seed, "tangent": axes[:, 0]}
-    found = core.explore(surface, point, outward, planes, **size, **sensor, **fit)
+    found = _explored(surface, point, outward, planes, **size, **sensor, **fit)
     clock.append(perf_counter())
     require_single(found.result)
     report = {
@@ -102,6 +103,21 @@ def touch(
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
     return Touched(surface, found.result, report)
+
+
+def _explored(surface, point, outward, planes, **given):
+    """What core.explore finds; where facets longer than some steps may be why it fails, the error says so."""
+    try:
+        return core.explore(surface, point, outward, planes, **given)
+    except core.DegenerateCurvesError as error:
+        step = {"auto": FINEST_STEP * surface.size}.get(given["step"], given["step"])
+        facet = surface.facet(point)
+        if given["noise"] or facet < LARGE_FACET * step:
+            raise
+        raise ValueError(
+            f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier, if the mesh "
+            "stands for a smooth shape"
+        ) from error
 
 
 def _exploration_report(found, given, ended):
@@ -130,7 +146,7 @@ def completed(touched, most=None):
     found = _verification_report(touched.surface, result, most)
     # Where faces are large a pocket between the curves may have no vertex that lies over the patch.
     offs = found.get("vertex_distance_mean"), core.height_error(result, touched.surface)
-    found |= judgment(result, max(off or 0.0 for off in offs), report["ended"])
+    found |= judgment(result, max(off or 0.0 for off in offs), report["ended"], found["vertices"])
     clock.append(perf_counter())
     plane = suggestion_report(result, np.array(report["axes"]))
     clock.append(perf_counter())

@@ -15,6 +15,7 @@ ENDS = {
     core.CREASE: "at a crease",
     core.NOT_MONGE: "where the surface turns away",
 }
+FEW_VERTICES = 6  # over a patch: with fewer it is facets that were felt, not the shape they stand for
 
 
 def ends(contours):
@@ -39,10 +40,19 @@ def _counted(counts):
     return ", ".join([f"{most} end {first}", *(f"{count} {end}" for count, end in others)])
 
 
-def judgment(result, mean, ended):
-    """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message."""
+def judgment(result, mean, ended, vertices=FEW_VERTICES):
+    """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
+
+    vertices : of the mesh over the patch, as far as they are known
+    """
     status, message = core.judged_by_mesh(result, mean)
-    return {"status": status, "message": message + (ended if message == result.message else "")}
+    found = {"status": status, "message": message + (ended if message == result.message else "")}
+    if vertices >= FEW_VERTICES:
+        return found
+    return found | {
+        "message": f"The patch lies on facets (vertices of the mesh over it: {vertices}): add a Subdivision "
+        f"modifier, if the mesh stands for a smooth shape. {found['message']}"
+    }
 
 
 def suggestion_report(result, reference):

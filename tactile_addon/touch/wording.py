@@ -2,44 +2,69 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The reports of patches and maps as tables and sentences for people; and errors as sentences."""
 
-import bpy
+from collections import Counter
 
+import bpy
+import numpy as np
+
+from .touch_report import ENDS, FEW_VERTICES
 from .units import length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
+SHORT = ("edge", "crease", "turns away")  # what ends a curve that could be felt on
 
 
 def readable(report):
     """Lines of label and value; lengths in the unit of the scene or file."""
-    seconds = report["seconds"]
+    return table(readable_rows(report))
+
+
+def readable_rows(report):
+    """(label, value) of all that a patch has to say."""
+    seconds, unit = report["seconds"], unit_of(bpy.context.scene, report["radius"])
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
-    rows = [
+    return [
         ("touched", report["source"]),
         ("status", f"{report['status']}: {report['message']}"),
         ("fit", f"{report['method']}, degree {report['degree']}"),
         ("contacts", contacts),
-        *_lengths(report),
-        *([("more planes", added_planes(report, ("", 1.0)))] if report.get("added_planes") else []),
-        ("point", _vector(report["frame"]["origin"])),
+        *_lengths(report, unit),
+        *([("more planes", added_planes(report, unit))] if report.get("added_planes") else []),
+        ("point", f"{_vector(np.divide(report['frame']['origin'], unit[1]))} {unit[0]}".rstrip()),
         ("normal", _vector(report["frame"]["normal"])),
         ("direction d1", _vector(report["frame"]["d1"])),
-        ("kappa1, kappa2", f"{_measured(report, 'k1')}, {_measured(report, 'k2')} per unit of length"),
-        ("Gaussian curvature", f"{_measured(report, 'gaussian_curvature')} per unit of area"),
-        ("mean curvature", f"{_measured(report, 'mean_curvature')} per unit of length"),
+        ("kappa1, kappa2", ", ".join(_measured(report, key, -1, unit) for key in ("k1", "k2"))),
+        ("Gaussian curvature", _measured(report, "gaussian_curvature", -2, unit)),
+        ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
         ("shape index", f"{report['shape_index']:.3f}"),
-        ("curvedness", f"{report['curvedness']:.5g} per unit of length"),
-        ("residual", f"{report['residual']:.4g}, {_share(report, 'residual')} of the radius"),
-        ("fit error (6)", f"{report['fit_error']:.4g}, {_share(report, 'fit_error')} of the radius"),
-        ("height std", f"{report['height_std']:.4g}, {_share(report, 'height_std')} of the radius"),
-        ("mesh to patch", _verification(report)),
+        ("curvedness", say(report["curvedness"], -1, unit)),
+        ("residual", _shared(report, "residual", unit)),
+        ("fit error (6)", _shared(report, "fit_error", unit)),
+        ("height std", _shared(report, "height_std", unit)),
+        ("mesh to patch", _verification(report, unit)),
         *([("put onto", registration_summary(report["registration"]))] if "registration" in report else []),
-        *_verified_rows(report.get("verification")),
-        ("suggested next plane", _suggestion(report["suggested_plane"])),
+        *_verified_rows(report.get("verification"), unit),
+        ("suggested next plane", _suggestion(report["suggested_plane"], unit)),
         ("total |K| (8)", f"{report['total_absolute_curvature']:.4g}"),
         ("condition number", f"{report['condition_number']:.2g}"),
         ("milliseconds", ", ".join(f"{name} {1e3 * value:.1f}" for name, value in seconds.items())),
     ]
-    return table(rows)
+
+
+def verdict(report, unit):
+    """Whether a patch is good, and what to do where it is not, in a sentence."""
+    if report["status"] == "outdated":
+        return "Outdated: touch again"
+    if report["status"] != "ok":
+        doubt = report["message"].partition(". ")[0].rstrip(".")
+        return f"Doubtful: {doubt.rpartition(': ')[2]}"
+    stops = Counter(stop for pair in report.get("stops", ()) for stop in pair)
+    early = [(count, ENDS[stop]) for stop, count in stops.most_common() if ENDS.get(stop, "").endswith(SHORT)]
+    if early:
+        count, where = early[0]
+        return f"Good, with {count} of {stops.total()} half curves cut short {where}"
+    of = ", of a facet" if "step" in report and report.get("vertices", FEW_VERTICES) < FEW_VERTICES else ""
+    return f"Good{of}: heights to ± {say(report['height_std'], 1, unit)}"
 
 
 def added_planes(report, unit):
@@ -62,15 +87,12 @@ def _tracked(report):
     return f"{report['contacts']} on {len(report['planes'])} curves, ended by: {', '.join(stops)}"
 
 
-def _lengths(report):
+def _lengths(report, unit):
     """Rows of a touch; for measured curves, how far they miss their common point."""
-    if "step" in report:
-        lengths = f"{report['step']:.4g}, {report['extent']:.4g}, {report['radius']:.4g}"
-        return [("step, extent, radius", lengths)]
-    rows = [("unit", report["unit"])] if report["unit"] else []
-    rows.append(("radius", f"{report['radius']:.4g}"))
+    names = [name for name in ("step", "extent", "radius") if name in report]
+    rows = [(", ".join(names), ", ".join(say(report[name], 1, unit) for name in names))]
     if "misses" in report:
-        rows.append(("curves miss it by", ", ".join(f"{miss:.3g}" for miss in report["misses"])))
+        rows.append(("curves miss it by", ", ".join(say(miss, 1, unit) for miss in report["misses"])))
     return rows
 
 
@@ -87,37 +109,31 @@ def sentence(error):
 
 
 def fit_summary(report):
-    """The fit in a sentence: its status, the curvatures, and how far its contacts are missed."""
+    """The fit in a sentence: the verdict on it, and the curvatures."""
     unit = unit_of(bpy.context.scene, report["radius"])
-    return (
-        f"{report['message']} Curvatures {say(report['k1'], -1, unit)} and {say(report['k2'], -1, unit)}, "
-        f"{report['contacts']} contacts missed by {length(report['fit_error'])} in the mean"
-    )
+    curvatures = " and ".join(say(report[key], -1, unit) for key in ("k1", "k2"))
+    return f"{verdict(report, unit)}. Curvatures {curvatures}"
 
 
-def _verification(report):
+def _verification(report, unit):
     if "curves" in report:
         return "there is none"
     if not report["vertices"]:
         return "no vertex of the mesh lies over the patch"
-    share = _share(report, "vertex_distance_mean")
+    farthest = say(report["vertex_distance_max"], 1, unit)
     return (
-        f"mean {report['vertex_distance_mean']:.4g}, {share} of the radius; "
-        f"max {report['vertex_distance_max']:.4g}; {report['vertices']} vertices"
+        f"mean {_shared(report, 'vertex_distance_mean', unit)}; max {farthest}; {report['vertices']} vertices"
     )
 
 
-def _verified_rows(found):
+def _verified_rows(found, unit):
     """What is not in the report without it."""
     if found is None:
         return []
     names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
-    more = f"{found['extra_fit_error']:.4g}, " if "extra_fit_error" in found else ""
+    more = f"{say(found['extra_fit_error'], 1, unit)}, " if "extra_fit_error" in found else ""
     return [
-        *(
-            (f"{name} distances", ", ".join(f"{key} {found[f'{name}_distance_{key}']:.4g}" for key in SPREAD))
-            for name in names
-        ),
+        *((f"{name} distances", _spread(found, f"{name}_distance", unit)) for name in names),
         ("(6) on more curves", f"{more}{found['extra_points']} points on {found['extra_contours']} curves"),
         ("overlap", f"{100.0 * found['overlap']:.0f} % of the area"),
     ]
@@ -132,10 +148,14 @@ def registration_summary(found):
     return f"{words}; others of its {len(found['residuals'])} poses are about as good"
 
 
-def _suggestion(plane):
+def _spread(found, what, unit):
+    return ", ".join(f"{key} {say(found[f'{what}_{key}'], 1, unit)}" for key in SPREAD)
+
+
+def _suggestion(plane, unit):
     return (
         f"azimuth {plane['azimuth']:.0f} degrees, along {_vector(plane['tangent'])}; "
-        f"would take height std to {plane['expected_height_std']:.4g}"
+        f"would take height std to {say(plane['expected_height_std'], 1, unit)}"
     )
 
 
@@ -143,9 +163,10 @@ def _vector(v):
     return " ".join(f"{x:.5g}" for x in v)
 
 
-def _measured(report, key):
-    return f"{report[key]:.5g} ± {report[key + '_std']:.2g}"
+def _measured(report, key, power, unit):
+    return say(report[key], power, unit, report[f"{key}_std"])
 
 
-def _share(report, key):
-    return f"{100.0 * report[key] / report['radius']:.2f} %"
+def _shared(report, key, unit):
+    """A length, and its share of the radius."""
+    return f"{say(report[key], 1, unit)}, {100.0 * report[key] / report['radius']:.2f} % of the radius"

@@ -28,7 +28,8 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == "OBJECT" and shown_probe(context) is not None
+        found = shown_probe(context) if context.mode == "OBJECT" else None
+        return found is not None and found.tactile_probe.show_handles
 
     def setup(self, context):
         self.extent = self._handle("GIZMO_GT_dial_3d", DRAG_EXTENT, 0, (1.0, 1.0, 1.0))

@@ -89,13 +89,14 @@ def draw_plane():
 
 
 def draw_legend():
-    """The legend of the active patch or map: quantity, unit and range, beside the sidebar."""
+    """The legend of the active patch, whole object or map: quantity, unit and range, beside the sidebar."""
     context = bpy.context
     if not shows_colors(context.space_data):
         return
     obj = _active(context)
-    patch = probe.patch_near(obj)
-    record = probe.record_of(obj)
+    patch, record = probe.patch_near(obj), probe.record_of(obj)
+    if obj is not None and patch_record.ATLAS_RECORD in obj:
+        patch, record = obj, obj[patch_record.ATLAS_RECORD]
     if record is not None and "color_limit" in record and patch.visible_get():
         shown = patch.tactile_colors
         low = 0.0 if shown in patch_record.POSITIVE else -1.0

@@ -7,17 +7,18 @@ from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
 
 from ..probes import anchor, probe, touch_again
 from ..probes.operators import make_active, report_error, target_object
+from ..scene import patch_record
 from ..scene.viewports import show_colors
+from ..stability_map.map_object import inputs_of
 from ..touch import units
 from ..touch.settings import NAMES, TouchSettings, draw_all, touch_arguments
-from ..touch.surface import MeshSurface
 from ..touch.touch_object import touch
-from ..touch.wording import sentence
+from ..touch.wording import sentence, verdict
 from . import overlay
-from .mouse import draw_hints, mouse_ray, viewport_below
+from .below import large_meshes, names_below, point_below, read
+from .mouse import draw_hints
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
-LAYERS = 64  # patches and hidden objects that the mouse sees through at most
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 HINTS = (
     ("MOUSE_LMB", "Touch Here"),
@@ -57,6 +58,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         options=UNSAVED,
     )
 
+    at_once: BoolProperty(
+        name="At Once",
+        description="Touch where the mouse is, without asking for a click",
+        options={"HIDDEN", *UNSAVED},
+    )
     parent: BoolProperty(
         name="Move With Target",
         description="Make a new probe a child of the object touched, so that it goes where that goes",
@@ -74,18 +80,20 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         if context.area is None or context.area.type != "VIEW_3D":
             self.report({"ERROR"}, "Points are picked in a 3D viewport: start it there")
             return {"CANCELLED"}
+        self._area, self._unread = context.area, large_meshes(context)
         for name in NAMES:  # those of the last pick are remembered, but suited another object
             self.properties.property_unset(name)
         try:
             self._inherit(context)
         except ValueError as error:
             return report_error(self, error)
+        if self.at_once:
+            return self._click(context, event)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
         self._seen = {"touched": None}
         self._drawing = bpy.types.SpaceView3D.draw_handler_add(
             overlay.draw_preview, (self._seen,), "WINDOW", "POST_VIEW"
         )
-        self._area = context.area
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         context.window_manager.modal_handler_add(self)
@@ -102,14 +110,27 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             self._hover(context, event)
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             self._hover(context, event)
-            touched = self._seen["touched"]
-            if touched is not None:
-                self.target = touched.report["source"]
-                self.location = touched.result.frame.origin
-                self.outward = touched.result.frame.axes[:, 2]
+            if self._seen["touched"] is not None:
                 self.cancel(context)
-                return self.execute(context)
+                return self._take(context)
         return {"RUNNING_MODAL"}
+
+    def _click(self, context, event):
+        """What the tool in the toolbar does."""
+        self._seen = {"touched": None}
+        words = self._hover(context, event)
+        self._area.header_text_set(None)
+        context.window.cursor_modal_restore()
+        if self._seen["touched"] is None:
+            self.report({"WARNING"}, words)
+            return {"CANCELLED"}
+        return self._take(context)
+
+    def _take(self, context):
+        touched = self._seen["touched"]
+        self.target, self.location = touched.report["source"], touched.result.frame.origin
+        self.outward = touched.result.frame.axes[:, 2]
+        return self.execute(context)
 
     def cancel(self, context):
         """Takes away all that shows that a pick is going on."""
@@ -140,8 +161,9 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         settings.is_probe = True
         make_active(context, found)
         show_colors(context.space_data)
-        report = touched.report
-        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, report["message"])
+        report = probe.record_of(found).to_dict()
+        unit = units.unit_of(context.scene, report["radius"])
+        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, verdict(report, unit))
         return {"FINISHED"}
 
     def _target(self, context, moved):
@@ -168,23 +190,28 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         draw_all(layout, self)
 
     def _inherit(self, context):
-        """The probe that is to be moved, if any; what is not set becomes what it has.
+        """The probe that is to be moved, if any; what is not set becomes what it has, or the active map.
 
         Raises ValueError where it cannot be changed.
         """
-        moved = None if self.new else probe.probe_of(context.view_layer.objects.active)
+        active = context.view_layer.objects.active
+        moved, given = None if self.new else probe.probe_of(active), {}
         if moved is not None:
             probe.require_unlocked(moved)
-            for name in NAMES:
-                if not self.properties.is_property_set(name):
-                    setattr(self, name, getattr(moved.tactile_probe, name))
+            given = {name: getattr(moved.tactile_probe, name) for name in NAMES}
+        elif active is not None and patch_record.MAP_RECORD in active:
+            given = inputs_of(active)
+        for name, value in given.items():
+            if not self.properties.is_property_set(name):
+                setattr(self, name, value)
         return moved
 
     def _hover(self, context, event):
-        """Touches below the mouse; the preview shows it, and the header says it."""
+        """Touches below the mouse; the preview shows it, and the header says it, and it returns the words."""
         self._seen["touched"], words = None, "Move over a mesh to touch it"
         try:
-            found = _point_below(context, event)
+            self._read(context, names_below(context, event, self._unread))
+            found = point_below(context, event)
             if found is not None:
                 obj, location, eye = found
                 depsgraph = context.evaluated_depsgraph_get()
@@ -197,50 +224,21 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             words = sentence(error)
         self._area.header_text_set(f"Pick Reference Point     {words}")
         _redraw(context)
+        return words
+
+    def _read(self, context, names):
+        """Says that it takes a while to touch large meshes for the first time, and does what takes it."""
+        if not names:
+            return
+        self._unread.difference_update(names)
+        self._area.header_text_set(f"Pick Reference Point     Reading {', '.join(names)} for the first touch")
+        context.window.cursor_modal_set("WAIT")
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+        read(context, names)
+        context.window.cursor_modal_set("EYEDROPPER")
 
 
 def _redraw(context):
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             area.tag_redraw()
-
-
-def _point_below(context, event):
-    """(object, location, direction toward the eye) of the mesh below the mouse, or None where there is none.
-
-    Raises ValueError for what cannot be touched.
-    """
-    viewport = viewport_below(context, event)
-    if viewport is None:
-        return None
-    space, region, view = viewport
-    eye, direction = mouse_ray(region, view, event)
-    # An orthographic view shows what is behind its origin too.
-    start = eye if view.is_perspective else eye - space.clip_end * direction
-    depsgraph = context.evaluated_depsgraph_get()
-    cast = context.scene.ray_cast
-    for _ in range(LAYERS):
-        hit, point, _, _, found, matrix = cast(depsgraph, start, direction)
-        if not hit:
-            return None
-        obj = found.original
-        if not probe.is_result(obj) and obj.visible_in_viewport_get(space):
-            _require_touchable(obj, matrix)
-            # Cast again from close by: from far away it is not exact.
-            surface = MeshSurface(obj, depsgraph)
-            depth = (point - eye).dot(direction) - surface.size
-            start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
-            hit = surface.ray_cast(start, direction, 2.0 * surface.size)
-            return obj, list(point) if hit is None else hit[0], -direction
-        # Behind it, by more than rounding: from close by, for from far away that is more than a small object.
-        back = 1e-3 * (point - start).length
-        hit, near, *_ = cast(depsgraph, point - back * direction, direction)
-        start = (near if hit else point) + 1e-5 * max(back, point.length) * direction
-    return None
-
-
-def _require_touchable(obj, matrix):
-    if obj.type != "MESH":
-        raise ValueError(f'"{obj.name}" is no mesh: convert it to one first')
-    if matrix != obj.matrix_world:
-        raise ValueError(f'This is an instance of "{obj.name}": make it real to touch it')

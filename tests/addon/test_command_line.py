@@ -3,6 +3,7 @@
 """The command line, called as Blender calls it; a real `blender -c` is in tests/gui."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -43,6 +44,21 @@ def test_every_option_arrives(command, files):
 
     bpy.ops.wm.open_mainfile(filepath=str(output))
     assert bpy.data.objects["Sphere Patch"]["tactile"]["degree"] == 5
+
+
+def test_a_whole_object_from_a_file(command, files):
+    output = files / "whole.ply"
+    options = ("--tolerance", "0.01", "--edge", "0.2", "--seed", "1", "--json", "-", "--output", output)
+    code, out, _ = command("object", files / "ball.ply", *options)
+    assert code == 0
+    (line,) = [line for line in out.splitlines() if line.startswith("{")]
+    report = json.loads(line)
+    assert report["is_closed"]
+    assert report["deviation_mean"] < 0.01
+    assert b"property float height_std" in output.read_bytes()[:2000]
+    code, out, _ = command("object", files / "ball.ply", "--tolerance", "0.01")
+    assert code == 0
+    assert "closed all round" in out
 
 
 def test_a_map_from_every_kind_of_file(command, files):
@@ -96,6 +112,26 @@ def test_the_degree_may_be_left_to_the_contacts(command, files):
     code, out, _ = command("reconstruct", files / "ball.ply", *PLACE, "--degree", "auto")
     assert code == 0
     assert "bayes, degree 4" in out
+
+
+def test_lengths_are_said_in_the_unit_of_the_scene(command, files):
+    import bpy
+
+    out = command("reconstruct", files / "ball.blend", *PLACE)[1]
+    rows = dict(line.split("  ", 1) for line in out.splitlines() if "  " in line)
+    rows = {label.strip(): value.strip() for label, value in rows.items()}
+    assert re.fullmatch(r"-0\.5\S* ± \S+ 1/m, -0\.[45]\S* ± \S+ 1/m", rows["kappa1, kappa2"])
+    assert re.fullmatch(r"0\.2\d* ± \S+ 1/m²", rows["Gaussian curvature"])
+    assert re.fullmatch(r"\S+ \w*m, \S+ % of the radius", rows["height std"])
+    assert re.fullmatch(r"\S+ m, 0.6 m, \S+ m", rows["step, extent, radius"])
+    assert rows["point"].endswith(" m")
+    bpy.context.scene.unit_settings.system = "NONE"
+    bpy.ops.wm.save_as_mainfile(filepath=str(files / "none.blend"))
+    out = command("reconstruct", files / "none.blend", *PLACE)[1]
+    assert re.search(r"kappa1, kappa2 +-0\.5\S* ± \S+, -0\.[45]\S* ± \S+\n", out)
+    out = command("map", files / "ball.blend", "--spacing", 1)[1]
+    assert re.search(r"median height_std +\S+ \S*m\n", out)
+    assert re.search(r"median blind_share +[\d.]+\n", out)
 
 
 def test_strokes_are_fitted_around_a_place(command, empty, tmp_path):

@@ -32,7 +32,7 @@ def patch():
 
 
 def write_contacts():
-    """Of a touch, as .csv and as .ply."""
+    """Writes the contacts of a touch as .csv and as .ply."""
     bpy.ops.tactile.reconstruct(target="Suzanne", extent=0.3)
     csv = FOLDER / "contacts.csv"
     bpy.ops.tactile.export_contacts("EXEC_DEFAULT", filepath=str(csv))

@@ -164,7 +164,7 @@ def tab():
 
 
 def look_beside_the_panel(point, direction, distance):
-    """As look() does, with the point in the left third."""
+    """Does what look() does, with the point in the left third."""
     look(point, direction, distance)
     view = gui.find()[1].spaces.active.region_3d
     view.view_location = point + view.view_rotation @ Vector((0.3 * distance, 0.0, 0.0))

@@ -16,6 +16,7 @@ from mathutils import Vector
 sys.path.insert(0, str(Path(__file__).parent))
 from common import (
     ASIDE,
+    PICK_BUTTON,
     check,
     extent,
     handle,
@@ -259,6 +260,38 @@ def handles():
     check("... and one Ctrl Z takes it back", moved.length < 1e-5, moved)
 
 
+def edges():
+    """A point near a corner of a block: what the ring of a pick and the patch promise there."""
+    bpy.data.objects[TARGET].hide_set(True)
+    bpy.ops.mesh.primitive_cube_add(location=(0, 0, 8))
+    block = bpy.context.object
+    bpy.ops.ed.undo_push(message="Block")
+    look((0.4, 0.2, 9.0), (0.4, -0.6, 1), 6)
+    yield 1
+    gui.click(*PICK_BUTTON)
+    yield 1
+    at = gui.view_point((0.85, 0.8, 9.0))
+    gui.xdo("mousemove", *map(round, at))
+    yield 2
+    picture("edge_preview")
+    gui.click(*at)
+
+    def found():
+        return next((o for o in bpy.data.objects if o.type == "EMPTY" and o.parent == block), None)
+
+    yield from until(lambda: found() and patch(found()) and patch(found())["tactile"]["is_verified"], 20)
+    if not check("a click near the edge of a block makes a probe on it", found() is not None):
+        return
+    seen = patch(found())
+    reach = max(abs(v) for vertex in seen.data.vertices for v in (seen.matrix_world @ vertex.co)[:2])
+    check("... whose patch ends at the edge, where its curves did", reach < 1.005, reach)
+    record = seen["tactile"].to_dict()
+    said = record["message"]
+    check("... and says so", "at a crease" in said and "directions" not in said, said)
+    check("... and is flat", max(abs(record["k1"]), abs(record["k2"])) < 1e-4, (record["k1"], record["k2"]))
+    picture("edge")
+
+
 def steps():
     yield from open_tab()
     yield from pick()
@@ -267,6 +300,7 @@ def steps():
     yield from move_and_delete_patch()
     yield from handles()
     yield from play()
+    yield from edges()
 
 
 gui.play(steps())

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A first result in a window as it comes: colors at once, a verdict, numbers with what they mean."""
+"""A first result in a window as it comes: colors at once, a verdict, numbers with what they mean.
+
+And what else the panel has: what freezes or hides a patch, a point of a map, the tool of the
+toolbar, and what is said while a large mesh is touched first.
+"""
 
 import sys
 from pathlib import Path
@@ -10,24 +14,38 @@ import gui
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import PICK_BUTTON, check, is_complete, look, open_tab, picture, until
+from common import PICK_BUTTON, check, is_complete, last_report, look, open_tab, patch, picture, probe, until
 
-NUMBER = (835, 500)
+# Where they are in a window of 1280 by 800 with the sidebar open.
+NUMBER, SENSOR = (790, 524), (815, 321)
+CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 284)
 
 
-def steps():
-    yield from open_tab()
+def probes():
+    return [obj for obj in bpy.data.objects if obj.type == "EMPTY"]
+
+
+def activate(obj):
+    for one in bpy.context.view_layer.objects:
+        one.select_set(one == obj)
+    bpy.context.view_layer.objects.active = obj
+
+
+def first():
     space = gui.find()[1].spaces.active
     place = bpy.context.scene.cursor.location
     look(place + Vector((0.2, 0.0, -0.1)), (0.3, -1.0, 0.5), 1.7)
     space.shading.color_type = "MATERIAL"
     yield 0.5
+    picture("panel_empty")
     at = [round(v) for v in gui.view_point(place)]
     gui.click(*PICK_BUTTON)
     yield 0.5
     gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.2, "mousemove", *at, "sleep", 0.5, "click", 1)
     yield from until(is_complete)
     picture("panel_first")
+    said = last_report()
+    check("a pick says the verdict, short", said.startswith("Good") and len(said) < 60, said)
     check(
         "a pick has the viewport show colors", space.shading.color_type == "VERTEX", space.shading.color_type
     )
@@ -38,6 +56,113 @@ def steps():
     yield 0.5
     copied = bpy.context.window_manager.clipboard
     check("a click on the name of a number copies it", " ± " in copied and copied.endswith("1/m"), copied)
+
+
+def numbers():
+    """Numbers are not dragged here: Blender takes the pointer back while it is, and xdotool moves it away."""
+    settings = probe().tactile_probe
+    settings.live = False
+    gui.click(*SENSOR)
+    yield 1
+    picture("panel_frozen")
+    settings.live = True
+    gui.click(*SENSOR)
+    yield from until(is_complete)
+
+
+def toggled(place, reached):
+    """Presses a button once the mouse is known to be over it."""
+    gui.xdo("mousemove", place[0] - 5, place[1], "sleep", 0.3, "mousemove", *place)
+    yield 0.7
+    gui.click(*place)
+    yield from until(reached, 10)
+
+
+def hidden():
+    (lines,), settings = patch().children, probe().tactile_probe
+    yield from toggled(CONTOURS, lambda: lines.hide_viewport)
+    check("a button hides the contours", lines.hide_viewport and not lines.visible_get())
+    yield from toggled(HANDLES, lambda: not settings.show_handles)
+    check("... and one the handles", not settings.show_handles)
+    picture("panel_hidden")
+    settings.azimuths[0] += 0.1
+    yield from until(is_complete)
+    yield from toggled(CONTOURS, lambda: not lines.hide_viewport)
+    yield from toggled(HANDLES, lambda: settings.show_handles)
+    check("... and they come back", lines.visible_get() and settings.show_handles)
+
+
+def on_map():
+    source = bpy.data.objects["Suzanne"]
+    place, before = bpy.context.scene.cursor.location, probes()
+    bpy.ops.tactile.stability_map("EXEC_DEFAULT", target=source.name, extent=0.3)
+    source.hide_set(True)
+    yield 1
+    picture("panel_map")
+    gui.click(*MAP_PROBE)
+    yield 0.5
+    at = [round(v) for v in gui.view_point(place)]
+    gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 0.2, "mousemove", *at, "sleep", 0.5, "click", 1)
+    yield from until(lambda: len(probes()) > len(before))
+    (made,) = set(probes()) - set(before)
+    settings = made.tactile_probe
+    check("a click on a map makes a probe on what it shows", settings.target == source, settings.target)
+    check("... with the map's inputs", abs(settings.extent - 0.3) < 1e-6, settings.extent)
+    off = (made.matrix_world.translation - place).length
+    check("... there", off < 0.03, off)
+    source.hide_set(False)
+
+
+def with_tool():
+    window, area, region = gui.find()
+    place, count = bpy.context.scene.cursor.location, len(probes())
+    activate(bpy.data.objects["Suzanne"])
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.wm.tool_set_by_id(name="tactile.tool")
+    yield 1
+    at = [round(v) for v in gui.view_point(place)]
+    gui.click(at[0] + 60, at[1])
+    yield from until(lambda: len(probes()) > count)
+    check("a click with the tool touches there", len(probes()) == count + 1, probes())
+    picture("panel_tool")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+
+
+def large():
+    """A picture is taken at the moment when Blender begins to read the mesh."""
+    for obj in bpy.data.objects:
+        obj.hide_set(True)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=700, y_subdivisions=700, size=2.0)
+    mesh, pick = bpy.context.object, sys.modules[bpy.types.TACTILE_OT_pick.__module__]
+    inner, seen = pick.read, []
+
+    def read(context, names):
+        picture("panel_reading")
+        seen.extend(names)
+        inner(context, names)
+
+    pick.read = read
+    look(Vector((0.0, 0.0, 0.0)), (0.0, -1.0, 1.0), 3.0)
+    yield 3
+    at = [round(v) for v in gui.view_point(Vector((0.0, 0.0, 0.0)))]
+    gui.click(*PICK_BUTTON)
+    yield 1
+    gui.xdo("mousemove", at[0] - 10, at[1], "sleep", 1, "mousemove", *at, "sleep", 1)
+    yield from until(lambda: seen)
+    gui.xdo("key", "Escape")
+    yield 1
+    check("the first touch of a large mesh is announced, once", seen == [mesh.name], seen)
+
+
+def steps():
+    yield from open_tab()
+    yield from first()
+    yield from numbers()
+    yield from hidden()
+    yield from on_map()
+    yield from with_tool()
+    yield from large()
 
 
 gui.play(steps())

@@ -91,6 +91,7 @@ def walk():
     yield from settled()
     while is_well() and len(taken) < STEPS:
         taken.append(dice.choice(["drag", *9 * [None]]) or steps.choose(dice))
+        print(len(taken), taken[-1], flush=True)  # the last line before a crash
         if taken[-1] == steps.RELOAD:
             yield from reload()
         elif taken[-1] == "drag":

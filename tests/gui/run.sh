@@ -3,8 +3,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 
 # run.sh ZIP: what only a real Blender can show, with the zip without wheels installed in it: the
-# command line, the example script, the menu entry, probes, verification and stability maps by mouse and
-# keyboard in a window, and what hundreds of touches leave behind. The pictures are in build/gui, to be looked at.
+# command line, the example script, the menu entry, probes, verification, whole objects and stability maps by
+# mouse and keyboard in a window, what hundreds of touches leave behind, and installing from a repository.
+# The pictures are in build/gui, to be looked at.
 set -euo pipefail
 [ $# = 1 ] || { echo "usage: run.sh ZIP" >&2; exit 2; }
 zip=$(readlink -f "$1")
@@ -15,7 +16,7 @@ gui=../shared/blender/gui.sh
 out=build/gui
 log=$out/log.txt
 export BLENDER_USER_RESOURCES=build/gui-user
-rm -rf "$out" "$BLENDER_USER_RESOURCES"
+rm -rf "$out" "$BLENDER_USER_RESOURCES" build/gui-user-repository
 mkdir -p "$out"
 cp "$zip" "$out/tactile_patch.zip"
 
@@ -43,7 +44,7 @@ pear=../shared/data/meshes/pear.ply
 [ ! -e "$pear" ] || cp "$pear" "$out/"
 GUI_ARGS="$out/scene.blend" step "the window's checks" \
   $gui shot tests/gui/window.py "$out/window.png"
-GUI_ARGS="$out/scene.blend" step "the panel's checks" \
+GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the panel's checks" \
   $gui shot tests/gui/panel.py "$out/panel.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the viewport's checks" \
   $gui shot tests/gui/viewport.py "$out/viewport.png"
@@ -61,10 +62,16 @@ GUI_ARGS="$out/scene.blend" step "the verification's checks" \
   $gui shot tests/gui/verify.py "$out/verify.png"
 GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the stability map's checks" \
   $gui shot tests/gui/stability.py "$out/stability.png"
+GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the checks of whole objects" \
+  $gui shot tests/gui/whole_object.py "$out/whole_object.png"
 GUI_ARGS="$out/scene.blend" step "the contacts' checks" \
   $gui shot tests/gui/contacts.py "$out/contacts.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the endurance checks" \
   $gui shot tests/gui/endurance.py "$out/endurance.png" 640 480
+GUI_ARGS=examples/sample.blend step "the sample's checks" \
+  $gui shot tests/gui/sample.py "$out/sample.png"
+BLENDER_USER_RESOURCES=build/gui-user-repository GUI_TIMEOUT=240 step "the repository's checks" \
+  $gui shot tests/gui/repository.py "$out/repository.png"
 [ -e "$pear" ] || echo "skipped: the scan of a pear, there is no ../shared/data."
 
 passed=$(grep -c '^ok: ' "$log" || true)

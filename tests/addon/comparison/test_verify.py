@@ -143,10 +143,9 @@ def test_the_scenes_unit_is_the_panels(empty, patch, extension):
     found = verified(empty, patch)
     unit = addon.touch.units.unit_of(empty.context.scene, patch["tactile"]["radius"])
     head, *rows, points = addon.comparison.verification_wording.verification_table(found, unit)
-    assert head == ("Distance", "Mesh", "Contacts")
+    assert head == ("in mm", "Mesh", "Contacts")
     assert [row[0] for row in rows] == ["Mean", "Median", "Maximum", "RMS"]
-    assert all(cell.endswith(" mm") for row in rows for cell in row[1:])
-    assert rows[0][1] == f"{found['vertex_distance_mean']:.3g} mm"
+    assert rows[0][1] == f"{found['vertex_distance_mean']:.3g}"
     assert points == ("Points", str(found["vertices"]), "60")
     assert dict(addon.comparison.verification_wording.verification_rows(found, unit))["Overlap"] == "100 %"
 
@@ -188,7 +187,7 @@ def test_layers_hidden_from_a_finger_do_not_count(empty, patch):
 
 def test_a_coarse_mesh_has_no_vertices_over_the_patch(empty, capfd):
     empty.ops.mesh.primitive_plane_add(size=10.0)
-    assert empty.ops.tactile.reconstruct(location=(0.5, 0.2, 0.0)) == {"FINISHED"}
+    assert empty.ops.tactile.reconstruct(location=(0.5, 0.2, 0.0), extent=3.0) == {"FINISHED"}
     found = verified(empty, empty.context.object)
     assert (found["vertices"], found["overlap"], found["extra_contours"]) == (0, 1.0, 9)
     assert found["extra_fit_error"] == pytest.approx(0.0, abs=1e-5)
@@ -370,3 +369,40 @@ def test_from_the_shell(empty, command, tmp_path):
     (row,) = csv.DictReader(table.read_text(encoding="utf-8").splitlines())
     cells = [row[key] for key in ("vertices", "vertex_distance_mean [unit of the file]", "contacts")]
     assert cells == ["0", "", "72"]
+
+
+@pytest.mark.parametrize("disturb", ["move", "delete", "patch"])
+def test_what_changes_while_it_is_compared_ends_it_with_a_sentence(empty, patch, extension, disturb):
+    operator = extension.tactile_addon.comparison.verify_operator
+    ball = empty.data.objects["Sphere"]
+    verification = operator.Verification(patch, ball)
+    verification.look(empty.context.evaluated_depsgraph_get())
+    next(verification.steps())
+    if disturb == "delete":
+        empty.data.objects.remove(ball)
+    else:
+        (ball if disturb == "move" else patch).location.x += 0.1
+    empty.context.view_layer.update()
+    said = "was deleted while it was verified" if disturb == "delete" else "was changed while it was verified"
+    with pytest.raises(ValueError, match=said):
+        verification.look(empty.context.evaluated_depsgraph_get())
+    assert "verification" not in patch["tactile"]
+
+
+def test_in_steps_it_finds_what_it_finds_at_once(empty, patch, extension):
+    """Whatever Blender evaluates between two steps."""
+    operator = extension.tactile_addon.comparison.verify_operator
+    ball, wanted, done = empty.data.objects["Sphere"], verified(empty, patch), []
+    deviation = values(patch.data, "deviation")
+    verification = operator.Verification(patch, ball)
+    verification.look(empty.context.evaluated_depsgraph_get())
+    for _ in verification.steps():
+        done.append(verification.done)
+        ball.data.update()  # to the same shape, which frees what was evaluated
+        empty.context.view_layer.update()
+        verification.look(empty.context.evaluated_depsgraph_get())
+    assert len(done) > 4
+    assert done == sorted(done)
+    assert done[-1] == verification.count > wanted["vertices"]
+    assert verification.write()["verification"] == wanted
+    assert (values(patch.data, "deviation") == deviation).all()

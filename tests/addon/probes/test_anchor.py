@@ -220,3 +220,17 @@ def test_a_probe_that_stands_alone_touches_a_target_that_was_moved(empty, touche
     empty.context.view_layer.update()
     assert touches == [probe.name]
     assert (probe.matrix_world.translation - Vector((0.0, 0.0, 0.1))).length == pytest.approx(2.0, abs=2e-3)
+
+
+def test_a_target_scaled_to_nothing_is_named_and_not_the_probe_which_it_takes_along(empty, suzanne):
+    probe, patch = pick(empty, (-0.05, -0.9, 0.6))
+    before = patch["tactile"]["status"]
+    for scale in ((0.0, 0.0, 0.0), (1.0, 0.0, 1.0)):
+        suzanne.scale = scale
+        empty.context.view_layer.update()
+        said = '"Suzanne" is scaled to nothing in some direction: give it a scale other than 0'
+        assert probe.tactile_probe.message == said
+        assert patch["tactile"]["status"] == "outdated"
+        suzanne.scale = (1.2, 0.8, 1.0)
+        empty.context.view_layer.update()
+        assert (probe.tactile_probe.message, patch["tactile"]["status"]) == ("", before)

@@ -110,3 +110,52 @@ def test_the_colors_of_a_linked_patch_stay(empty, library):
     limit = patch["tactile"]["color_limit"]
     patch.tactile_colors = "mean_curvature"
     assert patch["tactile"]["color_limit"] == limit
+
+
+@pytest.fixture
+def linked(empty, tmp_path):
+    """A ball of a library, linked into the open scene."""
+    empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.0)
+    path = str(tmp_path / "ball.blend")
+    empty.ops.wm.save_as_mainfile(filepath=path)
+    empty.ops.wm.read_homefile(use_empty=True)
+    with empty.data.libraries.load(path, link=True) as (_, into):
+        into.objects = ["Sphere"]
+    empty.context.scene.collection.objects.link(into.objects[0])
+    empty.context.view_layer.update()
+    return into.objects[0]
+
+
+def is_content(probe):
+    (patch,) = (child for child in probe.children if "tactile" in child)
+    return (patch["tactile"]["status"], probe.tactile_probe.message) == ("ok", "")
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_a_probe_goes_with_the_override_that_takes_the_place_of_its_target(empty, linked, live):
+    empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6)
+    probe, objects = empty.context.object, empty.context.scene.collection.objects
+    probe.tactile_probe.live = live
+    own = linked.override_create()
+    objects.link(own)
+    objects.unlink(linked)
+    empty.context.view_layer.update()
+    assert (probe.tactile_probe.target, probe.parent) == (own, own)
+    assert is_content(probe)
+    own.location.x += 1.0
+    empty.context.view_layer.update()
+    assert probe.matrix_world.translation.x == pytest.approx(1.31, abs=0.01)
+    assert is_content(probe)
+
+
+def test_a_probe_on_an_override_is_not_confused_by_the_object_it_is_of(empty, linked):
+    own = linked.override_create()
+    empty.context.scene.collection.objects.link(own)
+    empty.context.view_layer.update()
+    assert own.name == linked.name
+    empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6)
+    probe = empty.context.object
+    for target in (own, linked):
+        probe.tactile_probe.target = target
+        empty.context.view_layer.update()
+        assert is_content(probe), probe.tactile_probe.message

@@ -181,3 +181,46 @@ def test_an_edit_while_the_extension_was_off_is_seen_once_it_is_on(
     empty.data.objects["Sphere Probe"].update_tag()
     empty.context.view_layer.update()
     assert_followed_or_said(empty.data.objects["Sphere Probe"], live, -1.0 / 2.4)
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_another_name_is_no_other_target_and_no_other_probe(empty, extension, ball, live):
+    empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6)
+    probe, record = empty.context.object, record_of(empty.context.object)
+    probe.tactile_probe.live = live
+    before, shown = record.to_dict(), probe.children[0].data.vertices[0].co.copy()
+    ball.name = "Globe"
+    empty.context.view_layer.update()
+    probe.name = "Finger"
+    empty.context.view_layer.update()
+    assert record.to_dict() == before | {"source": "Globe"}
+    ball.location.x += 1.0
+    empty.context.view_layer.update()
+    assert said(probe)[0] == "ok"
+    assert record["frame"]["origin"][0] == pytest.approx(before["frame"]["origin"][0] + 1.0, abs=1e-5)
+    assert record["frame"]["origin"][:] == pytest.approx(tuple(probe.matrix_world.translation), abs=1e-5)
+    assert record["seconds"].to_dict() == before["seconds"]  # nothing was touched
+    assert probe.children[0].data.vertices[0].co == shown
+    ball.scale.x = 1.1
+    empty.context.view_layer.update()
+    assert said(probe) == (("ok", said(probe)[1]) if live else ("outdated", STALE))
+    assert empty.ops.tactile.update() == {"FINISHED"}
+    assert said(probe)[0] == "ok"
+
+
+def test_a_renamed_target_gives_its_probe_to_another_that_is_chosen(empty, ball):
+    empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6)
+    probe = empty.context.object
+    probe.tactile_probe.live = False
+    empty.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64, radius=2.0)
+    other, ball.name = empty.context.object, "Globe"
+    empty.context.view_layer.update()
+    probe.tactile_probe.target = other
+    empty.context.view_layer.update()
+    assert probe.parent == other
+    assert said(probe) == ("outdated", STALE)
+    place = record_of(probe)["frame"]["origin"].to_list()
+    other.location.x += 1.0  # the patch is none of this one's, and stays
+    empty.context.view_layer.update()
+    assert record_of(probe)["frame"]["origin"].to_list() == place
+    assert record_of(probe)["source"] == "Globe"

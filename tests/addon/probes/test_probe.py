@@ -689,6 +689,16 @@ def test_the_suggested_planes_lower_the_deviation(empty, ball):
     assert not empty.ops.tactile.add_plane.poll()
 
 
+@pytest.mark.parametrize("plane", [4, 5])
+def test_a_plane_that_is_not_there_is_not_removed(empty, ball, plane):
+    probe, patch = pick(empty, plane_count=4)
+    before, azimuths = report_of(patch), probe.tactile_probe.azimuths[:]
+    with pytest.raises(RuntimeError, match="There are 4 planes, 0 to 3: take one of them"):
+        empty.ops.tactile.remove_plane(plane=plane)
+    assert (report_of(patch), probe.tactile_probe.azimuths[:]) == (before, azimuths)
+    assert probe.tactile_probe.plane_count == 4
+
+
 def test_removing_a_plane_keeps_the_order_of_the_others(empty, ball):
     azimuths, tilts = [0.1, 0.7, 1.3, 1.9, 2.5, 0.0], [0.0, 0.1, 0.2, -0.1, -0.2, 0.0]
     _, patch = pick(empty, plane_count=5, azimuths=azimuths, tilts=tilts)

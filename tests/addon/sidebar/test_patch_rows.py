@@ -3,6 +3,7 @@
 """What the sidebar says: a verdict first, found values, and what each row means."""
 
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,6 +14,11 @@ UNIT = ("mm", 1.0)
 @pytest.fixture
 def said(extension):
     return extension.tactile_addon.sidebar.patch_rows
+
+
+@pytest.fixture
+def wording(extension):
+    return extension.tactile_addon.touch.wording
 
 
 @pytest.fixture
@@ -28,34 +34,53 @@ def record(status="ok", message="The patch describes its contacts.", **more):
     return {"status": status, "message": message, "height_std": 0.0123, **more}
 
 
-def test_the_verdict_says_good_and_how_good(said):
-    assert said.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
+def test_the_verdict_says_good_and_how_good(wording):
+    assert wording.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
     blind = record(
         message="The patch describes its contacts. 3 of 28 coefficients are invisible to these planes."
     )
-    assert said.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
+    assert wording.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
 
 
-def test_the_verdict_says_what_limits_a_good_patch(said, empty):
+def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
     empty.ops.mesh.primitive_cube_add()
     empty.ops.tactile.pick(target="Cube", location=(0.9, 0.2, 1.0), extent=0.5)
     (patch,) = empty.context.object.children
-    words = said.verdict(patch["tactile"].to_dict(), UNIT)
+    words = wording.verdict(patch["tactile"].to_dict(), UNIT)
     assert words == "Good, with 3 of 6 half curves cut short at a crease"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
-def test_the_verdict_says_what_to_do_where_there_is_doubt(said, status):
+def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     message = (
         "Heights are good to 5.3 % of the radius in the mean: take a shorter extent, or add sampling planes."
         " 3 of 28 coefficients are invisible to these planes. All half curves end at a crease."
     )
-    words = said.verdict(record(status, message), UNIT)
+    words = wording.verdict(record(status, message), UNIT)
     assert words == "Doubtful: take a shorter extent, or add sampling planes"
 
 
-def test_the_verdict_on_an_earlier_patch_is_none(said):
-    assert said.verdict(record("outdated"), UNIT) == "Outdated: touch again"
+def test_the_verdict_on_an_earlier_patch_is_none(wording):
+    assert wording.verdict(record("outdated"), UNIT) == "Outdated: touch again"
+
+
+@pytest.mark.parametrize("size", [0.065, 2.0, 65.0])
+def test_a_number_is_dragged_by_the_size_of_the_object(empty, extension, size):
+    """What 20 pixels move a number by is a fifth of its step: Blender counts it in hundredths."""
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.5 * size)
+    empty.ops.tactile.pick(location=(0.0, 0.0, 0.5 * size))
+    settings = empty.context.object.tactile_probe
+    fields = extension.tactile_addon.probes.number_fields.fields(max(settings.target.dimensions))
+    moves = {name: 0.2 * settings.bl_rna.properties[shown].step / size for name, shown in fields.items()}
+    assert 0.009 < moves["extent"] < 0.1
+    assert 0.0009 < moves["step"] < 0.01
+    assert 0.00009 < moves["noise"] < 0.001
+    (patch,) = empty.context.object.children
+    assert getattr(settings, fields["extent"]) == pytest.approx(patch["tactile"]["extent"])  # as found
+    assert settings.extent == getattr(settings, fields["noise"]) == 0.0
+    setattr(settings, fields["extent"], 0.2 * size)
+    assert settings.extent == pytest.approx(0.2 * size)
+    assert patch["tactile"]["extent"] == pytest.approx(0.2 * size)
 
 
 def test_what_was_found_stands_beside_auto(said, empty, ball):
@@ -71,16 +96,17 @@ def test_what_was_found_stands_beside_auto(said, empty, ball):
 
 def test_rows_are_told_apart_by_how_they_begin(said, ball):
     _, report = ball
-    labels = [label for label, _ in said.main_rows(report, UNIT) + said.other_rows(report, UNIT)]
+    rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT)
+    labels = [label for label, value in rows if value]  # and no heading
     assert len({label[:5] for label in labels}) == len(labels) == len(set(labels))
-    assert max(map(len, labels)) <= 15
+    assert max(map(len, labels)) <= 11
 
 
 def test_every_row_says_what_it_is(said, extension, ball):
     _, report = ball
     addon = extension.tactile_addon
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT) + said.plane_rows(report, UNIT)
-    labels = [label for label, _ in rows] + ["Error on 9 More", "Total |K|", "Would Bring"]
+    labels = [label for label, value in rows if value] + ["Error on 9 More", "Total |K|", "Would Bring"]
     assert not [
         label for label in labels if not re.match(r"[A-Z1\d].{15,}", addon.sidebar.rows.tip_of(label))
     ]
@@ -104,3 +130,61 @@ def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
         empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=0.2)
     with pytest.raises(RuntimeError, match=r"got nan mm, 0 mm and 0 mm"):
         empty.ops.tactile.pick(target="Cube", location=(0.0, 0.0, 0.025), extent=float("nan"))
+
+
+class Layout:
+    """What a panel draws, as (text, whether it is drawn as usual) in `drawn`; parts of it share the list."""
+
+    def __init__(self, whole=None):
+        self.drawn, self.whole, self.active = [] if whole is None else whole.drawn, whole, True
+
+    @property
+    def is_gray(self):
+        return not self.active or (self.whole is not None and self.whole.is_gray)
+
+    def part(self, *_, **__):
+        return Layout(self)
+
+    row = column = split = box = part
+
+    def label(self, *, text="", **_):
+        self.drawn.append((text, not self.is_gray))
+
+    def panel(self, *_, **__):
+        return self.part(), self.part()
+
+    def operator(self, *_, text="", **__):
+        self.drawn.append((text, not self.is_gray))
+        return SimpleNamespace()
+
+    def prop(self, *_, **__):
+        pass
+
+    prop_search = prop
+
+
+def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty, ball):
+    probe, _ = ball
+    assert empty.ops.tactile.verify() == {"FINISHED"}
+    probe.tactile_probe.live = False
+    context = SimpleNamespace(
+        view_layer=empty.context.view_layer,
+        scene=empty.context.scene,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        region=SimpleNamespace(width=300),
+        space_data=SimpleNamespace(shading=SimpleNamespace(type="MATERIAL")),
+    )
+
+    def drawn():
+        layout = Layout()
+        extension.tactile_addon.sidebar.panel.TACTILE_PT_result.draw_active(None, context, layout, probe)
+        return layout.drawn
+
+    numbers = ("κ1", "κ2", "Height", "Curvedness", "Overlap")
+    assert "Last Touch" not in dict(drawn())
+    assert all(dict(drawn())[name] for name in numbers[:4])
+    probe.tactile_probe.extent = 0.2
+    empty.context.view_layer.update()
+    texts = [text for text, _ in drawn()]
+    assert texts.index("Last Touch") < texts.index("κ1")
+    assert not any(dict(drawn())[name] for name in numbers)

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 from mathutils import Vector
+from scenes import made
 
 OFF = "The principal directions may be"
 
@@ -31,6 +32,19 @@ def test_a_patch_of_a_given_extent_says_where_its_curves_ended_before(empty, cub
     assert "half curves" not in report_of(empty, (0.1, 0.2, 1.0), extent=0.5)["message"]
 
 
+@pytest.mark.parametrize("extent", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize("location", [(0.9, 0.2, 1.0), (0.98, 0.1, 1.0), (0.9, 0.85, 1.0), (0.6, -0.7, 1.0)])
+def test_the_patch_ends_at_the_edges_of_its_face(empty, cube, location, extent):
+    report_of(empty, location, extent=extent)
+    (patch,) = empty.context.object.children
+    reach = max(
+        abs(value) for v in patch.data.vertices for value in (patch.matrix_world @ v.co)[:2]
+    )  # the cube's is 1
+    assert reach < 1.005
+    assert empty.ops.tactile.verify() == {"FINISHED"}
+    assert patch["tactile"]["verification"]["overlap"] > 0.99
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.4])
 @pytest.mark.parametrize("extent", [0.0, 0.2, 0.5])
 @pytest.mark.parametrize("location", [(0.1, 0.2, 1.0), (0.9, 0.2, 1.0), (0.9, 0.85, 1.0)])
@@ -42,11 +56,46 @@ def test_a_plane_gets_no_advice_about_directions_that_it_does_not_have(empty, cu
     assert OFF not in report["message"]
 
 
+@pytest.fixture
+def monkey(empty):
+    """Blender's monkey without its Subdivision modifier: facets."""
+    empty.ops.mesh.primitive_monkey_add()
+    return empty.context.object
+
+
+def test_a_patch_on_facets_names_them_and_the_modifier(empty, monkey):
+    report = made(empty.ops.tactile.reconstruct, target="Suzanne", location=(0.25, -0.55, 0.75))[1]
+    assert report["vertices"] < 6
+    assert report["message"].startswith("The patch lies on facets (vertices of the mesh over it: ")
+    assert "): add a Subdivision modifier, if the mesh stands for a smooth shape. " in report["message"]
+    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = 4
+    report = made(empty.ops.tactile.reconstruct, target="Suzanne", location=(0.25, -0.55, 0.75))[1]
+    assert report["vertices"] > 20
+    assert "facets" not in report["message"]
+
+
+def test_a_touch_that_fails_on_facets_names_them_and_the_modifier(empty, monkey):
+    corner = monkey.data.vertices[0].co
+    words = r"The facets there are [\d.]+ \w*m long: add a Subdivision modifier, if the mesh stands"
+    with pytest.raises(RuntimeError, match=words):
+        empty.ops.tactile.reconstruct(target="Suzanne", location=corner)
+
+
+def test_a_crease_of_a_fine_mesh_is_none_between_facets(empty, cube):
+    modifier = cube.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels, modifier.subdivision_type = 6, "SIMPLE"
+    empty.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="it needs besides the reference point") as caught:
+        empty.ops.tactile.reconstruct(target="Cube", location=(0.999, 0.999, 1.0))
+    assert "facets" not in str(caught.value)
+
+
 def test_what_rounding_leaves_of_nothing_is_said_to_be_none(extension):
     said = extension.tactile_addon.sidebar.patch_rows
     rows = dict(said.main_rows(RECORD, ("mm", 1.0)) + said.other_rows(RECORD, ("mm", 1.0)))
-    assert rows["κ1 Curvature"] == "0 ± 0.01 1/mm"
-    assert rows["κ2 Curvature"] == "0.02 ± 0.01 1/mm"
+    assert rows["κ1"] == "0 ± 0.01 1/mm"
+    assert rows["κ2"] == "0.02 ± 0.01 1/mm"
     assert rows["K Gaussian"] == "0 ± 0.01 1/mm²"
     assert rows["Fit Error"] == "0 mm"
 

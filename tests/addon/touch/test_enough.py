@@ -120,7 +120,7 @@ def test_the_shell_asks_for_planes_too(command, files):
 
 @pytest.mark.parametrize(("name", "noise"), [("cad_block.stl", 0.0), ("shell_gastropod.stl", 0.05)])
 def test_no_patch_across_an_edge_or_a_rib(empty, extension, scans, name, noise):
-    """Of touches all over, those without a warning are off the mesh by no more than they say."""
+    """Touches without a warning, all over the mesh, are off it by no more than they say."""
     extension.tactile_addon.files.mesh_file.open_file(scans / name)
     obj = empty.context.scene.objects[0]
     faces = np.array([(*face.center, face.area) for face in obj.data.polygons])

@@ -32,7 +32,7 @@ def reconstruct(bpy, **arguments):
 
 
 def test_enabling_the_extension_imports_no_scipy():
-    """In a process of its own, for the tests import scipy."""
+    """A process of its own looks, for the tests import scipy."""
     code = (
         "import sys, bpy, addon_utils; addon_utils.enable('bl_ext.user_default.tactile_patch');"
         "assert hasattr(bpy.types, 'TACTILE_OT_reconstruct'), 'not enabled';"
@@ -227,7 +227,7 @@ def test_extent_and_step_suit_the_object_where_they_are_not_given(empty, ball):
 
 
 def test_the_chosen_extent_does_not_depend_on_how_the_object_is_turned(empty, ball):
-    """With the planes turned along, which are otherwise laid out by the axes of the world."""
+    """The planes turn along, which are otherwise laid out by the axes of the world."""
     ball.scale = (1.0, 2.0, 0.5)
     extents, along = [], None
     for angle in (0.0, 0.7):
@@ -549,7 +549,7 @@ def test_a_doubtful_patch_finishes_with_a_warning(empty, capfd):
     _, report = reconstruct(empty, location=(0.42, -0.62, 0.78), extent=0.3)
     assert report["status"] == "uncertain"
     assert "take a shorter extent" in report["message"]
-    assert "Warning: Heights are good to" in capfd.readouterr().out
+    assert "Warning: Doubtful: take a shorter extent, or add sampling planes" in capfd.readouterr().out
 
 
 def test_a_bump_between_the_curves_is_a_doubt_once_the_mesh_is_compared(empty):

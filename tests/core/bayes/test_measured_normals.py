@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, reconstruct_many
 from core.bayes import evidence, linear_system, posterior
-from core.bayes.contradiction import contradiction
+from core.bayes.contradiction import contradiction, measured_normals
 from core.bayes.measured_slopes import slope_equations
+from core.contours.local_geometry import Frame
 from core.patch.monge import monomials
 
 PLANES = surfaces.planes((0, 60, 120))
@@ -147,7 +148,7 @@ def test_the_order_and_the_side_of_normals_make_no_difference():
 
 
 def test_slopes_are_the_derivatives_of_the_heights():
-    """Of a surface with these coefficients exact normals are met exactly; by finite differences."""
+    """Exact normals, by finite differences of a surface with these coefficients, are met exactly."""
     rng = np.random.default_rng(3)
     local, b, h = rng.uniform(-0.8, 0.8, (1, 9, 3)), 0.2 * rng.normal(size=27), 1e-6
     x, y, _ = local[0].T
@@ -181,9 +182,9 @@ def test_without_slopes_both_likelihoods_are_one():
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
     alone = linear_system.linear_system(local, weights, nothing, local[:, :0])
-    data = evidence.restricted(linear_system.of_heights(alone, weights))
+    data = evidence.restricted(alone.equations)
     empty = alone._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
-    one, other = (linear_system.hyperparameters(s, data, weights, np.array([2e-3])) for s in (alone, empty))
+    one, other = (linear_system.hyperparameters(s, data, np.array([2e-3])) for s in (alone, empty))
     for a, b in zip(one, other, strict=True):
         assert b == pytest.approx(a, rel=1e-4)
 
@@ -230,7 +231,7 @@ def test_right_normals_are_not_doubted(std):
 
 
 def test_normals_that_only_scatter_more_than_was_said_contradict_nothing():
-    """As those of a texture do."""
+    """Normals of a texture are like that."""
     surface = surfaces.pear()
     for seed in range(20):
         contours = [replace(c, normal_std=0.02) for c in measured(touched(surface, 0.02), 0.1, seed)]
@@ -292,7 +293,7 @@ def test_no_normal_is_taken_for_better_than_a_hundredth_of_a_radian():
 
 
 def test_a_contradiction_is_counted_in_deviations_of_the_mean_and_in_radians():
-    """Of a plane that contacts know all about, and normals that lean by .03 radians, good to .02 each."""
+    """Contacts know all about a plane; normals, good to .02 radians each, lean by .03."""
     rng = np.random.default_rng(9)
     contacts = np.column_stack([rng.uniform(-0.8, 0.8, (40, 2)), np.zeros(40)])
     known = posterior.Posterior(
@@ -304,3 +305,8 @@ def test_a_contradiction_is_counted_in_deviations_of_the_mean_and_in_radians():
     assert angle == pytest.approx(0.03, rel=1e-3)
     scattered = np.tile(lean / 0.02, (40, 1)) + 3.0 * rng.normal(size=(40, 3))
     assert contradiction(contacts, scattered, known)[0] < 0.6 * deviations
+
+
+def test_of_contours_without_normals_there_are_none():
+    contacts, normals = measured_normals([Contour(np.eye(3))], Frame(np.zeros(3), np.eye(3)), 1.0)
+    assert contacts.shape == normals.shape == (0, 3)

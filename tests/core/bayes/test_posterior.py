@@ -7,7 +7,7 @@ import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import Contour, SamplingPlane, reconstruct, suggest_plane, track
+from core import Contour, SamplingPlane, reconstruct, reconstruct_many, suggest_plane, track
 from core.bayes import evidence, joint_fit, linear_system, posterior
 from core.patch.monge import monomials
 from core.reconstruction import next_plane
@@ -304,7 +304,8 @@ def test_without_evidence_the_waviness_is_the_priors():
     w = evidence.WAVINESS
     density = np.exp(-0.5 * (np.log(w / 0.6) / 0.5) ** 2)
     density /= density.sum()
-    assert found.waviness == pytest.approx([np.exp(density @ np.log(w))])
+    typical = evidence.prior_variances(np.exp(density @ np.log(w)))
+    assert found.typical[0] == pytest.approx(typical)
     assert found.variances[0] == pytest.approx(density @ evidence.prior_variances(w))
     assert found.noise == pytest.approx([0.01])
     assert evidence.prior_variances(np.array([0.6]))[0, [0, -1]] == pytest.approx([0.036**2, 0.007776**2])
@@ -335,6 +336,10 @@ def test_an_outlying_contact_weighs_as_under_students_distribution():
 
 
 def test_scatter_makes_contacts_outlying_beyond_five_of_its_deviations_by_the_median():
+    even = np.array([[1.0, -1.0, 1.0, 1.0, 2.0, -2.0, 2.0, 12.0]]) * 0.01
+    for floor in (1e-4, 2e-3):
+        weights = joint_fit._student_weights(even, np.ones((1, 8), dtype=bool), np.full(1, floor))
+        assert weights[0] == pytest.approx(5.0 / (4.0 + (even[0] / (1.4826 * 0.015)) ** 2))
     residuals = np.array([[1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 8.0]]) * 0.01
     deviation = 1.4826 * 0.01
     weights = joint_fit._student_weights(residuals, np.ones((1, 7), dtype=bool), np.full(1, 2e-3))
@@ -347,7 +352,7 @@ def test_scatter_makes_contacts_outlying_beyond_five_of_its_deviations_by_the_me
 
 def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
     surface = surfaces.torus(40, 20, 0.6)
-    for azimuths in ((0, 60, 120), (0, 35, 80), (10, 20, 60)):
+    for azimuths in ((0, 60, 120), (0, 35, 80), (10, 20, 60), (0, 45, 100), (5, 50, 140), (0, 70, 110)):
         r = touched(surface, surfaces.planes(azimuths), noise=0.03)
         points, weights = r.domain.nodes
         lost = next_plane._lost(r, points / r.radius, next_plane.AZIMUTHS) @ weights
@@ -355,6 +360,7 @@ def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
         chosen = np.argmin(np.abs(next_plane.AZIMUTHS - plane.azimuth))
         assert next_plane.AZIMUTHS[chosen] == pytest.approx(plane.azimuth)
         assert lost[chosen] > 0.97 * lost.max()
+        assert lost[chosen] >= (1.0 - 1e-12) * lost[(chosen + np.arange(-1, 2)) % len(lost)].max()
 
 
 @pytest.mark.parametrize("planes", [THREE, surfaces.planes((0, 25, 70))], ids=["even", "uneven"])
@@ -372,6 +378,11 @@ def test_deviations_of_curvatures_are_those_of_surfaces_drawn_from_the_posterior
         assert found == pytest.approx(np.std(values), rel=0.01)
 
 
+def prior_mean(k1, k2):
+    """Of one surface."""
+    return linear_system.prior_mean(np.array([k1]), np.array([k2]))[0]
+
+
 @pytest.mark.parametrize("k", [-0.7, 0.4])
 def test_the_priors_mean_goes_on_as_spheres_and_cylinders_do(k):
     """z = (1 - sqrt(1 - k^2 r^2)) / k is k r^2 / 2 + k^3 r^4 / 8 + k^5 r^6 / 16 and more."""
@@ -380,14 +391,14 @@ def test_the_priors_mean_goes_on_as_spheres_and_cylinders_do(k):
     terms = monomials(x, y, posterior.TERMS)
     for pair, square in (((k, k), x**2 + y**2), ((k, 0.0), x**2), ((0.0, k), y**2)):
         wanted = k**3 * square**2 / 8.0 + k**5 * square**3 / 16.0
-        assert terms @ linear_system.prior_mean(*pair) == pytest.approx(wanted, rel=1e-9)
-    assert np.array_equal(linear_system.prior_mean(-3.0, 2.0), linear_system.prior_mean(-1.0, 1.0))
+        assert terms @ prior_mean(*pair) == pytest.approx(wanted, rel=1e-9)
+    assert np.array_equal(prior_mean(-3.0, 2.0), prior_mean(-1.0, 1.0))
 
 
 @pytest.mark.parametrize(("k1", "k2"), [(-0.6, 0.3), (0.2, 0.5)])
 def test_the_priors_mean_between_is_that_of_a_surface_that_goes_on_and_of_a_torus(k1, k2):
     """Q |grad Q|^2 / 4 has k1 k2 (k1 + k2) / 8 of x^2 y^2, a sixth of degree likewise."""
-    mean = linear_system.prior_mean(k1, k2)
+    mean = prior_mean(k1, k2)
     assert mean[9:14] == pytest.approx([k1**3 / 8, 0.0, (k1 * k2**2 + k2 * k1**2) / 8, 0.0, k2**3 / 8])
     a, b = k1**2, k2**2
     x, y = 0.3, -0.7
@@ -406,3 +417,47 @@ def test_the_suggested_plane_is_measured_as_the_contours_were_tracked():
         assert same == expected
         t = other.axes(s.normal, tangent)[:, 0]
         assert abs(np.cross(t, along) @ s.normal) < 1e-3  # but for the fit's normal beside the true one
+
+
+@pytest.mark.parametrize("step", [1.0, 4.0, 0.25])
+def test_what_is_expected_of_a_plane_is_the_posterior_with_its_contacts_added(step):
+    """It has as many contacts as the curves; of more than 24 means, of so much less noise."""
+    s = surfaces.torus(40, 20, 0.6)
+    r = s.fit(s.track(THREE, step=step, noise=0.05, rng=1))
+    plane, expected = suggest_plane(r)
+    count = round(len(r.contacts) / 3)
+    few = min(count, 24)
+    t = np.linspace(-1.0, 1.0, few)[:, None] * [np.cos(plane.azimuth), np.sin(plane.azimuth)]
+    basis = monomials(*t.T, posterior.TERMS)
+    noise = r.posterior.noise**2 * few / count
+    after = np.linalg.inv(np.linalg.inv(r.posterior.covariance) + basis.T @ basis / noise)
+    points, weights = r.domain.nodes
+    over = monomials(*points.T / r.radius, posterior.TERMS)
+    stds = np.sqrt(np.einsum("ni,ij,nj->n", over, after, over))
+    assert expected == pytest.approx(r.radius * weights @ stds, rel=1e-5)
+
+
+def test_a_height_at_the_origin_that_is_open_varies_with_the_terms():
+    """The level and the 27 coefficients are one Gaussian of 28."""
+    half = np.random.default_rng(4).normal(size=(28, 28))
+    whole = half @ half.T
+    level = whole[0].copy()
+    some = posterior.Posterior(np.zeros(27), whole[1:, 1:], np.array(0.1), np.zeros((22, 22)), level)
+    x, y = np.random.default_rng(5).uniform(-1.0, 1.0, (2, 9))
+    basis = np.column_stack([np.ones(9), monomials(x, y, posterior.TERMS)])
+    wanted, points = basis @ whole @ basis.T, np.column_stack([x, y])
+    assert some.height_std(x, y) ** 2 == pytest.approx(wanted.diagonal())
+    assert some.height_covariance(points, points) == pytest.approx(wanted)
+
+
+def test_a_stack_whose_touches_settle_one_after_the_other_gives_what_each_gives_alone():
+    s = surfaces.torus(40, 20, 0.6)
+    clean = s.track(THREE, noise=0.02, rng=0)
+    points = clean[1].points.copy()
+    points[[3, 20]] += [[1.0], [-0.7]] * clean[1].normals[[3, 20]]
+    touches = [[clean[0], Contour(points, noise=0.02), clean[2]], clean]
+    found = reconstruct_many([s.point] * 2, touches, outward=[s.normal] * 2)
+    for one, contours in zip(found, touches, strict=True):
+        other = s.fit(contours)
+        assert [one.patch.k1, one.patch.k2] == pytest.approx([other.patch.k1, other.patch.k2], abs=1e-9)
+        assert one.mean_height_std == pytest.approx(other.mean_height_std, rel=1e-6)

@@ -20,7 +20,7 @@ from core import (
 from core.bayes import residual_evidence
 from core.bayes.evidence import USUAL_WAVINESS, prior_variances
 from core.bayes.posterior import DISK, FREE, nodes
-from core.bayes.residual_evidence import FREE_VARIANCE, Touch, fitted, system_of
+from core.bayes.residual_evidence import FREE_VARIANCE, Observations, fitted, system_of
 from core.bayes.rough_fit import QUARTIC_SHARE
 from core.patch import residual
 from core.patch.monge import TERMS, exponents, monomials
@@ -80,7 +80,7 @@ def test_the_mean_alone_is_that_of_the_posterior(weight):
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     contacts = np.column_stack([flat, rough(3)(flat)])
     weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
-    touch = Touch(contacts, weights, 1e-3, 4e-3, None)
+    touch = Observations(contacts, weights, 1e-3, 4e-3, None)
     system = system_of(touch)
     size = residual_evidence.sizes(touch, system)
     mean = residual_evidence.mean_given(touch, system, size)
@@ -120,7 +120,7 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     _, r = touched(noise=noise)
     contacts, (x, y, z) = r.contacts / r.radius, r.contacts.T / r.radius
     sizes = np.array([4e-4, 9e-4])
-    touch = Touch(contacts, np.ones(len(x)), noise, noise, None)
+    touch = Observations(contacts, np.ones(len(x)), noise, noise, None)
     residual = fitted(touch, system_of(touch), sizes, noise)
     variances = np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(USUAL_WAVINESS))])
     places, points = contacts[:, :2], over(r) / r.radius
@@ -181,7 +181,7 @@ def test_the_point_is_a_contact_like_the_others():
 
 
 def test_a_point_above_its_surroundings_bends_no_curvature():
-    """As where a vertex of facets is touched: all contacts but the point are lower by a noticeable length."""
+    """All contacts but the point are noticeably lower, as where a vertex of facets is touched."""
     for seed in range(4):
         _, r = touched(seed)
         lower = []
@@ -251,7 +251,7 @@ def test_it_moves_with_its_contacts(scale):
 
 
 def test_a_stack_of_rough_and_smooth_touches_gives_what_each_gives_alone():
-    smooth = surfaces.graph({(2, 0): -0.02, (0, 2): 0.0075})
+    smooth = surfaces.graph({(2, 0): -0.01, (0, 2): 0.0075})
     exact = smooth.track(surfaces.UPRIGHT, extent=EXTENT, step=1.5)
     touches = [
         contours_of(rough(0)),
@@ -326,3 +326,54 @@ def test_the_derivatives_of_a_surface_with_a_residual_are_those_of_its_height_in
     assert d.y == pytest.approx((r.height(x, y + h) - r.height(x, y - h)) / (2.0 * h), abs=2e-4)
     xx = (r.height(x + h, y) - 2.0 * r.height(x, y) + r.height(x - h, y)) / h**2
     assert d.xx == pytest.approx(xx, abs=0.02 * np.abs(d.xx).max() + 2e-3)
+    plain = r.geometry.polynomial.derivatives(x, y)
+    beside = r.residual.derivatives(x / r.radius, y / r.radius)
+    for name in ("xx", "xy", "yy"):
+        wanted = getattr(plain, name) + getattr(beside, name) / r.radius
+        assert getattr(d, name) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
+    """But for 2 pi: with a residual of any size, and without one."""
+    flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
+    basis, heights = monomials(*flat.T, TERMS), rough(3)(flat)
+    noises = np.array([1e-3, 2e-3, 4e-3])
+
+    def surprise(covariance):
+        return np.linalg.slogdet(covariance)[1] + heights @ np.linalg.solve(covariance, heights)
+
+    def prior(waviness):
+        return (basis * residual_evidence._prior(waviness)) @ basis.T
+
+    found = residual_evidence._surprises(basis, heights, residual.kernels(flat, flat), noises)
+    assert found.shape == (2, 5, 3) and np.isfinite(found).sum() > 6
+    for (length, at, i), value in np.ndenumerate(found):
+        if np.isfinite(value):
+            within = residual_evidence.AMPLITUDES[at] ** 2 * residual.kernels(flat, flat)[length]
+            white = noises[i] ** 2 * np.eye(len(flat))
+            assert value == pytest.approx(surprise(prior(USUAL_WAVINESS) + within + white), rel=1e-6)
+    alone = residual_evidence._surprises_alone(basis / 4e-3, heights / 4e-3)
+    for value, waviness in zip(alone, residual_evidence.ALONE, strict=True):
+        white = 4e-3**2 * np.eye(len(flat))
+        wanted = surprise(prior(waviness) + white) - 2.0 * len(flat) * np.log(4e-3)
+        assert value == pytest.approx(wanted, rel=1e-6)
+
+
+def test_the_noise_may_be_all_that_a_sextic_leaves_over():
+    rng = np.random.default_rng(6)
+    contacts = np.column_stack([rng.uniform(-0.7, 0.7, (120, 2)), rng.normal(0.0, 0.008, 120)])
+    touch = Observations(contacts, np.ones(120), 1e-3, 8e-3, None)
+    assert residual_evidence.sizes(touch, system_of(touch)).noise > 6e-3
+
+
+def test_the_factor_of_places_is_that_of_their_covariance():
+    places = np.random.default_rng(7).uniform(-1.0, 1.0, (60, 2))
+    within = kernel(places, places, np.array([2e-4, 3e-4]))
+    factor = residual.places_factor(within.copy())
+    assert factor @ factor.T == pytest.approx(within, abs=1e-11)
+    assert np.array_equal(factor, np.tril(factor))
+
+
+def test_contacts_beside_a_residual_are_known_to_five_ten_thousandths_of_the_radius_at_best():
+    noises = [float(touched(seed)[1].residual.noise) for seed in range(6)]
+    assert 5e-4 <= min(noises) < 1e-3

@@ -14,6 +14,7 @@ from core import (
     DegenerateCurvesError,
     SamplingPlane,
     common_point,
+    in_running_order,
     reconstruct,
 )
 
@@ -154,3 +155,14 @@ def test_a_long_curve_among_many_short_ones():
     point, misses = common_point(contours)
     assert point == pytest.approx(np.zeros(3), abs=1e-6)
     assert misses.max() < 1e-6
+
+
+def test_contacts_come_into_running_order_with_their_normals():
+    whole, shuffle = bent(0.3, 41), np.random.default_rng(0).permutation(41)
+    normals = np.column_stack([whole.points[:, :2], np.full(41, 2.0)])
+    found = in_running_order(Contour(whole.points[shuffle], normals=normals[shuffle]), (0.0, 0.0, 0.0))
+    way = 1 if found.points[0, 0] < 0.0 else -1
+    assert np.array_equal(found.points[::way], whole.points)
+    assert np.array_equal(found.normals[::way], normals)
+    nothing = Contour(np.empty((0, 3)))
+    assert in_running_order(nothing, (0.0, 0.0, 0.0)) is nothing

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Contours of very many contacts, with noise in all directions: as good as few, and as honest."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import surfaces
@@ -20,13 +22,22 @@ SURFACES = {
 }
 
 
-def scattered(surface, count, noise, seed):
-    """So many contacts a curve, anywhere on it, off by `noise` in all directions."""
-    rng, found = np.random.default_rng(seed), []
+@cache
+def curves_of(surface):
+    """A spline by arc length through each contour of a surface, and its length."""
+    found = []
     for contour in surface.track(surfaces.planes((0, 60, 120)), extent=EXTENT, step=EXTENT / 48):
         steps = np.linalg.norm(np.diff(contour.points, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
-        points = CubicSpline(along, contour.points)(np.sort(rng.uniform(0.0, along[-1], count)))
+        found.append((CubicSpline(along, contour.points), along[-1]))
+    return found
+
+
+def scattered(surface, count, noise, seed):
+    """So many contacts a curve, anywhere on it, off by `noise` in all directions."""
+    rng, found = np.random.default_rng(seed), []
+    for curve, length in curves_of(surface):
+        points = curve(np.sort(rng.uniform(0.0, length, count)))
         found.append(points + rng.normal(0.0, noise, (count, 3)))
     return found
 
@@ -89,6 +100,14 @@ def test_means_run_as_the_contour_does_and_keep_to_their_side_of_the_point():
     assert fewer.normals == pytest.approx(np.tile([0.0, 0.6, 0.8], (MOST_CONTACTS, 1)))
     backward, _ = thinned(Contour(points[::-1]), np.array([7.0, -3.0, 5.0]))
     assert backward.points == pytest.approx(fewer.points[::-1])
+
+
+@pytest.mark.parametrize("count", [101, 150, 201])
+def test_more_than_a_hundred_contacts_become_a_hundred_at_most(count):
+    t = np.linspace(0.1, 1.0, count)
+    fewer, size = thinned(Contour(np.column_stack([t, 0.0 * t, -0.2 * t**2])), np.zeros(3))
+    assert size == -(-count // MOST_CONTACTS) > 1
+    assert len(fewer.points) <= MOST_CONTACTS
 
 
 @pytest.mark.parametrize("count", [1, 50, MOST_CONTACTS])

@@ -262,3 +262,19 @@ def test_single_precision_may_round_by_a_hundredth_of_a_curves_size(spacings, go
     else:
         with pytest.raises(ValueError, match="numbers of single precision are"):
             Contour(points.astype(np.float32))
+
+
+@pytest.mark.parametrize("step", [0.01, 100.0])
+def test_a_ray_that_slips_between_two_faces_is_cast_again_a_thousandth_of_a_step_beside(step):
+    """A plate of five steps to each side, which no ray meets at the very point."""
+
+    class Plate:
+        def ray_cast(self, origin, direction, distance):
+            t = np.inf if direction[2] == 0.0 else -origin[2] / direction[2]
+            x, y = (origin[i] + t * direction[i] if t < np.inf else np.inf for i in (0, 1))
+            missed = not 0.0 <= t <= distance or max(abs(x), abs(y)) > 5.0 * step or x == y == 0.0
+            return None if missed else ((x, y, 0.0), (0.0, 0.0, 1.0))
+
+    (contour,) = track(Plate(), (0, 0, 0), (0, 0, 1), [SamplingPlane(0.0)], extent=4 * step, step=step)
+    assert len(contour.points) == 9
+    assert contour.points[5] == pytest.approx([step, 0.0, 0.0], abs=1.1e-3 * step)

@@ -7,7 +7,9 @@ import pytest
 import surfaces
 
 import core
+from core.exploration import growth, one_touch, touches
 from core.exploration.one_touch import NOTICEABLE, is_enough
+from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
 
 PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
@@ -66,7 +68,7 @@ def test_on_a_sphere_the_patch_is_large_and_as_good_as_it_says(radius, noise):
     assert off < 3.0 * r.mean_height_std
 
 
-@pytest.mark.parametrize(("high", "wide"), [(1.6, 2.4), (1.2, 2.1), (3.2, 2.8)])
+@pytest.mark.parametrize(("high", "wide"), [(1.6, 2.4), (1.4, 2.3), (3.2, 2.8)])
 def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_lengths_tried_first(high, wide):
     def waves(x, y):
         return high * np.sin(x / wide) * np.sin(y / wide)
@@ -81,6 +83,38 @@ def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_leng
     assert true_error(surface, found) < 1.5 * found.result.mean_height_std
 
 
+def short_waves():
+    return bowl_with(
+        lambda x, y: 0.12 * np.sin(2.0 * x) * np.sin(2.0 * y),
+        lambda x, y: (
+            0.24 * np.cos(2.0 * x) * np.sin(2.0 * y),
+            0.24 * np.sin(2.0 * x) * np.cos(2.0 * y),
+        ),
+    )
+
+
+def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
+    asked = []
+    monkeypatch.setattr(touches, "fitted", lambda *given: asked.append(1) or fitted(*given))
+    found, few = explore(short_waves()), len(asked)
+    monkeypatch.setattr(growth, "TOO_ROUGH", np.inf)
+    assert explore(short_waves()).extent == found.extent
+    assert len(asked) - few > few
+
+
+def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
+    tried = growth.tried
+
+    def of_more_than_the_least(felt, counts):
+        if counts.max() <= growth.SEEDS[-1]:
+            raise core.DegenerateCurvesError("too few")
+        return (yield from tried(felt, counts))
+
+    monkeypatch.setattr(growth, "tried", of_more_than_the_least)
+    monkeypatch.setattr(growth.Felt, "roughness", lambda *_: 2.0)
+    assert explore(surfaces.plane()).result.status == "ok"
+
+
 def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
     found = explore(surfaces.plane(), noise=0.01, rng=0)
     assert found.extent == pytest.approx(30.0)
@@ -88,9 +122,10 @@ def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
     assert {stop for contour in found.contours for stop in contour.stops} == {core.EXTENT}
 
 
-def test_curves_end_before_a_rib_and_go_on_elsewhere():
+@pytest.mark.parametrize("options", [{}, {"step": 0.25}], ids=["any step", "a fine step"])
+def test_curves_end_before_a_rib_and_go_on_elsewhere(options):
     surface = rib(at=9.0, high=0.8, wide=1.0)
-    found = explore(surface)
+    found = explore(surface, **options)
     for contour in found.contours:
         assert contour.points[:, 0].max() < 8.5  # the rib rises from there
     assert core.UNEXPLAINED in found.contours[0].stops
@@ -297,7 +332,7 @@ def test_whether_contacts_are_enough_is_no_matter_of_the_unit(noise):
 
 
 def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
-    """By another fit: the deviation with as many contacts more, between those there are."""
+    """The deviation, by another fit, with as many contacts more, between those there are."""
     surface = surfaces.torus(40, 20, 0.6)
     for step, noise in ((0.5, 0.05), (2.0, 0.05), (3.0, 0.2), (1.0, 0.01)):
         planes = surfaces.planes((0, 60, 120))
@@ -344,3 +379,12 @@ def test_planes_may_be_a_number_of_evenly_laid_out_ones(count):
 def test_too_few_or_too_many_planes_are_refused(planes):
     with pytest.raises(ValueError, match="planes: wanted 3 to 24, or sampling planes, got"):
         explore(surfaces.plane(), planes=planes)
+
+
+def test_six_planes_are_the_most_unless_more_are_wanted(monkeypatch):
+    s = surfaces.torus(40, 20, 0.6)
+    monkeypatch.setattr(one_touch, "HELPS", -1.0)
+    given = {"extent": 12.0, "step": 1.0, "tolerance": 0.0, "noise": 0.05, "rng": 0}
+    assert len(core.explore(s, s.point, s.normal, **given).planes) == 6
+    assert len(core.explore_many(s, [s.point], [s.normal], **given)[0].planes) == 6
+    assert len(core.explore(s, s.point, s.normal, most_planes=4, **given).planes) == 4

@@ -239,3 +239,37 @@ def test_figure_3_and_4_of_the_paper():
     assert off_data < 0.07
     assert medians["tagc"][2] < curvature < 0.3
     assert medians["bayes"][1] < 0.02
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_the_descent_comes_down_a_bowl_of_any_size(scale):
+    """Its first step is of length 1, and here too far."""
+
+    class Bowl:
+        def fields(self, a):
+            return a
+
+        def value(self, a):
+            return scale * (1.0 + a @ a)
+
+        def gradient(self, a):
+            return 2.0 * scale * a
+
+    found, converged = tagc.descent_minimum(Bowl(), np.array([0.3, -0.1]))
+    assert converged
+    assert found == pytest.approx([0.0, 0.0], abs=2e-3)
+
+
+def test_newtons_minimum_of_a_surface_that_hardly_curves_twice_is_one_to_a_millionth(monkeypatch):
+    s, found, newton = surfaces.cylinder(20), [], tagc.newton_minimum
+
+    def caught(objective, start):
+        a, converged = newton(objective, start)
+        with monkeypatch.context() as finer:
+            finer.setattr(tagc, "CONVERGED", 1e-14)
+            found.append([objective.value(objective.fields(b)) for b in (a, newton(objective, a)[0])])
+        return a, converged
+
+    monkeypatch.setattr(tagc, "newton_minimum", caught)
+    s.fit(s.track(surfaces.planes((0, 60, 120)), noise=0.05, rng=1), method="tagc", weight=1.0)
+    assert found[0][0] <= (1.0 + 1e-6) * found[0][1]

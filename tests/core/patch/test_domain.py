@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from core.patch.domain import closed_spline_domain
+from core.patch.domain import closed_spline_domain, hull_domain
 
 
 def circle(angles, radius=1.0):
@@ -88,9 +88,20 @@ def test_beside_a_short_end_the_boundary_turns_back_nowhere(short):
     assert domain.area == pytest.approx(shoelace, rel=1e-3)
 
 
+@pytest.mark.parametrize("ends", [circle(SIXTH), UNEVEN, STUBBY], ids=["even", "uneven", "stubby"])
+def test_the_area_is_that_within_the_spline(ends):
+    domain = closed_spline_domain(ends, 1.0)
+    x, y = domain.boundary(200_000).T
+    shoelace = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+    assert domain.area == pytest.approx(shoelace, rel=2e-6)
+
+
 def test_a_curve_that_ends_at_the_point_is_no_end():
-    domain = closed_spline_domain(np.vstack([circle(SIXTH), [[1e-5, 0.0]], circle([0])]), 1.0)
-    assert len(domain.ends) == 6
+    for reach, ends in ((1e-5, 6), (9e-4, 6), (1.1e-3, 7)):
+        given = np.vstack([circle(SIXTH), circle([30], reach), circle([0])])
+        assert len(closed_spline_domain(8.0 * given, 8.0).ends) == ends
+    for degrees, ends in ((0.05, 6), (0.06, 7)):  # a thousandth of the radius is 0.0573 degrees
+        assert len(closed_spline_domain(8.0 * circle([*SIXTH, degrees]), 8.0).ends) == ends
 
 
 def test_fewer_than_three_ends_bound_nothing():
@@ -107,10 +118,59 @@ def test_lengths_scale():
 
 @pytest.mark.parametrize("others", [[(-1.0, 0.2), (-0.9, -0.3)], [(0.9, 0.1), (0.8, -0.1)]])
 def test_two_ends_in_one_direction_bound_what_the_farther_does(others):
-    """As where a curve comes back over itself; the spline through both would turn back."""
+    """A curve comes back over itself; the spline through both ends would turn back."""
     domain = closed_spline_domain([(1.0, 0.5), (0.02, 0.01), (0.5, 0.25), *others], 1.0)
     azimuths, radii = domain._polar
     assert np.isfinite(radii).all()
     assert (np.diff(azimuths) > 0.0).all()
     assert np.isfinite(domain.area)
     assert domain.contains(0.5, 0.25)
+
+
+def test_the_domain_of_scattered_contacts_is_their_hull():
+    rng = np.random.default_rng(0)
+    points = np.vstack([circle(np.arange(0, 360, 5), 2.0), rng.uniform(-1.0, 1.0, (50, 2))])
+    domain = hull_domain(points, 2.0)
+    assert domain.area == pytest.approx(4.0 * np.pi, rel=0.01)
+    assert np.hypot(*domain.boundary(100).T) == pytest.approx(2.0, rel=0.01)
+    with pytest.raises(ValueError, match="points: wanted the origin among them"):
+        hull_domain(points + np.array([1.95, 0.0]), 2.0)
+
+
+def cut(angles, distance):
+    """Ends of half curves of length 1 on what ends at x = distance, and which of them end there."""
+    ends = circle(angles)
+    ahead = np.cos(np.radians(angles))
+    is_cut = ahead > distance
+    return ends * np.where(is_cut, distance / np.where(is_cut, ahead, 1.0), 1.0)[:, None], is_cut
+
+
+@pytest.mark.parametrize("distance", [0.02, 0.1, 0.3, 0.45])
+@pytest.mark.parametrize("turn", [0, 10, 30])
+def test_the_domain_ends_where_the_surface_does(distance, turn):
+    ends, brinks = cut(SIXTH + turn, distance)
+    domain = closed_spline_domain(ends, 1.0, brinks)
+    assert brinks.any()
+    assert domain.boundary(3600)[:, 0].max() <= distance + 2e-4
+    points, weights = domain.nodes
+    assert points[:, 0].max() < distance
+    assert weights.sum() == pytest.approx(1.0, rel=1e-12)
+    dense, h = domain.grid(40000)
+    assert len(dense) * h**2 == pytest.approx(domain.area, rel=1e-2)
+    for i, j in [(2, 0), (1, 1), (0, 2), (0, 4)]:
+        moment = np.mean(dense[:, 0] ** i * dense[:, 1] ** j)
+        assert weights @ (points[:, 0] ** i * points[:, 1] ** j) == pytest.approx(moment, abs=2e-3)
+    assert domain.scaled(3.0).area == pytest.approx(9.0 * domain.area)
+
+
+def test_beside_no_brink_the_boundary_is_round():
+    ends, brinks = cut(SIXTH, 0.3)
+    domain, round_one = closed_spline_domain(ends, 1.0, brinks), closed_spline_domain(ends, 1.0)
+    turns = np.radians(np.arange(120, 241))  # where no end is one
+    places = np.column_stack([np.cos(turns), np.sin(turns)])
+    radii = np.linalg.norm(domain.points_at(places), axis=1)
+    assert radii == pytest.approx(1.0, abs=0.01)
+    assert radii[::60] == pytest.approx(1.0, abs=1e-5)
+    everywhere = closed_spline_domain(ends, 1.0, np.zeros(6, dtype=bool))
+    assert everywhere.brinks is None
+    assert (everywhere.boundary(99) == round_one.boundary(99)).all()

@@ -16,6 +16,7 @@ X, Y = RNG.uniform(-0.8, 0.8, (2, 50))
 
 
 def test_the_terms_stand_in_the_order_of_equation_1():
+    assert not exponents(3, 4).flags.writeable
     names = ["".join(map(str, term)) for term in exponents(3, 4)]
     assert names == ["30", "21", "12", "03", "40", "31", "22", "13", "04"]
     patch = MongePatch(2.0, 6.0, np.array([0, 0, 0, 0, 0, 0, 0, 5.0, 0]))
@@ -143,3 +144,25 @@ def test_monomials_differentiated_away_are_zero_even_at_the_origin():
     assert np.array_equal(
         derived_monomials(zero, zero, np.array([(3, 0), (2, 1)]), [(2, 1)]), [[[0.0], [2.0]]]
     )
+
+
+@pytest.mark.parametrize("k", [-0.5, 0.8])
+@pytest.mark.parametrize("share", [0.9, -3.0, 40.0])
+def test_closest_points_are_found_from_far_above_and_from_nearly_the_center_of_curvature(k, share):
+    patch, u = MongePatch(k, k, np.empty(0)), np.linspace(0.1, 2.0, 12)
+    t = share / k if share < 1.0 else -share / k
+    feet = np.column_stack([u, 0.7 * u, patch.height(u, 0.7 * u)])
+    points = feet + t * patch.normal(*feet[:, :2].T)
+    assert patch.closest_point(points) == pytest.approx(feet, abs=1e-8)
+
+
+def test_closest_points_of_a_steep_trough():
+    """Where the Hessian of the distance is no bowl, the step is that of the tangent plane."""
+    patch = MongePatch(-8.0, 2.0, np.empty(0))
+    points = np.random.default_rng(3).uniform(-2.0, 2.0, (100, 3))
+    ours, theirs = distances(patch, points), []
+    for p in points:
+        u, v = (p[i] + np.linspace(-3.0, 3.0, 151) for i in (0, 1))
+        u, v = np.meshgrid(u, v)
+        theirs.append(np.sqrt((u - p[0]) ** 2 + (v - p[1]) ** 2 + (patch.height(u, v) - p[2]) ** 2).min())
+    assert np.mean(ours <= np.array(theirs) + 1e-9) > 0.9

@@ -50,7 +50,7 @@ def deviations(patch, points, triangles, steps=9):
 
 
 def angles(points, triangles):
-    """Of the triangles' corners in the tangent plane, in degrees; negative where it goes round clockwise."""
+    """The triangles' angles in the tangent plane, in degrees; negative where one goes round clockwise."""
     corners = points[triangles][:, :, :2]
     u, v = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     return np.degrees(np.arctan2(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0], np.sum(u * v, axis=-1)))

@@ -107,7 +107,6 @@ def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
         (["contours"], [], "contours: wanted a list of some"),
         (["contours", 0, "points"], [1, 2], "points: wanted shape"),
         (["contours", 0, "noise"], -1.0, "noise: wanted a finite number of 0 or more"),
-        (["misses"], [[0.0, 0.0]], "misses: wanted shape"),
         (["geometry", "residual"], {"places": 3}, "places: wanted shape"),
         (["posterior", "covariance"], [[1.0]], "covariance: wanted shape"),
         (["posterior", "mean"], None, "mean: wanted it in the dict"),
@@ -124,13 +123,30 @@ def test_what_is_no_dict_is_refused(value):
         from_dict(value)
 
 
-@pytest.mark.parametrize("sign", ["negative", "skew"])
-def test_a_covariance_that_is_none_is_refused(sign):
-    d = to_dict(touched())
-    covariance = np.array(d["posterior"]["covariance"])
-    d["posterior"]["covariance"] = (-covariance if sign == "negative" else np.triu(covariance)).tolist()
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda c: -c,
+        np.triu,
+        lambda c: c + 1e-6 * np.abs(c).max() * np.eye(27, k=5),  # hardly skew
+        lambda c: c + np.abs(c).max() * (np.ones((27, 27)) - np.eye(27)),  # with a positive diagonal
+    ],
+    ids=["negative", "skew", "hardly skew", "indefinite"],
+)
+def test_a_covariance_that_is_none_is_refused(change):
+    d = to_dict(touched(noise=0.0))
+    d["posterior"]["covariance"] = change(np.array(d["posterior"]["covariance"])).tolist()
     with pytest.raises(ValueError, match="covariance: wanted a symmetric matrix without negative"):
         from_dict(d)
+
+
+def test_a_covariance_may_be_singular_but_for_rounding():
+    d = to_dict(touched(noise=0.0))
+    values, axes = np.linalg.eigh(d["posterior"]["covariance"])
+    values[0] = -1e-10 * values[-1]
+    singular = axes * values @ axes.T
+    d["posterior"]["covariance"] = (0.5 * (singular + singular.T)).tolist()
+    assert from_dict(d).blind == touched(noise=0.0).blind
 
 
 def rough():

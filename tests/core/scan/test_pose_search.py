@@ -18,6 +18,7 @@ TURN, SHIFT = Rotation.from_euler("xyz", (0.7, -1.1, 2.3)).as_matrix(), np.array
 WAVES = ((1.0, (0.27, 0.08, -0.14), 0.4), (0.8, (-0.1, 0.3, 0.19), 1.9), (0.9, (0.16, -0.19, 0.24), 3.0))
 
 
+@cache
 def ball(count=10000):
     """Points all over the unit sphere (n, 3), and counterclockwise triangles."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
@@ -58,8 +59,9 @@ def bumpy():
     return surface, vertices, faces
 
 
+@cache
 def touch(surface, *, side=1.0, factor=1.0, noise=0.0):
-    """Of `surface`, scaled by `factor`, moved to where TURN and SHIFT bring it back; reconstructed."""
+    """A reconstruction of `surface`, scaled by `factor`, moved to where TURN and SHIFT bring it back."""
     lengths = {"extent": 10.0, "step": 0.8, "noise": noise, "rng": 3}
     contours = surface.track(PLANES, **lengths)
     moved = [Contour((factor * c.points - SHIFT) @ TURN, noise=factor * noise) for c in contours]
@@ -67,7 +69,7 @@ def touch(surface, *, side=1.0, factor=1.0, noise=0.0):
 
 
 def off(pose, r, point, turn=TURN):
-    """By how much a pose misses: in place, and in degrees."""
+    """How far a pose misses: in place, and in degrees."""
     place = pose.rotation @ r.frame.origin + pose.translation
     angle = np.arccos(np.clip((np.sum(turn * pose.rotation) - 1.0) / 2.0, -1.0, 1.0))
     return np.linalg.norm(place - point), np.degrees(angle)
@@ -101,7 +103,7 @@ def test_the_residual_is_the_distance_of_the_contacts_to_the_mesh():
     corners = 26.0 * directions[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    # Of a convex body, nearly, for contacts that are nearly on it.
+    # The distance to a convex body is that of its farthest plane, for contacts that are nearly on it.
     heights = np.max(np.einsum("nfi,fi->nf", contacts[:, None] - corners[None, :, 0], normals), axis=1)
     assert pose.residual == pytest.approx(np.sqrt(np.mean(heights**2)), rel=0.02)
 
@@ -248,7 +250,7 @@ def test_few_triangles_are_enough():
 def test_noise_shifts_a_pose_by_a_20th_of_the_radius_or_turns_it_by_2_degrees(
     monkeypatch, turning, shifting, slides
 ):
-    """Of contacts whose distances grow by so many times three least residuals then."""
+    """Distances grow by so many times three least residuals where contacts turn or shift."""
     growth = np.repeat([turning / np.radians(2.0), shifting / 0.05], 3) * 3e-3
     monkeypatch.setattr(
         pose_search, "mesh_distances", lambda *_: (np.zeros((1, 6, 1)), np.diag(growth)[None])
@@ -318,3 +320,34 @@ def test_long_triangles_are_halved_until_a_patch_covers_many():
     assert np.linalg.norm(scanned_mesh._across(mesh.triangles), axis=1).sum() / 2.0 == pytest.approx(6.0)
     assert mesh.centers == pytest.approx(mesh.triangles.mean(axis=1))
     assert mesh.smooth == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(mesh.smooth), 1)))
+
+
+def test_a_piece_is_long_by_its_edges_and_not_by_its_normals():
+    corners = 0.1 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    normals = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    assert len(scanned_mesh._halved(np.concatenate([corners, normals], axis=1)[None])) == 1
+
+
+def test_the_foot_on_a_triangle_is_the_nearest_of_its_points():
+    rng = np.random.default_rng(0)
+    triangles, points = rng.normal(size=(200, 3, 3)), rng.normal(size=(200, 3))
+    feet = scanned_mesh._feet(points, triangles)
+    a, b = np.meshgrid(np.linspace(0.0, 1.0, 101), np.linspace(0.0, 1.0, 101))
+    shares = np.stack([a, b, 1.0 - a - b])[:, a + b <= 1.0 + 1e-9].T
+    nearest = np.linalg.norm(shares @ triangles - points[:, None], axis=2).min(axis=1)
+    ours = np.linalg.norm(feet - points, axis=1)
+    assert np.all(ours <= nearest + 1e-9)
+    assert ours == pytest.approx(nearest, abs=0.02)
+    inside = np.linalg.solve(np.swapaxes(triangles, 1, 2), feet[..., None])[..., 0]
+    assert inside.min() > -1e-9 and inside.sum(axis=1) == pytest.approx(np.ones(200))
+
+
+def test_contours_are_tried_in_turns_of_ten_degrees(monkeypatch):
+    surface, vertices, faces = bumpy()
+    tried, scores = [], pose_search._scores
+    monkeypatch.setattr(
+        pose_search, "_scores", lambda felt, fields: tried.append(felt[0, -1]) or scores(felt, fields)
+    )
+    register(touch(surface), vertices, faces)
+    turns = np.sort(np.degrees(np.arctan2(*np.array(tried)[:, 1::-1].T)))
+    assert np.diff(turns) == pytest.approx(np.full(35, 10.0))

@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many points of an even spacing there are."""
+"""How many points of an even spacing there are, and where random ones are."""
 
 import numpy as np
 import pytest
 
 import core
+from core.scan import sampling
 
 
 @pytest.mark.parametrize("spacing", [0.1, 0.2, 0.4])
@@ -20,3 +21,38 @@ def test_the_count_of_spaced_points_is_known_before_they_are_chosen(spacing):
 
 def test_there_is_one_point_at_least():
     assert core.spaced_count(0.01, 1.0) == 1
+
+
+def test_of_the_points_in_a_cell_one_is_left():
+    points = np.random.default_rng(1).uniform(-3.0, 2.0, (4000, 3)) * [1.0, 2.0, 0.5]
+    cells = np.floor(points / 0.4)
+    first = np.unique(cells, axis=0, return_index=True)[1]
+    assert np.array_equal(np.sort(sampling._one_a_cell(points, 0.4)), np.sort(first))
+
+
+def test_scattered_points_are_even_by_area_and_on_their_faces():
+    # A square of two triangles, nine times as large as the third, which stands upright beside it.
+    points = np.array(
+        [[0, 0, 0], [3, 0, 0], [3, 3, 0], [0, 3, 0], [5, 0, 0], [5, 2, 0], [5, 0, 1]], dtype=float
+    )
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]])
+    found, normals = core.scattered(points, triangles, 20_000, np.random.default_rng(0))
+    upright = found[:, 0] == 5.0
+    assert abs(upright.mean() - 0.1) < 4.0 * np.sqrt(0.09 / 20_000)
+    np.testing.assert_array_equal(normals, np.where(upright[:, None], (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    flat = found[~upright]
+    assert not flat[:, 2].any()
+    counts, *_ = np.histogram2d(*flat[:, :2].T, bins=3, range=[(0.0, 3.0), (0.0, 3.0)])
+    expected = len(flat) / 9.0
+    assert (
+        (counts - expected) ** 2 / expected
+    ).sum() < 26.1  # chi squared of eight, beyond which one in 1000 is
+    y, z = found[upright, 1] / 2.0, found[upright, 2]
+    assert min(y.min(), z.min()) >= 0.0 and (y + z).max() <= 1.0 + 1e-12
+    assert abs(y.mean() - 1.0 / 3.0) < 0.03 and abs(z.mean() - 1.0 / 3.0) < 0.03
+
+
+def test_nothing_is_scattered_on_what_has_no_area():
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    with pytest.raises(ValueError, match="triangles: wanted some with an area, got none"):
+        core.scattered(points, np.array([[0, 1, 2]]), 5, np.random.default_rng(0))

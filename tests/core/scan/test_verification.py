@@ -58,7 +58,7 @@ def seen(r, surface, vertices, normals):
 
 
 class Cut:
-    """Of a surface, what is on one side of a plane; with `roof`, something over the rest as well."""
+    """What is of a surface on one side of a plane; with `roof`, something over the rest as well."""
 
     def __init__(self, surface, origin, direction, roof=None):
         self.surface, self.origin, self.direction, self.roof = surface, origin, direction, roof
@@ -244,7 +244,7 @@ def test_bad_vertices_are_refused():
 
 
 def test_overlap_is_a_share_of_the_area_which_is_more_where_the_patch_is_steep():
-    """Of a cap of a sphere, the ring that is below a plane across its normal."""
+    """The surface is the ring of a sphere's cap that is below a plane across its normal."""
     surface, extent = surfaces.sphere(30), 27.0
     contours = surface.track(surfaces.planes((0, 60, 120)), extent=extent, step=1.5)
     r = surface.fit(contours, degree=6)
@@ -266,3 +266,17 @@ def test_what_is_farther_from_the_tangent_plane_than_the_radius_is_not_below_the
     assert verify(r, surface, np.empty((0, 3)), extra=0)["overlap"] == share
     vertices, normals = vertices_of(surface, touched(surface))
     assert (len(reachable(r.geometry, surface, vertices, normals)) > 0) == (share > 0.0)
+
+
+@pytest.mark.parametrize(("height", "hides"), [(1.9, True), (2.1, False)])
+def test_what_is_more_than_two_radii_above_hides_nothing(height, hides):
+    r = touched(surfaces.plane())
+
+    class Layers:
+        def ray_cast(self, origin, direction, distance):
+            for z in sorted((0.0, height * r.radius), key=lambda z: abs(z - origin[2])):
+                if direction[2] and 0.0 <= (z - origin[2]) / direction[2] <= distance:
+                    return (origin[0], origin[1], z), (0.0, 0.0, 1.0)
+            return None
+
+    assert verify(r, Layers(), np.empty((0, 3)), extra=0)["overlap"] == (0.0 if hides else 1.0)

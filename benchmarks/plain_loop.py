@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The loop over touches that one would write without a cluster; benchmarks.cluster starts it.
+
+`python -m benchmarks.plain_loop FILES OPTIONS`, both JSON: it says that it is ready, waits for a line, and
+prints the seconds that it took and the processor's.
+"""
+
+import json
+import sys
+from time import perf_counter, process_time
+
+from cluster.data_set.options import Options
+from cluster.extension import core
+from cluster.worker import touches
+from cluster.worker.objects import touchable
+from tools import blender
+
+
+def touch_all(files, options):
+    """The same touches as in a data set, in batches as well, judged and compared with the mesh; kept."""
+    kept = []
+    for name, path in files:
+        target = touchable(path, name)
+        for block in options.blocks():
+            for _, _, found in touches.explored(target, options, block):
+                results = [each.result for each in found if not isinstance(each, ValueError)]
+                kept += [(r, r.status, r.message, core.height_error(r, target.surface)) for r in results]
+    return kept
+
+
+def main():
+    files, options = json.loads(sys.argv[1]), Options.from_dict(json.loads(sys.argv[2]))
+    print("ready", flush=True)
+    sys.stdin.readline()
+    start, work = perf_counter(), process_time()
+    with blender.quiet():
+        touch_all(files, options)
+    print(json.dumps([perf_counter() - start, process_time() - work]))
+
+
+if __name__ == "__main__":
+    main()

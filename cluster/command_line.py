@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`python -m cluster touch OBJECTS...`: a data set of touches from the shell."""
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from .data_set.folder import DataSet
+from .data_set.options import Length, Options
+from .engine import Engine, EngineError, connected
+from .extension import core
+from .input_files import KINDS, files_of
+from .run import Run, StoppedError, summed_up
+from .summary import summary
+
+WRONG_WORDS, STOPPED, WITH_ERRORS, INTERRUPTED = 2, 1, 3, 130  # exit codes
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Makes a data set; returns the exit code."""
+    parser = _parser()
+    given = parser.parse_args(words)
+    if given.dashboard and find_spec("bokeh") is None:
+        parser.error("--dashboard: wanted bokeh beside Dask, which draws it: install it")
+    try:
+        run = Run(DataSet(given.output), _options(given), files_of(given.objects))
+        with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:
+            if given.dashboard:
+                print(f"Dashboard: {client.dashboard_link}", file=sys.stderr)
+            run.work(Engine(client, given.limit))
+        rows = summed_up(run.data_set)
+    except ValueError as error:
+        print(f"cluster: {error}", file=sys.stderr)
+        return WRONG_WORDS
+    except (OSError, EngineError, StoppedError) as error:
+        print(f"cluster: {error}", file=sys.stderr)
+        return STOPPED
+    except KeyboardInterrupt:
+        print("cluster: interrupted; the same command goes on from here", file=sys.stderr)
+        return INTERRUPTED
+    print(summary(rows, run))
+    return WITH_ERRORS if any(row["error"] for row in rows) else 0
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """A request to end, as schedulers of batch jobs send it, is the same as Ctrl+C."""
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _options(given: argparse.Namespace) -> Options:
+    azimuths = given.azimuths or [180.0 * i / given.planes for i in range(given.planes)]
+    lengths = ("extent", "step", "noise", "tolerance")
+    return Options(
+        azimuths=tuple(azimuths),
+        tilts=tuple(given.tilts or [0.0] * len(azimuths)),
+        **{name: vars(given)[name] and str(vars(given)[name]) for name in lengths},
+        **{
+            name: vars(given)[name]
+            for name in ("touches", "block", "seed", "method", "degree", "weight", "solver")
+        },
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m cluster", description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
+    touch = commands.add_parser(
+        "touch", help="touch objects at random places, in parallel, into Parquet files"
+    )
+    _add_work(touch.add_argument)
+    _add_touches(touch.add_argument)
+    return parser
+
+
+def _add_work(add: Any) -> None:
+    """What to touch, and who does."""
+    help = f"{', '.join(KINDS)} files, folders with such, .txt lists of these"
+    add("objects", nargs="+", type=Path, metavar="OBJECT", help=help)
+    add("--output", type=Path, required=True, metavar="FOLDER", help="of the data set, begun or new")
+    add("--scheduler", metavar="ADDRESS", help="of a Dask scheduler that has workers")
+    help = "processes on this machine, without a scheduler elsewhere (%(default)s)"
+    add("--workers", type=_count, default=os.cpu_count(), metavar="COUNT", help=help)
+    help = "show Dask's dashboard there, which needs bokeh: :8787"
+    add("--dashboard", metavar="ADDRESS", help=help)
+    help = "seconds that a block may take before it is ended (%(default)s)"
+    add("--limit", type=_positive, default=600.0, metavar="SECONDS", help=help)
+
+
+def _add_touches(add: Any) -> None:
+    """How to touch; all of it is in the manifest."""
+    add("--touches", type=_count, default=1000, help="of each object (%(default)s)")
+    add("--block", type=_count, default=500, help="touches of a task and a file (%(default)s)")
+    add("--seed", type=int, default=0, help="of places and noise (%(default)s)")
+    add("--planes", type=int, choices=range(3, 7), default=3, help="sampling planes, evenly apart (3)")
+    degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
+    add("--azimuths", **degrees, help="of planes that are not")
+    add("--tilts", **degrees, help="of the planes, as many (0)")
+    length = {"type": _length, "metavar": "LENGTH"}
+    help = "of each half curve, in the object's unit, or as 6%% of its size (as far as can be trusted)"
+    add("--extent", **length, help=help)
+    add("--step", **length, help="between contacts (so many that more would tell little)")
+    add("--noise", **length, default=Length(0.0, False), help="standard deviation of the sensor (0)")
+    help = "add planes until heights are good to this (the given planes only)"
+    add("--tolerance", **length, help=help)
+    add("--method", choices=core.METHODS, default="bayes", help="how to fit (%(default)s)")
+    add("--degree", choices=["auto", *"23456"], default="auto", help="of the polynomial (%(default)s)")
+    add("--weight", type=_positive, help="lambda L^2 of tagc and quadratic-variation (1000, 1e5)")
+    add("--solver", choices=core.SOLVERS, default="fast", help="of tagc (%(default)s)")
+
+
+def _length(text: str) -> Length:
+    try:
+        return Length.of(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not int(text):
+        raise argparse.ArgumentTypeError(f"wanted a number of 1 or more, got {text}")
+    return int(text)
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"wanted a number above 0, got {text}")
+    return value

@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The columns of a data set: types, units and meanings, which stand in the metadata of each file too."""
+
+from typing import Any
+
+import pyarrow as pa
+
+NUMBER, NUMBERS, WORD = pa.float64(), pa.list_(pa.float64()), pa.string()
+REPEATED = pa.dictionary(pa.int32(), pa.string())
+# Lengths are in the unit of the object's file, whatever that is.
+LENGTH, PER_LENGTH = "object's unit", "1 / object's unit"
+COUNTS = ("ok", "in_doubt", "refused", "error")
+
+TOUCHES = (
+    ("object", REPEATED, "", "name of the object"),
+    ("hash", REPEATED, "", "of its geometry: by this rows and objects belong together"),
+    ("block", pa.int32(), "", "the task that made the row"),
+    ("touch", pa.int64(), "", "number of the touch on its object, from 0"),
+    ("seed", pa.int64(), "", "of the whole data set; places and noise follow from it, hash and block"),
+    ("status", REPEATED, "", "ok, uncertain, not_converged; refused: no patch there; error: no touch"),
+    ("message", REPEATED, "", "the status in a sentence"),
+    ("location", NUMBERS, LENGTH, "x, y, z of the reference point, in the file's coordinates as all points"),
+    ("outward", NUMBERS, "", "unit normal of the face there"),
+    ("origin", NUMBERS, LENGTH, "x, y, z of the origin of the patch's frame"),
+    ("axes", NUMBERS, "", "the frame's d1, d2 and normal, three numbers each"),
+    ("radius", NUMBER, LENGTH, "L, how far from the origin a contact is at most, in the tangent plane"),
+    ("k1", NUMBER, PER_LENGTH, "smaller principal curvature, along d1; negative where convex"),
+    ("k2", NUMBER, PER_LENGTH, "larger principal curvature, along d2"),
+    ("k1_std", NUMBER, PER_LENGTH, "standard deviation of k1"),
+    ("k2_std", NUMBER, PER_LENGTH, "standard deviation of k2"),
+    ("height_std", NUMBER, LENGTH, "standard deviation of the heights, in the mean over the domain"),
+    ("coefficients", NUMBERS, "1 / unit^(degree - 1)", "of the patch: x^3, x^2 y, x y^2, y^3, x^4, ..."),
+    ("domain", NUMBERS, LENGTH, "x, y in the frame of the ends of the curves, through which the rim runs"),
+    ("contacts", NUMBERS, LENGTH, "x, y, z of each contact, curve after curve"),
+    ("normals", pa.list_(pa.float32()), "", "x, y, z of the mesh's unit normal at each contact"),
+    ("curves", pa.list_(pa.int32()), "", "how many of the contacts each curve has"),
+    ("azimuths", NUMBERS, "rad", "of the curves' sampling planes"),
+    ("tilts", NUMBERS, "rad", "of the curves' sampling planes"),
+    ("stops", pa.list_(REPEATED), "", "why each curve ended, at its start and at its end"),
+    ("extent", NUMBER, LENGTH, "of the longest half curve"),
+    ("step", NUMBER, LENGTH, "between contacts"),
+    ("noise", NUMBER, LENGTH, "standard deviation of the simulated sensor"),
+    ("mesh_error", NUMBER, LENGTH, "mean distance in height of mesh and surface; null where there is none"),
+)
+OBJECTS = (
+    ("object", WORD, "", "its name: of the mesh object in a .blend or .obj, else of the file"),
+    ("hash", WORD, "", "of its geometry; null where it could not be read"),
+    ("file", WORD, "", "where it was read from"),
+    ("size", NUMBER, LENGTH, "longest edge of its bounding box"),
+    ("unit", NUMBER, "m", "length of the object's unit; null where the file does not say"),
+    ("vertices", pa.int64(), "", "of its evaluated mesh"),
+    ("triangles", pa.int64(), "", "of its evaluated mesh"),
+    ("touches", pa.int64(), "", "rows of it"),
+    *((name, pa.int64(), "", "how many of the touches are so") for name in COUNTS),
+    ("seconds", NUMBER, "s", "processor time of its touches"),
+    ("message", WORD, "", "of its first error"),
+)
+
+
+def _schema(columns: tuple[tuple[str, pa.DataType, str, str], ...]) -> pa.Schema:
+    return pa.schema(
+        pa.field(name, kind, metadata={"unit": unit, "description": meaning})
+        for name, kind, unit, meaning in columns
+    )
+
+
+TOUCH_SCHEMA, OBJECT_SCHEMA = _schema(TOUCHES), _schema(OBJECTS)
+
+
+def table(rows: list[dict[str, Any]], schema: pa.Schema, metadata: dict[str, str] | None = None) -> pa.Table:
+    """The rows as a table; what a row does not have is null."""
+    arrays = [pa.array([row.get(field.name) for row in rows], field.type) for field in schema]
+    return pa.Table.from_arrays(arrays, schema=schema.with_metadata(metadata))
+
+
+def kind_of(status: str) -> str:
+    """The count that a status belongs to."""
+    return status if status in COUNTS else "in_doubt"

@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a data set was made of and how; what another run wants otherwise is refused, never mixed in."""
+
+import json
+from importlib.metadata import version as version_of
+from typing import Any
+
+from .. import extension
+from .folder import DataSet, whole_file
+from .options import Options
+
+FORMAT = 1
+PACKAGES = ("bpy", "numpy", "scipy")
+
+
+def versions() -> dict[str, str]:
+    """Of all that rows depend on."""
+    found = {"format": str(FORMAT), "tactile_patch": extension.version()}
+    return found | {name: version_of(name) for name in PACKAGES}
+
+
+def read(data_set: DataSet) -> dict[str, Any] | None:
+    """The manifest of a data set that was begun; None where there is none.
+
+    Raises ValueError, with a sentence, where it cannot be read.
+    """
+    if not data_set.manifest.exists():
+        return None
+    try:
+        found = json.loads(data_set.manifest.read_text(encoding="utf-8"))
+        return {key: dict(found[key]) for key in ("versions", "options", "files")}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ValueError(
+            f'"{data_set.manifest}" is no manifest of a data set: take another folder'
+        ) from error
+
+
+def require_same(old: dict[str, Any], options: Options) -> None:
+    """Raises ValueError where a data set was made by other versions or with other options."""
+    for kind, now in (("versions", versions()), ("options", options.to_dict())):
+        for name in sorted(now.keys() | old[kind].keys()):
+            was, wanted = old[kind].get(name), now.get(name)
+            if was != wanted:
+                raise ValueError(
+                    f"{name}: this data set was begun with {_said(was)}, and now it is {_said(wanted)}: "
+                    "take that again, or another folder"
+                )
+
+
+def require_same_objects(old: dict[str, Any], files: dict[str, Any]) -> None:
+    """Raises ValueError where a file has not the objects that it had; files may be added."""
+    for path, hashes in files.items():
+        had = old["files"].get(path, {})
+        if any(known is not None and hashes.get(name) != known for name, known in had.items()):
+            raise ValueError(
+                f'"{path}" has changed since this data set was begun, or cannot be read any more: put the '
+                "old file back, or take another folder"
+            )
+
+
+def write(data_set: DataSet, options: Options, files: dict[str, Any]) -> None:
+    """The manifest; `files` are hashes of objects by name, by path."""
+    content = {"versions": versions(), "options": options.to_dict(), "files": files}
+    whole_file.write_text(data_set.manifest, json.dumps(content, indent=1) + "\n")
+
+
+def _said(value: Any) -> str:
+    return "auto" if value is None else json.dumps(value).strip('"')

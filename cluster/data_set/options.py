@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How objects are touched: what the words of the command say, checked, and the lengths of one object."""
+
+import math
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from ..extension import core
+
+
+@dataclass(frozen=True)
+class Length:
+    """A length in the object's unit, or a share of its size: the longest edge of its bounding box."""
+
+    value: float
+    is_share: bool
+
+    @classmethod
+    def of(cls, text: str) -> "Length":
+        """Of words such as 0.002 or 1.5%. Raises ValueError for others."""
+        number = text.strip().removesuffix("%")
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if not 0.0 <= value < math.inf:
+            raise ValueError(f"wanted a length, as 0.002, or a share of the object, as 1.5%, got {text}")
+        return cls(value / 100.0, True) if text.strip().endswith("%") else cls(value, False)
+
+    def on(self, size: float) -> float:
+        """The length on an object of that size."""
+        return self.value * size if self.is_share else self.value
+
+    def __str__(self) -> str:
+        return f"{100.0 * self.value:.12g}%" if self.is_share else f"{self.value:.12g}"
+
+
+@dataclass(frozen=True)
+class Options:
+    """All that rows depend on beside the object; lengths are words, see Length, None where they are chosen.
+
+    touches : of each object; block : touches of a task, which are one file
+    azimuths, tilts : of the sampling planes, in degrees
+    tolerance : deviation of the height up to which planes are added; None for the given ones only
+    """
+
+    touches: int
+    block: int
+    seed: int
+    azimuths: tuple[float, ...]
+    tilts: tuple[float, ...]
+    extent: str | None
+    step: str | None
+    noise: str
+    tolerance: str | None
+    method: str
+    degree: str
+    weight: float | None
+    solver: str
+
+    def __post_init__(self) -> None:
+        """Raises ValueError, with a sentence, for options that no touch can have."""
+        for name, least in (("touches", 1), ("block", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name}: wanted a number of {least} or more, got {getattr(self, name)}")
+        if len(self.tilts) != len(self.azimuths):
+            raise ValueError(
+                f"tilts: wanted as many as there are planes, {len(self.azimuths)}, got {len(self.tilts)}"
+            )
+        self._rehearse()
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> "Options":
+        """What `to_dict` gave, perhaps from JSON, which has no tuples."""
+        plain = {field.name: values.get(field.name) for field in fields(cls)}
+        return cls(**plain | {name: tuple(plain[name]) for name in ("azimuths", "tilts")})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self) | {"azimuths": list(self.azimuths), "tilts": list(self.tilts)}
+
+    def planes(self) -> list[Any]:
+        """The sampling planes."""
+        pairs = zip(self.azimuths, self.tilts, strict=True)
+        return [core.SamplingPlane(math.radians(a), math.radians(t)) for a, t in pairs]
+
+    def length(self, name: str, size: float) -> float | None:
+        """One of the lengths on an object of that size; None where it is chosen."""
+        words = getattr(self, name)
+        return None if words is None else Length.of(words).on(size)
+
+    def fit(self) -> dict[str, Any]:
+        """What core.reconstruct takes."""
+        degree = self.degree if self.degree == "auto" else int(self.degree)
+        return {"method": self.method, "degree": degree, "weight": self.weight, "solver": self.solver}
+
+    def exploration(self, size: float) -> dict[str, Any]:
+        """What core.explore_many takes beside places, on an object of that size."""
+        return {
+            "extent": self.length("extent", size) or "auto",
+            "step": self.length("step", size) or "auto",
+            "noise": self.length("noise", size),
+            "tolerance": self.length("tolerance", size),
+            **self.fit(),
+        }
+
+    def blocks(self) -> range:
+        """The numbers of an object's blocks."""
+        return range(-(-self.touches // self.block))
+
+    def numbers(self, block: int) -> range:
+        """The numbers of the touches of a block."""
+        return range(block * self.block, min((block + 1) * self.block, self.touches))
+
+    def _rehearse(self) -> None:
+        """Raises ValueError where not even a plane could be rebuilt from its own curves."""
+        up, along = (0.0, 0.0, 1.0), np.linspace(-1.0, 1.0, 21)
+        axes = [plane.axes(up) for plane in self.planes()]
+        contours = [core.Contour(np.outer(along, a[:, 0]), plane_normal=a[:, 2]) for a in axes]
+        core.reconstruct(np.zeros(3), contours, outward=up, **self.fit())

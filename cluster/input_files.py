@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which files the words of the command stand for."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+KINDS = (".ply", ".stl", ".obj", ".blend")
+LIST = ".txt"
+
+
+def files_of(words: Iterable[Path]) -> list[str]:
+    """Absolute paths of files, of those below folders and of those in lists, each once, in order.
+
+    Raises ValueError, with a sentence, for what is none of these.
+    """
+    found = sorted({str(path.resolve()) for word in words for path in _files(word)})
+    if not found:
+        raise ValueError(f"objects: wanted {', '.join(KINDS)} files, got folders or lists without any")
+    return found
+
+
+def _files(path: Path) -> Iterator[Path]:
+    if path.is_dir():
+        yield from (each for each in path.rglob("*") if each.suffix.lower() in KINDS and each.is_file())
+    elif not path.is_file():
+        raise ValueError(f'objects: there is no file or folder "{path}"')
+    elif path.suffix.lower() == LIST:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            if line.strip():
+                yield from _files(path.parent / line.strip())
+    elif path.suffix.lower() in KINDS:
+        yield path
+    else:
+        raise ValueError(f'objects: wanted {", ".join(KINDS)} files, folders or .txt lists, got "{path}"')

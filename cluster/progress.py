@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a run is, in one line: on a terminal it is written over, elsewhere a line now and then."""
+
+import sys
+from collections import Counter
+from time import monotonic
+
+EVERY = {True: 0.5, False: 10.0}  # seconds between lines, by whether they go to a terminal
+
+
+class Progress:
+    """Counts touches, of `total` that are to be made now, and says how many there are a second."""
+
+    def __init__(self) -> None:
+        self._is_terminal, self._width = sys.stderr.isatty(), 0
+        self.begin(0)
+
+    def begin(self, total: int) -> None:
+        """So many touches are to be made, from now on."""
+        self.total, self.counts = total, Counter[str]()
+        self.start = self._said = monotonic()
+
+    @property
+    def done(self) -> int:
+        """Touches that were made."""
+        return sum(self.counts.values())
+
+    @property
+    def rate(self) -> float:
+        """Touches a second."""
+        return self.done / max(monotonic() - self.start, 1e-9)
+
+    def add(self, counts: dict[str, int], workers: int) -> None:
+        """Notes touches by their status, and says so where it is time."""
+        self.counts.update(counts)
+        if monotonic() - self._said >= EVERY[self._is_terminal] or self.done == self.total:
+            self._said = monotonic()
+            self._say(self.line(workers))
+
+    def line(self, workers: int) -> str:
+        """As in "1,200 of 9,000 touches, 80 a second on 2 workers, 2 min left, 3 errors"."""
+        left = (self.total - self.done) / self.rate if self.done else 0.0
+        words = [
+            f"{self.done:,} of {self.total:,} touches",
+            f"{self.rate:.3g} a second on {workers} worker{'s'[: workers != 1]}",
+        ]
+        words.append(f"{_duration(left)} left")
+        if self.counts["error"]:
+            words.append(f"{self.counts['error']:,} errors")
+        return ", ".join(words)
+
+    def note(self, text: str) -> None:
+        """Says something else, in lines of its own."""
+        print("\r" + text.ljust(self._width) if self._width else text, file=sys.stderr, flush=True)
+        self._width = 0
+
+    def end(self) -> None:
+        """Leaves the line as it is."""
+        if self._width:
+            print(file=sys.stderr, flush=True)
+            self._width = 0
+
+    def _say(self, line: str) -> None:
+        if self._is_terminal:
+            print("\r" + line.ljust(self._width), end="", file=sys.stderr, flush=True)
+            self._width = len(line)
+        else:
+            print(line, file=sys.stderr, flush=True)
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A run: looks through the files, has the blocks touched that are missing, and sums up."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from .data_set import manifest
+from .data_set.columns import COUNTS
+from .data_set.folder import DataSet, file_key
+from .data_set.options import Options
+from .engine import Engine, Order, Outcome
+from .progress import Progress
+from .worker.process import FAILED, STOP
+
+
+class StoppedError(Exception):
+    """A worker cannot go on, whatever the object; a sentence."""
+
+
+class Run:
+    """What is to be done for a data set, and how far it is."""
+
+    def __init__(self, data_set: DataSet, options: Options, files: list[str]) -> None:
+        """Raises ValueError for the folder of another data set, OSError where it cannot be written to."""
+        self.data_set, self.options, self.files = data_set, options, files
+        self.old = manifest.read(data_set)
+        if self.old is not None:
+            manifest.require_same(self.old, options)
+        data_set.create()
+        if self.old is None:
+            manifest.write(data_set, options, {})
+        self.progress = Progress()
+
+    def work(self, engine: Engine) -> None:
+        """All that is missing. Raises ValueError for files that have changed, StoppedError and OSError."""
+        done = self.data_set.done()
+        objects = self._survey(engine, done)
+        blocks = {
+            f"{facts['hash']}-{block:05d}": (facts, block)
+            for facts in objects
+            for block in self.options.blocks()
+        }
+        missing = [value for name, value in blocks.items() if name not in done]
+        self.progress.begin(sum(len(self.options.numbers(block)) for _, block in missing))
+        if len(missing) < len(blocks):
+            self._log(f"{len(blocks) - len(missing)} of {len(blocks)} blocks are there already")
+        orders = {self._label(*each): each for each in missing}
+        for outcome in self._outcomes(engine, (self._order(*each) for each in missing)):
+            facts, block = orders[outcome.order.label]
+            counts = outcome.value["counts"] if outcome.how != FAILED else {}
+            if outcome.how == FAILED:
+                numbers = self.options.numbers(block)
+                self.progress.note(f"{outcome.order.label}: {outcome.value}")
+                self.data_set.write_errors(facts, block, numbers, outcome.value)
+                counts = {"error": len(numbers)}
+            self.progress.add(counts, engine.threads)
+        self.progress.end()
+
+    def _survey(self, engine: Engine, done: set[str]) -> list[dict[str, Any]]:
+        """The facts of all objects that are to be touched, each once; the manifest then has them."""
+        known = {path for path in self.files if f"{file_key(path, Path(path).stem)}-00000" in done}
+        versions = manifest.versions()
+        orders = (Order(path, "survey", (path, versions)) for path in self.files if path not in known)
+        self.progress.note(f"{len(self.files) - len(known):,} files to look through")
+        facts = {path: [] for path in self.files}
+        for outcome in self._outcomes(engine, orders):
+            path = outcome.order.label
+            broken = {"name": Path(path).stem, "file": path, "hash": None, "trouble": outcome.value}
+            facts[path] = [broken] if outcome.how == FAILED else outcome.value
+        hashes = {path: {each["name"]: each["hash"] for each in facts[path]} for path in self.files}
+        if self.old is not None:
+            manifest.require_same_objects(self.old, hashes)
+            hashes = self.old["files"] | hashes
+        manifest.write(self.data_set, self.options, hashes)
+        return list(self._distinct(each for path in self.files for each in facts[path]))
+
+    def _distinct(self, objects: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+        """Those that can be touched, each geometry once; of the others there are error rows then."""
+        seen: dict[str, dict[str, Any]] = {}
+        for facts in objects:
+            if facts["hash"] is None:
+                self._log(f"{_title(facts)}: {facts['trouble']}")
+                self.data_set.write_errors(facts, None, range(self.options.touches), facts["trouble"])
+            elif facts["hash"] in seen:
+                self._log(f"{_title(facts)} is the same as {_title(seen[facts['hash']])}: touched once")
+            else:
+                seen[facts["hash"]] = facts
+                yield facts
+
+    def _outcomes(self, engine: Engine, orders: Iterable[Order]) -> Iterator[Outcome]:
+        for outcome in engine.performed(orders):
+            for trouble in outcome.troubles:
+                self._log(trouble, aloud=False)
+            if outcome.how == STOP:
+                raise StoppedError(outcome.value)
+            yield outcome
+
+    def _order(self, facts: dict[str, Any], block: int) -> Order:
+        path = str(self.data_set.block_path(facts["hash"], block).resolve())
+        return Order(self._label(facts, block), "touch", (facts, self.options.to_dict(), block, path))
+
+    def _label(self, facts: dict[str, Any], block: int) -> str:
+        return f"{_title(facts)} block {block}"
+
+    def _log(self, text: str, aloud: bool = True) -> None:
+        """Into the folder's log, and to the terminal."""
+        now = datetime.now().astimezone().isoformat(timespec="seconds")
+        with self.data_set.log.open("a", encoding="utf-8") as file:
+            file.write(f"{now} {text}\n")
+        if aloud:
+            self.progress.note(text)
+
+
+def summed_up(data_set: DataSet) -> list[dict[str, Any]]:
+    """Rows of the file of objects, which is written too, out of the summaries of all blocks."""
+    rows: dict[str, dict[str, Any]] = {}
+    for summary in data_set.summaries():
+        facts, counts = summary["facts"], Counter(summary["counts"])
+        key = facts["hash"] or file_key(facts["file"], facts["name"])
+        row = rows.setdefault(key, facts | {"object": facts["name"], "touches": 0, "seconds": 0.0})
+        row["touches"] += counts.total()
+        row["seconds"] += summary["seconds"]
+        row["message"] = row.get("message") or summary["message"]
+        for name in COUNTS:
+            row[name] = row.get(name, 0) + counts[name]
+    found = sorted(rows.values(), key=lambda row: (row["object"], row["file"], row["hash"] or ""))
+    data_set.write_objects(found)
+    return found
+
+
+def _title(facts: dict[str, Any]) -> str:
+    return f"{facts['name']} ({facts['file']})"

@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is said of a data set at the end of a run."""
+
+from typing import Any
+
+from .data_set.columns import COUNTS
+
+MOST = 10  # objects with errors that are named
+
+
+def summary(rows: list[dict[str, Any]], run: Any) -> str:
+    """A few lines: how much there is, how fast it came, and what could not be touched."""
+    totals = {name: sum(row[name] for row in rows) for name in COUNTS}
+    words = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in totals.items())
+    lines = [f"{len(rows):,} objects, {sum(totals.values()):,} touches: {words}"]
+    if run.progress.done:
+        lines.append(f"{run.progress.done:,} of them now, {run.progress.rate:.3g} a second")
+    wrong = [row for row in rows if row["error"]]
+    for row in wrong[:MOST]:
+        lines.append(f"{row['object']} ({row['file']}): {row['error']:,} errors: {row['message']}")
+    if len(wrong) > MOST:
+        lines.append(f"and {len(wrong) - MOST:,} objects more with errors, see {run.data_set.objects}")
+    return "\n".join([*lines, f"Data set: {run.data_set.folder}"])

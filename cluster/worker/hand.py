@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The process that has Blender and touches: `python -m cluster.worker.hand FD`, started by process.py.
+
+It takes orders from a connection and answers each. A watchdog below Python ends it where an order takes too
+long, even in the middle of a call of Blender's; and it ends itself when who has started it is gone.
+"""
+
+import faulthandler
+import os
+import queue
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from ..data_set import manifest
+from ..data_set.folder import write_block
+from ..data_set.options import Options
+from . import objects, touches
+from .process import DONE, FAILED, STOP
+
+
+class HopelessError(Exception):
+    """Nothing can be done here, whatever the object."""
+
+
+class Hand:
+    """Carries out orders; keeps the object touched last, for the next block mostly is of it too.
+
+    opened : how many objects it has opened
+    """
+
+    def __init__(self) -> None:
+        self.opened = 0
+        self._target: Any = None
+
+    def survey(self, path: str, versions: dict[str, str]) -> list[dict[str, Any]]:
+        """Facts of the objects in a file. Raises HopelessError where rows made here would not be the same."""
+        here = manifest.versions()
+        if here != versions:
+            name = next(name for name in {**here, **versions} if here.get(name) != versions.get(name))
+            raise HopelessError(
+                f"A worker has {name} {here.get(name)}, the data set {versions.get(name)}: start workers "
+                "in the same environment"
+            )
+        self.opened, self._target = self.opened + 1, None
+        return objects.survey(path)
+
+    def touch(self, facts: dict[str, Any], options: dict[str, Any], block: int, path: str) -> dict[str, Any]:
+        """Touches an object, and writes the rows of that block to the file `path`; their summary."""
+        rows, seconds = touches.touched(self._object(facts), Options.from_dict(options), block)
+        try:
+            return write_block(Path(path), rows, facts, seconds)
+        except OSError as error:
+            raise HopelessError(str(error)) from error
+
+    def _object(self, facts: dict[str, Any]) -> Any:
+        if self._target is None or self._target.facts != facts:
+            self._target = None
+            self.opened += 1
+            self._target = objects.touchable(facts["file"], facts["name"])
+            if self._target.facts["hash"] != facts["hash"]:
+                self._target = None
+                raise OSError(f'"{facts["file"]}" has changed since it was first read')
+        return self._target
+
+
+def answered(run: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+    """How it went, and what came of it: a value, or a sentence."""
+    try:
+        return DONE, run(*arguments)
+    except HopelessError as error:
+        return STOP, str(error)
+    except Exception as error:  # whatever it is, it is this object's and no other's
+        words = " ".join(str(error).split()) or type(error).__name__
+        return FAILED, words.removeprefix("Error: ")  # which Blender's operators begin with
+
+
+def main() -> None:
+    """Answers orders until there are no more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for who has started it
+    connection, orders = Connection(int(sys.argv[1])), queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(connection, orders), daemon=True).start()
+    hand = Hand()
+    connection.send("ready")
+    while True:
+        limit, name, arguments = orders.get()
+        faulthandler.dump_traceback_later(limit, exit=True)
+        answer = answered(getattr(hand, name), arguments)
+        faulthandler.cancel_dump_traceback_later()
+        connection.send((*answer, hand.opened))
+
+
+def _listen(connection: Connection, orders: "queue.SimpleQueue[Any]") -> None:
+    while True:
+        try:
+            orders.put(connection.recv())
+        except (EOFError, OSError):
+            os._exit(0)  # perhaps in the middle of an order, which nobody waits for any more
+
+
+if __name__ == "__main__":
+    main()

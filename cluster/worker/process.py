@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A hand in a process of its own: started, asked, watched and ended."""
+
+import os
+import platform
+import signal
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from multiprocessing import Pipe
+from typing import Any
+
+from ..extension import ROOT
+
+DONE, FAILED, STOP = "done", "failed", "stop"  # How an order went: STOP where all others would go so too.
+START = 120.0  # seconds that Blender may take to start
+GRACE = 1.0  # seconds in which a process that is about to end does so
+TIMEOUT, UNENDED = "Timeout (", "It did not end by itself"  # The first is the watchdog's word.
+MOST_OPENED = 200  # objects that a process opens before another takes its place
+THREADS = ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR")
+TAIL = 20_000  # characters of what a process has said last
+
+
+class LostError(Exception):
+    """The process has ended, or was ended, in the middle of an order; says why."""
+
+
+class NotStartedError(LostError):
+    """Blender cannot be started on this machine."""
+
+
+class HandProcess:
+    """A process that has Blender; nothing is forked, so what Blender has in it is never copied."""
+
+    def __init__(self) -> None:
+        ours, theirs = Pipe()
+        environment = dict(os.environ) | {f"{name}_NUM_THREADS": "1" for name in THREADS}
+        environment["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+        self._connection, self._said, self._opened = ours, tempfile.TemporaryFile(), 0  # noqa: SIM115
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "cluster.worker.hand", str(theirs.fileno())],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=self._said,
+            stderr=self._said,
+            pass_fds=[theirs.fileno()],
+        )
+        theirs.close()
+        self._is_new = True
+
+    @property
+    def is_worn(self) -> bool:
+        """Whether another should take its place, so that memory stays flat."""
+        return self._opened >= MOST_OPENED or self._process.poll() is not None
+
+    def ask(self, limit: float, name: str, *arguments: Any) -> tuple[str, Any]:
+        """How an order went, and what came of it; see hand.py. Raises LostError where the process is gone."""
+        self._start()
+        with suppress(EOFError, OSError):
+            self._connection.send((limit, name, arguments))
+            if self._connection.poll(limit + GRACE):
+                how, value, self._opened = self._connection.recv()
+                return how, value
+        way, words = self._end()
+        if TIMEOUT in words or way == UNENDED:
+            way = f"It took longer than the limit of {limit:g} s"
+        raise LostError(f"{way}\n{words}")
+
+    def close(self) -> None:
+        """Ends it, whatever it does."""
+        self._connection.close()
+        self._process.kill()
+        self._process.wait()
+        self._said.close()
+
+    def _start(self) -> None:
+        """Waits for a new one until it says that Blender is there."""
+        if not self._is_new:
+            return
+        with suppress(EOFError, OSError):
+            if self._connection.poll(START):
+                self._connection.recv()
+                self._is_new = False
+                return
+        _, words = self._end()
+        last = (words.splitlines() or ["it did not say why"])[-1]
+        raise NotStartedError(
+            f"Blender cannot be started on {platform.node()} ({last}): start workers in an environment "
+            "that has it"
+        )
+
+    def _end(self) -> tuple[str, str]:
+        """Ends it; how it had ended by itself, and its last words."""
+        try:
+            code = self._process.wait(GRACE)
+            way = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
+        except subprocess.TimeoutExpired:
+            way = None
+            self._process.kill()
+            self._process.wait()
+        self._said.seek(max(0, os.fstat(self._said.fileno()).st_size - TAIL))
+        words = self._said.read().decode(errors="replace").strip()
+        self.close()
+        return UNENDED if way is None else f"Blender ended {way}", words

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Patches out: File > Export."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ..probes import probe
+from ..probes.operators import report_error
+from ..scene import patch_record
+from . import contact_file, patch_table
+
+
+class _PatchExport(ExportHelper):
+    """Mixed into what writes the active patch, which may be active by its probe or contours."""
+
+    @classmethod
+    def poll(cls, context):
+        if probe.patch_near(context.view_layer.objects.active) is None:
+            cls.poll_message_set("Select a patch, its probe or its contours first")
+            return False
+        return True
+
+    def invoke(self, context, event):
+        if not self.filepath:
+            patch = probe.patch_near(context.view_layer.objects.active)
+            self.filepath = bpy.path.clean_name(patch.name) + self.filename_ext
+        return super().invoke(context, event)
+
+    def execute(self, context):
+        try:
+            self.write(probe.patch_near(context.view_layer.objects.active))
+        except (OSError, ValueError) as error:
+            return report_error(self, error)
+        self.report({"INFO"}, f'Wrote "{Path(self.filepath).name}"')
+        return {"FINISHED"}
+
+
+class TACTILE_OT_export_contacts(_PatchExport, bpy.types.Operator):
+    """Write the contacts of the active patch as CSV, in the scene's units"""
+
+    bl_idname = "tactile.export_contacts"
+    bl_label = "Export Contact Data"
+    filename_ext = ".csv"
+    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+
+    def write(self, patch):
+        r = patch_record.reconstruction_of(patch)
+        contact_file.write(self.filepath, contact_file.contacts_of(r))
+
+
+class TACTILE_OT_export_patch(_PatchExport, bpy.types.Operator):
+    """Write the active patch as JSON: polynomial, frame, domain, covariance; as core.from_dict reads it"""
+
+    bl_idname = "tactile.export_patch"
+    bl_label = "Export Patch"
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def write(self, patch):
+        contact_file.write_patch(self.filepath, patch_record.reconstruction_of(patch))
+
+
+class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):
+    """Write what all patches have found as CSV, one row a probe, in the scene's units"""
+
+    bl_idname = "tactile.export_table"
+    bl_label = "Export Table of Patches"
+    filename_ext = ".csv"
+    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+    use_selection: BoolProperty(
+        name="Selected Only", description="Only of selected probes and patches", default=False
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not patch_table.patches_of(context.view_layer.objects):
+            cls.poll_message_set("There is no patch to export: pick a reference point first")
+            return False
+        return True
+
+    def execute(self, context):
+        objects = context.view_layer.objects
+        try:
+            patches = patch_table.patches_of(objects.selected if self.use_selection else objects)
+            patch_table.write(self.filepath, patches, context.scene)
+        except (OSError, ValueError) as error:
+            return report_error(self, error)
+        self.report({"INFO"}, f'Wrote a table of {len(patches)} patches: "{Path(self.filepath).name}"')
+        return {"FINISHED"}
+
+
+def draw_export(self, context):
+    self.layout.operator(TACTILE_OT_export_contacts.bl_idname, text="Contact Data (.csv)")
+    self.layout.operator(TACTILE_OT_export_patch.bl_idname, text="Tactile Patch (.json)")
+    self.layout.operator(TACTILE_OT_export_table.bl_idname, text="Table of Tactile Patches (.csv)")
+
+
+CLASSES = (TACTILE_OT_export_contacts, TACTILE_OT_export_patch, TACTILE_OT_export_table)
+MENUS = (("TOPBAR_MT_file_export", draw_export),)

@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What several patches have found as one table, a row each, to be read by spreadsheets and scripts."""
+
+import csv
+import io
+
+from ..probes import probe
+from ..touch import units
+from . import whole_file
+
+# Keys of the report, and the power of length each is measured in.
+NUMBERS = {
+    **dict.fromkeys(("k1", "k1_std", "k2", "k2_std"), -1),
+    **dict.fromkeys(("gaussian_curvature", "gaussian_curvature_std"), -2),
+    **dict.fromkeys(("mean_curvature", "mean_curvature_std", "curvedness"), -1),
+    "shape_index": 0,
+    **dict.fromkeys(("height_std", "fit_error", "vertex_distance_mean", "vertex_distance_max"), 1),
+    **dict.fromkeys(("radius", "extent", "step", "noise"), 1),
+    **dict.fromkeys(("degree", "contacts"), 0),
+}
+WORDS = ("source", "method", "status", "message")
+
+
+def patches_of(objects):
+    """The patches among objects, or that belong to probes and contours among them, by name."""
+    patches = {probe.patch_near(obj) for obj in objects} - {None}
+    return sorted((patch for patch in patches if probe.record_of(patch) is not None), key=lambda p: p.name)
+
+
+def write(path, patches, scene):
+    """A .csv with a header that names the unit, and a row for each patch; empty where something is not known.
+
+    Raises ValueError where there are none.
+    """
+    if not patches:
+        raise ValueError("There is no patch to export: pick a reference point first")
+    records = [probe.record_of(patch) for patch in patches]
+    unit = units.unit_of(scene, max(record["radius"] for record in records))
+    rows = [_row(*pair, unit) for pair in zip(patches, records, strict=True)]
+    text = io.StringIO()
+    table = csv.DictWriter(text, rows[0], lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    whole_file.write_text(path, text.getvalue())
+
+
+def _row(patch, record, unit):
+    """A dict of headings and values."""
+    owner = probe.probe_of(patch)
+    numbers = {_heading("xyz"[i], 1, unit): x / unit[1] for i, x in enumerate(record["frame"]["origin"])}
+    numbers |= dict(zip(("nx", "ny", "nz"), record["frame"]["normal"], strict=True))
+    for key, power in NUMBERS.items():
+        numbers[_heading(key, power, unit)] = record[key] / unit[1] ** power if key in record else None
+    named = {"probe": owner.name if owner else "", "patch": patch.name}
+    said = {key: "" if value is None else f"{value:.9g}" for key, value in numbers.items()}
+    return named | said | {key: record[key] for key in WORDS}
+
+
+def _heading(name, power, unit):
+    symbol = units.symbol(power, unit)
+    return f"{name} [{symbol}]" if symbol else name

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What takes longer than a redraw may: done in slices between a window's events, with progress and Esc."""
+
+import sys
+from time import perf_counter
+
+from .operators import report_error
+
+AT_ONCE = 0.2  # seconds of work before a window is told that there is more
+SLICE = 0.05  # seconds of work between two events
+NEXT = 0.01  # seconds from one slice to the next
+
+
+class InSlices:
+    """Mixed into operators whose work is a generator.
+
+    Each has `_begin(context)`, which sets `_steps`; `_check(context)`, called before each slice, as the scene
+    may have changed; `_done()`, words and the share that is done, or None; and `_finish(context)`. All but
+    `_done` may raise ValueError, with a sentence for the user.
+    """
+
+    _timer = None  # while it is running in a window
+    stop = "Stop"  # what Esc does
+    meanwhile = {"RUNNING_MODAL"}  # what becomes of all other events
+
+    def invoke(self, context, event):
+        try:
+            self._begin(context)
+            if self._advance(context, AT_ONCE):
+                return self._finish(context)
+        except ValueError as error:
+            return report_error(self, error)
+        return self._go_on(context)
+
+    def execute(self, context):
+        try:
+            self._begin(context)
+            self._check(context)
+            for _ in self._steps:
+                pass
+            return self._finish(context)
+        except ValueError as error:
+            return report_error(self, error)
+
+    def _go_on(self, context):
+        """Has the window do the steps."""
+        self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
+        context.workspace.status_text_set(_status(self.stop, *self._done()))
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC" and event.value == "PRESS":
+            return self._stopped(context)
+        if event.type != "TIMER":
+            return self.meanwhile
+        try:
+            if not self._advance(context, SLICE):
+                context.workspace.status_text_set(_status(self.stop, *self._done()))
+                return self.meanwhile
+            self._leave(context)
+            return self._finish(context)
+        except ValueError as error:
+            self._leave(context)
+            return report_error(self, error)
+
+    def _advance(self, context, seconds):
+        """Works so long; whether all is done then."""
+        self._check(context)
+        end = perf_counter() + seconds
+        return not any(perf_counter() > end for _ in self._steps)
+
+    def _check(self, context):
+        """Nothing that happens meanwhile matters."""
+
+    def _stopped(self, context):
+        self._leave(context)
+        self.report({"INFO"}, "Stopped: the patch stays as it was")
+        return {"CANCELLED"}
+
+    def _leave(self, context):
+        """Takes away all that shows that it is going on."""
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            context.workspace.status_text_set(None)
+            self._timer = None
+
+    def cancel(self, context):
+        """Blender's, where it ends the operator itself: by a dialog, a new file or a closed window."""
+        if self._timer is not None:
+            self._leave(context)
+            print(f"{self.bl_label}: stopped, for the file or the window was closed", file=sys.stderr)
+
+
+def _status(stop, words, share=None):
+    """What draws the status bar meanwhile; it may outlive the operator by a redraw."""
+
+    def draw(header, context):
+        layout = header.layout
+        layout.label(text="", icon="EVENT_ESC")
+        layout.label(text=f" {stop}")
+        if share is None:
+            layout.label(text=words, translate=False)
+        else:
+            row = layout.row()
+            row.ui_units_x = 16
+            row.progress(factor=share, text=words, translate=False)
+        layout.separator_spacer()
+
+    return draw

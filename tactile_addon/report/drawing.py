@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of a report as SVG, which needs no renderer: triangles and dots in colors, histograms, a scale."""
+
+import numpy as np
+
+from ..scene.colors import shades
+
+SIZE = 320  # of a picture, in pixels
+BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # of a histogram
+
+
+def triangles(points, corners, colors, marks=()):
+    """Triangles (m, 3) between points (n, 2) in colors (m, 3 or 4) of 0 to 1, and marks (k, 2) on them."""
+    place = _fitted(points)
+    shapes = [
+        f'<path d="M{_pairs(place(points[three]), "L")}Z" fill="{_hex(color)}" stroke="{_hex(color)}"/>'
+        for three, color in zip(corners, colors, strict=True)
+    ]
+    shapes += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in place(np.reshape(marks, (-1, 2)))]
+    return _picture(shapes)
+
+
+def dots(points, colors):
+    """Dots at points (n, 2), later ones above earlier ones, in colors (n, 3 or 4)."""
+    place, radius = _fitted(points), max(2.0, 0.7 * SIZE / np.sqrt(max(len(points), 1)))
+    return _picture(
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{_hex(color)}"/>'
+        for (x, y), color in zip(place(points), colors, strict=True)
+    )
+
+
+def histogram(values, weights, limit, label):
+    """Shares of the weights (n,) by values (n,) to a limit, from 0 where none is less; ends count more."""
+    low = -limit if np.min(values) < 0.0 else 0.0
+    edges = np.linspace(low, limit, BINS + 1)
+    shares, _ = np.histogram(np.clip(values, low, limit), edges, weights=weights)
+    tall = shares / max(shares.max(), 1e-300)
+    fills = shades(0.5 * (edges[1:] + edges[:-1]), limit)
+    bars = [
+        f'<rect x="{BAR_WIDTH * i}" y="{HEIGHT * (1.0 - t):.1f}" width="{BAR_WIDTH - 1}" '
+        f'height="{HEIGHT * t:.1f}" fill="{_hex(fill)}" stroke="#888" stroke-width="0.5"/>'
+        for i, (t, fill) in enumerate(zip(tall, fills, strict=True))
+    ]
+    width = BAR_WIDTH * BINS
+    places = ((low, 0, "start"), (0.5 * (low + limit), width // 2, "middle"), (limit, width, "end"))
+    ticks = [
+        f'<text x="{x}" y="{HEIGHT + 18}" text-anchor="{anchor}">{label(value)}</text>'
+        for value, x, anchor in places
+    ]
+    return f'<svg viewBox="0 0 {width} {HEIGHT + 24}" width="{width}">{"".join([*bars, *ticks])}</svg>'
+
+
+def scale(limit, label):
+    """The colors from -limit to limit with their values."""
+    fills = shades(np.linspace(-1.0, 1.0, 64), 1.0)
+    boxes = [
+        f'<rect x="{5 * i}" y="0" width="5.5" height="12" fill="{_hex(f)}"/>' for i, f in enumerate(fills)
+    ]
+    words = [
+        f'<text x="{x}" y="27" text-anchor="{anchor}">{label(at * limit)}</text>'
+        for x, at, anchor in ((0, -1.0, "start"), (SIZE // 2, 0.0, "middle"), (SIZE, 1.0, "end"))
+    ]
+    return f'<svg viewBox="0 0 {SIZE} 32" width="{SIZE}">{"".join([*boxes, *words])}</svg>'
+
+
+def _picture(shapes):
+    return f'<svg viewBox="0 0 {SIZE} {SIZE}" width="{SIZE}">{"".join(shapes)}</svg>'
+
+
+def _fitted(points):
+    """What takes points (n, 2) to the middle of a picture, y upward."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    factor = (SIZE - 10.0) / max((high - low).max(), 1e-300)
+    return lambda at: SIZE / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
+
+
+def _pairs(points, between):
+    return between.join(f"{x:.1f} {y:.1f}" for x, y in points)
+
+
+def _hex(color):
+    return "#" + "".join(f"{round(255 * min(max(part, 0.0), 1.0)):02x}" for part in color[:3])

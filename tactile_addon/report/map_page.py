@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page of a stability map: the painted object from three sides, and the errors of its touches."""
+
+import bpy
+import numpy as np
+
+from ..scene import patch_record
+from ..scene.mesh_data import values
+from ..stability_map import map_object
+from ..stability_map.map_report import map_summary, map_table_rows
+from ..stability_map.stability import NOTHING
+from ..touch import units
+from . import page, parts, views
+
+
+def map_page(painted):
+    """The page of a map object."""
+    record = painted[patch_record.MAP_RECORD].to_dict()
+    unit = units.unit_of(bpy.context.scene, record["extent"])
+    sections = [
+        page.verdict(map_summary(record), record["patches"] > 0 and not record["in_doubt"]),
+        page.section(
+            "Pictures",
+            _legend(painted, record, unit),
+            *views.three_sides(painted.data, _screen_colors(painted.data)),
+        ),
+        *_errors(painted.data, record, unit),
+        *parts.ending(map_table_rows(record), record),
+    ]
+    return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
+
+
+def _legend(painted, record, unit):
+    """What the colors mean."""
+    shown = painted.tactile_map_colors
+    swatches = "".join(page.swatch(color, words) for words, color in map_object.swatches(painted))
+    if shown == "reason":
+        return swatches
+    title = next(words for key, words, *_ in map_object.SHOWN if key == shown)
+    low = "1" if shown in map_object.LOGARITHMIC else "0"
+    high = units.say(record["color_limit"], map_object.POWERS[shown], unit)
+    return page.words(f"{title}: white at {low}, dark red from {high} on.") + swatches
+
+
+def _errors(mesh, record, unit):
+    errors = values(mesh, "error")
+    known = errors != NOTHING
+    if not known.any():
+        return []
+    weights, std = np.ones(known.sum()), float(np.median(values(mesh, "height_std")[known]))
+    words = (
+        "Shares of the vertices by the error of the touch nearest to them. The last bar counts all beyond."
+    )
+    return [
+        page.section("Errors", parts.spread(errors[known], weights, unit, words)),
+        page.section(
+            "Tolerance bands",
+            parts.bands(errors[known], weights, std, unit, parts.shares_of(record["extent"], "extent")),
+        ),
+    ]
+
+
+def _screen_colors(mesh):
+    """The colors of the vertices as screens have them, (n, 4)."""
+    attribute = mesh.attributes[map_object.COLOR]
+    rgba = np.empty((len(attribute.data), 4), dtype=np.float32)
+    attribute.data.foreach_get("color_srgb", rgba.ravel())
+    return rgba

@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page of a patch: pictures along its normal, and how far the mesh or the contacts are from it."""
+
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+from ..scene import patch_record
+from ..scene.colors import shades, symmetric_range
+from ..scene.mesh_data import values
+from ..touch import units
+from ..touch.wording import readable_rows
+from . import drawing, page, parts
+
+SHOWN = (
+    ("gaussian_curvature", "Gaussian curvature", -2),
+    ("height_std", "standard deviation of the height", 1),
+    ("deviation", "deviation from the mesh, red where the patch is outside it", 1),
+)
+
+
+class Deviations(NamedTuple):
+    """Lengths (n,), signed; their weights (n,); and what they are of, in words."""
+
+    lengths: np.ndarray
+    weights: np.ndarray
+    words: str
+
+
+def patch_page(patch):
+    """The page of a patch object. Raises ValueError, with a sentence, where it was edited."""
+    r, record = patch_record.reconstruction_of(patch), patch[patch_record.RECORD].to_dict()
+    unit = units.unit_of(bpy.context.scene, r.radius)
+    off = _deviations(patch, r, record)
+    reaches = parts.shares_of(r.radius, "radius")
+    bands = parts.bands(off.lengths, off.weights, r.mean_height_std, unit, reaches)
+    sections = [
+        page.verdict(f"{record['status']}: {record['message']}", record["status"] == "ok"),
+        page.section("Pictures", *_pictures(patch, r, record, unit)),
+        page.section("Deviations", parts.spread(off.lengths, off.weights, unit, off.words)),
+        page.section("Tolerance bands", bands),
+        *parts.ending(readable_rows(record), record),
+    ]
+    return page.page(f"{patch.name}: a patch of {record['source']}", sections)
+
+
+def _pictures(patch, r, record, unit):
+    points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
+    contacts = r.contacts[:, :2] * record["radius"] / r.radius  # as the object's mesh has them
+    for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
+        shown = values(patch.data, attribute)
+        limit = symmetric_range(shown, parts.LEAST_RANGE)
+        colors = shades(shown[corners].mean(axis=1), limit)
+        picture = drawing.triangles(points[:, :2], corners, colors, contacts)
+        scale = drawing.scale(limit, parts.label(power, unit))
+        yield page.figure(f"{picture}<br>{scale}", f"{title}, along the normal, with the contacts")
+
+
+def _has_mesh(record):
+    return bool(record.get("vertices") or record.get("verification"))
+
+
+def _deviations(patch, r, record):
+    if _has_mesh(record):
+        points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
+        words = (
+            "Shares of the patch's area by its distance from the mesh. The outermost bars count all beyond."
+        )
+        off = values(patch.data, "deviation").astype(float)
+        return Deviations(off, parts.vertex_areas(points, corners), words)
+    x, y, z = r.contacts.T
+    words = "Shares of the contacts by the patch's height above them. The outermost bars count all beyond."
+    return Deviations(r.height(x, y) - z, np.ones(len(x)), words)

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which mesh is below the mouse, and where."""
+
+from contextlib import suppress
+
+import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+from ..probes import probe
+from ..scene import patch_record
+from ..touch.surface import MeshSurface
+from .mouse import mouse_ray, viewport_below
+
+LAYERS = 64  # patches and hidden objects that the mouse sees through at most
+MANY_FACES = 200_000  # A mesh with more takes a noticeable time to be touched first.
+
+
+def large_meshes(context):
+    """Names of the visible objects whose first touch takes a noticeable time."""
+    depsgraph = context.evaluated_depsgraph_get()
+    meshes = (obj for obj in context.view_layer.objects if obj.type == "MESH" and obj.visible_get())
+    return {obj.name for obj in meshes if len(obj.evaluated_get(depsgraph).data.polygons) > MANY_FACES}
+
+
+def names_below(context, event, names):
+    """Those of the objects whose boxes are below the mouse, or may be."""
+    viewport = viewport_below(context, event)
+    if viewport is None:
+        return []
+    _, region, view = viewport
+    mouse = event.mouse_x - region.x, event.mouse_y - region.y
+    return [name for name in names if name in bpy.data.objects and _is_over(name, region, view, mouse)]
+
+
+def _is_over(name, region, view, mouse):
+    obj = bpy.data.objects[name]
+    corners = (obj.matrix_world @ Vector(corner) for corner in obj.bound_box)
+    seen = [location_3d_to_region_2d(region, view, corner) for corner in corners]
+    if None in seen:  # behind the eye
+        return True
+    ranges = ((min(axis), max(axis)) for axis in zip(*seen, strict=True))
+    return all(low <= at <= high for at, (low, high) in zip(mouse, ranges, strict=True))
+
+
+def read(context, names):
+    """Has Blender build the trees of these objects' faces, which it keeps."""
+    depsgraph = context.evaluated_depsgraph_get()
+    for name in names:
+        with suppress(ValueError):  # said where it is touched
+            MeshSurface(bpy.data.objects[name], depsgraph)
+
+
+def point_below(context, event):
+    """(object, location, direction toward the eye) of the mesh below the mouse, or None where there is none.
+
+    Raises ValueError for what cannot be touched.
+    """
+    viewport = viewport_below(context, event)
+    if viewport is None:
+        return None
+    space, region, view = viewport
+    eye, direction = mouse_ray(region, view, event)
+    # An orthographic view shows what is behind its origin too.
+    start = eye if view.is_perspective else eye - space.clip_end * direction
+    depsgraph = context.evaluated_depsgraph_get()
+    cast = context.scene.ray_cast
+    for _ in range(LAYERS):
+        hit, point, _, _, found, matrix = cast(depsgraph, start, direction)
+        if not hit:
+            return None
+        obj = _touched_by_map(found.original, space)
+        if not probe.is_result(obj) and (obj != found.original or obj.visible_in_viewport_get(space)):
+            if obj == found.original:  # A map's own transform differs from its source's by rounding.
+                _require_touchable(obj, matrix)
+            # Cast again from close by: from far away it is not exact.
+            surface = MeshSurface(obj, depsgraph)
+            depth = (point - eye).dot(direction) - surface.size
+            start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
+            hit = surface.ray_cast(start, direction, 2.0 * surface.size)
+            return obj, list(point) if hit is None else hit[0], -direction
+        # Behind it, by more than rounding: from close by, for from far away that is more than a small object.
+        back = 1e-3 * (point - start).length
+        hit, near, *_ = cast(depsgraph, point - back * direction, direction)
+        start = (near if hit else point) + 1e-5 * max(back, point.length) * direction
+    return None
+
+
+def _touched_by_map(obj, space):
+    """What a map or a whole object shows, where it is not to be seen itself; `obj` for all else."""
+    record = patch_record.touched_record(obj)
+    source = record and bpy.data.objects.get(record["source"])
+    return obj if source is None or source.visible_in_viewport_get(space) else source
+
+
+def _require_touchable(obj, matrix):
+    if obj.type != "MESH":
+        raise ValueError(f'"{obj.name}" is no mesh: convert it to one first')
+    if matrix != obj.matrix_world:
+        raise ValueError(f'This is an instance of "{obj.name}": make it real to touch it')

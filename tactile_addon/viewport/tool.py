@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tool in the viewport's toolbar: each click touches."""
+
+import bpy
+
+from .pick import TACTILE_OT_pick
+
+
+class TactileTool(bpy.types.WorkSpaceTool):
+    bl_space_type, bl_context_mode = "VIEW_3D", "OBJECT"
+    bl_idname = "tactile.tool"
+    bl_label = "Tactile Probe"
+    bl_description = "Click on a mesh to have a probe there, or the active probe moved there"
+    bl_icon = "ops.paint.eyedropper_add"
+    bl_keymap = (
+        (
+            TACTILE_OT_pick.bl_idname,
+            {"type": "LEFTMOUSE", "value": "PRESS"},
+            {"properties": [("at_once", True)]},
+        ),
+    )
+
+
+def register():
+    bpy.utils.register_tool(TactileTool, after={"builtin.measure"})
+
+
+def unregister():
+    bpy.utils.unregister_tool(TactileTool)

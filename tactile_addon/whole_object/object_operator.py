@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Touch All Over: touches that grow over an object by themselves; in slices in a window."""
+
+import sys
+from time import perf_counter
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+
+from ..probes import probe
+from ..probes.in_slices import InSlices
+from ..probes.operators import make_active, report_error, target_object
+from ..scene import patch_record
+from ..touch.settings import draw_chosen
+from . import whole_mesh
+from .object_report import object_summary
+from .object_touches import ObjectTouches
+
+SAY = 1.0  # seconds between two lines of progress
+UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
+
+
+class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
+    """Touch an object all over, from one point on, and join the patches to one surface"""
+
+    bl_idname = "tactile.touch_all_over"
+    bl_label = "Touch All Over"
+    bl_options = {"UNDO", "PRESET"}
+
+    target: StringProperty(
+        name="Target",
+        description="Name of the mesh object to touch; empty for the active object",
+        options=UNSAVED,
+    )
+    location: FloatVectorProperty(
+        name="Location",
+        subtype="TRANSLATION",
+        description="Where to begin; the probe's point, or any place that works, where it is not set",
+        options=UNSAVED,
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="How well the height of each patch is to be known; 0 for 1/500 of the object's size",
+        subtype="DISTANCE",
+        soft_min=0.0,
+    )
+    noise: FloatProperty(
+        name="Noise",
+        description="Standard deviation of the simulated sensor",
+        subtype="DISTANCE",
+        soft_min=0.0,
+    )
+    seed: IntProperty(name="Seed", description="Of the noise and of the place to begin", default=0, min=0)
+    most: IntProperty(
+        name="Most Touches",
+        description="When to end at the latest",
+        default=1000,
+        min=1,
+        soft_max=10_000,
+    )
+    edge: FloatProperty(
+        name="Edge Length",
+        description="Of the surface's triangles; 0 for what its curvature asks",
+        subtype="DISTANCE",
+        soft_min=0.0,
+    )
+    progress: BoolProperty(
+        name="Progress",
+        description="Print progress to stderr where there is no window to show it",
+        options={"HIDDEN", *UNSAVED},
+    )
+
+    stop = "Stop Touching and Keep"
+    meanwhile = {"PASS_THROUGH"}  # the touches are in a snapshot
+    _growing = None
+
+    @classmethod
+    def poll(cls, context):
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Objects are touched in Object Mode: leave this mode first")
+            return False
+        return True
+
+    def invoke(self, context, event):
+        if bpy.app.background:
+            return self.execute(context)
+        self._in_window = True
+        try:
+            self.target = target_object(context, self.target).name
+        except ValueError as error:
+            return report_error(self, error)
+        return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
+
+    def execute(self, context):
+        if not getattr(self, "_in_window", False):
+            return super().execute(context)
+        try:
+            self._begin(context)
+        except ValueError as error:
+            return report_error(self, error)
+        self._growing = whole_mesh.GrowingPatches(context.scene, self._name, self._touches.surface.origin)
+        return self._go_on(context)
+
+    def _begin(self, context):
+        target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
+        location = list(self.location) if self.properties.is_property_set("location") else None
+        if location is None and found is not None and found.tactile_probe.target == target:
+            location = list(found.matrix_world.translation)
+        # No reference to the target: whatever happens to the scene, the touches go on in a snapshot of it.
+        self._name = target.name
+        self._touches = ObjectTouches(
+            target,
+            context.evaluated_depsgraph_get(),
+            location=location,
+            **{name: getattr(self, name) for name in ("tolerance", "noise", "seed", "most", "edge")},
+        )
+        self._steps = self._shown()
+
+    def _shown(self):
+        """The steps; the patches appear between them, or progress is printed."""
+        shown, said = 0, perf_counter()
+        for _ in self._touches.steps():
+            if self._growing is not None:
+                self._growing.add(self._touches.found[shown:])
+            elif self.progress and perf_counter() > said + SAY:
+                said = perf_counter()
+                print(self._touches.words, file=sys.stderr, flush=True)
+            shown = len(self._touches.found)
+            yield
+
+    def _done(self):
+        return self._touches.words, self._touches.share
+
+    def _check(self, context):
+        if context.mode != "OBJECT":
+            raise ValueError("The touching was stopped, for Object Mode was left: start it again")
+
+    def _stopped(self, context):
+        """Esc joins what there is so far; once more, and nothing is kept."""
+        if self._touches.is_stopped or not self._touches.found:
+            self._leave(context)
+            return {"CANCELLED"}
+        self._touches.stop()
+        self.stop = "Drop It"
+        return {"RUNNING_MODAL"}
+
+    def _leave(self, context):
+        super()._leave(context)
+        if self._growing is not None:
+            self._growing.remove()
+            self._growing = None
+
+    def _finish(self, context):
+        made = whole_mesh.insert(context, self._name, self._touches)
+        make_active(context, made)
+        record = made[patch_record.ATLAS_RECORD].to_dict()
+        self.report({"INFO"} if record["is_closed"] else {"WARNING"}, object_summary(record))
+        return {"FINISHED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop_search(self, "target", context.scene, "objects")
+        draw_chosen(layout, self, "tolerance")
+        draw_chosen(layout, self, "edge")
+        layout.prop(self, "most")
+        layout.prop(self, "noise")
+        layout.prop(self, "seed")

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Touches that grow over an object, step by step, with nothing changed in the scene: its atlas and mesh."""
+
+import numpy as np
+
+from ... import core
+from ..touch.detached_mesh import DetachedMesh
+from ..touch.units import length
+
+TOLERANCE_SHARE = 1.0 / 500.0  # of the object's size, where no tolerance is given
+STARTS = 20  # places that are tried where no place to begin is given
+REACH = 0.05  # of the object's size, that the target is looked for along the normal
+AT_ONCE = 2000  # vertices whose deviation from the target is measured in a step
+
+
+class ObjectTouches:
+    """Touches of an evaluated mesh that begin at one place; all is in the directions of the world.
+
+    surface : the mesh as it was, from its object's origin
+    found : core.Reconstructions of the touches so far; uncovered : places known to be uncovered
+    words, share : what is going on, and the share of it that is done, None where nobody knows
+    atlas, mesh : core.Atlas and core.Mesh, once the steps are done
+    curvatures, deviation : as of Atlas.curvatures; signed distances (n,) of the mesh's vertices to the target
+    """
+
+    def __init__(self, obj, depsgraph, *, location, tolerance, noise, seed, most, edge):
+        """`location` is None, and lengths 0, for a choice by the object.
+
+        Raises ValueError, with a sentence, for what cannot be touched.
+        """
+        import scipy.linalg
+        import scipy.sparse  # takes half a second once: not between two redraws
+        import scipy.spatial  # noqa: F401
+
+        for name, value in (("tolerance", tolerance), ("noise", noise), ("edge", edge)):
+            if not value >= 0.0:  # NaN is none
+                raise ValueError(f"The {name} is a length of 0 or more, got {length(value)}")
+        self.surface = DetachedMesh(obj, depsgraph)
+        self.tolerance = tolerance or max(TOLERANCE_SHARE * self.surface.size, noise)
+        if self.tolerance < noise:
+            raise ValueError(
+                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: take a larger one"
+            )
+        self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
+        self.found, self.uncovered = [], 0
+        self.words, self.share = "Looking for a place to begin", None
+        self.is_stopped = False
+        self._location = location
+
+    def steps(self):
+        """Does all of it; a generator, which yields each few hundredths of a second."""
+        steps, state = self._started()
+        while True:
+            self._note(state)
+            yield
+            try:
+                state = steps.send(False if self.is_stopped else None)
+            except StopIteration as end:
+                self.atlas = end.value
+                break
+        yield from self._meshed()
+
+    def _started(self):
+        """The steps of core and what the first of them said; raises ValueError where none can begin."""
+        for point, outward in self._places():
+            steps = core.touch_all_over(
+                self.surface,
+                point,
+                outward,
+                tolerance=self.tolerance,
+                noise=self.noise,
+                most=self.most,
+                rng=self.seed,
+            )
+            try:
+                return steps, next(steps)
+            except ValueError as error:
+                why = error
+        raise ValueError(f"No touch could begin: choose another location ({why})")
+
+    def _places(self):
+        """Where the touches may begin, and the normal there."""
+        if self._location is not None:
+            at = np.subtract(self._location, self.surface.origin)
+            yield self.surface.project(at)[:2]
+            return
+        candidates = np.flatnonzero(self.surface.has_face)
+        chosen = np.random.default_rng(self.seed).permutation(candidates)[:STARTS]
+        yield from zip(self.surface.points[chosen], self.surface.normals[chosen], strict=True)
+
+    def _note(self, state):
+        self.found += [exploration.result for exploration in state.found]
+        self.uncovered = state.uncovered
+        self.words = f"{state.done} touches, {state.uncovered} places to go on from"
+        if state.joining is not None:
+            self.words, self.share = f"Joining {state.done} patches", 0.5 * state.joining
+
+    def _meshed(self):
+        self.words = "Meshing"
+        steps = self.atlas.meshing(self.edge or self.atlas.suggested_edge())
+        while True:
+            try:
+                self.share = 0.5 + 0.4 * next(steps)
+            except StopIteration as end:
+                self.mesh = end.value
+                break
+            yield
+        self.curvatures = self.atlas.curvatures(self.mesh)
+        yield
+        self.deviation, normals = np.zeros(len(self.mesh.vertices)), self.mesh.normals
+        for start in range(0, len(self.deviation), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            self.deviation[some] = self.surface.deviations(
+                self.mesh.vertices[some], normals[some], REACH * self.surface.size
+            )
+            self.share = 0.9 + 0.1 * start / len(self.deviation)
+            yield
+
+    def stop(self):
+        """Has the steps touch no more, and join what there is."""
+        self.is_stopped = True
+
+    def report(self):
+        """What there is to say, a dict of plain values."""
+        atlas, mesh = self.atlas, self.mesh
+        off = np.abs(self.deviation)
+        return {
+            "touches": len(self.found),
+            "patches": len(atlas.patches),
+            "in_doubt": sum(r.status != "ok" for r in atlas.patches),
+            "uncovered": len(atlas.uncovered),
+            "edges": len(atlas.edges),
+            "is_closed": mesh.is_closed,
+            "vertices": len(mesh.vertices),
+            "triangles": len(mesh.triangles),
+            "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # where it was felt
+            "deviation_mean": float(off.mean()),
+            "deviation_max": float(off.max()),
+            "radius": float(np.median([r.radius for r in atlas.patches])),
+            "size": self.surface.size,
+            "tolerance": self.tolerance,
+            "noise": self.noise,
+            "seed": self.seed,
+            "most": self.most,
+        }

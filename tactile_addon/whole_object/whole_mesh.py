@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What touches all over an object leave in the scene: their patches while they grow, then one surface."""
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..scene import colors, patch_object, patch_record
+from ..scene.mesh_data import emission, fill
+from ..scene.viewports import show_colors
+
+RINGS, SPOKES = (0.5, 1.0), 24  # of a patch while it is one of many
+
+
+class GrowingPatches:
+    """The patches that were found so far, as one object, until it is removed."""
+
+    def __init__(self, scene, name, origin):
+        self._mesh = bpy.data.meshes.new(f"{name} Touches")
+        obj = bpy.data.objects.new(self._mesh.name, self._mesh)
+        obj.show_in_front, obj.matrix_world = True, Matrix.Translation(origin)
+        scene.collection.objects.link(obj)  # in none of its own, which might be left empty
+        obj.data.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
+        self._uid, self._patches = obj.session_uid, []
+        show_colors()
+
+    def add(self, found):
+        """Shows these core.Reconstructions too; nothing where somebody has deleted the object."""
+        obj = self._object()
+        if obj is None or not found:
+            return
+        self._patches += [_disk(r) for r in found]
+        points, curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
+        count = 1 + SPOKES * len(RINGS)
+        triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
+        shades = colors.diverging(curvatures, colors.symmetric_range(curvatures, 1e-30))
+        fill(obj.data, points, triangles, [(patch_record.COLOR, "FLOAT_COLOR", shades)])
+
+    def remove(self):
+        obj = self._object()
+        if obj is not None:
+            patch_object.remove_objects([obj])
+
+    def _object(self):
+        return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
+
+
+def _disk(r):
+    """Points (n, 3) of a patch, on rings around its middle, and Gaussian curvatures (n,) there."""
+    angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
+    unit = np.column_stack([np.cos(angles), np.sin(angles)])
+    x, y = r.domain.points_at(np.vstack([np.zeros((1, 2)), *(share * unit for share in RINGS)])).T
+    return r.frame.to_world(np.column_stack([x, y, r.height(x, y)])), r.patch.gaussian_curvature(x, y)
+
+
+def _fan():
+    """Triangles (m, 3) of such points."""
+    a, b = np.arange(SPOKES), np.roll(np.arange(SPOKES), -1)
+    inner, outer = 1 + a, 1 + SPOKES + a
+    return np.vstack(
+        [
+            np.column_stack([np.zeros_like(a), inner, 1 + b]),
+            np.column_stack([inner, outer, 1 + SPOKES + b]),
+            np.column_stack([inner, 1 + SPOKES + b, 1 + b]),
+        ]
+    )
+
+
+def insert(context, name, touches):
+    """Adds the surface that `touches`, an ObjectTouches, have found to the scene; returns the object."""
+    mesh = bpy.data.meshes.new(f"{name} Touched")
+    obj = bpy.data.objects.new(mesh.name, mesh)
+    obj.matrix_world, obj.show_in_front = Matrix.Translation(touches.surface.origin), True
+    patch_object.collection(context.scene).objects.link(obj)
+    mesh.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
+    found = touches.mesh
+    attributes = [
+        *((key, "FLOAT", values) for key, values in touches.curvatures.items()),
+        ("height_std", "FLOAT", found.std),
+        ("deviation", "FLOAT", touches.deviation),
+        ("patch", "INT", found.patch.astype(np.int32)),
+        (patch_record.COLOR, "FLOAT_COLOR", np.ones((len(found.vertices), 4))),
+    ]
+    fill(mesh, found.vertices, found.triangles, attributes)
+    mesh.shade_smooth()
+    obj[patch_record.ATLAS_RECORD] = touches.report() | {"source": name, "object": obj.name}
+    patch_object.recolor(obj)
+    show_colors()
+    return obj

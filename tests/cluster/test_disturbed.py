@@ -1,0 +1,341 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whatever happens in the middle: workers and schedulers lost, broken files, no room on the disk, Ctrl+C."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+from data_sets import FEW, blocks_of, nothing_is_aside, rows_of, write_ball
+
+pq = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed: run make test-cluster")
+psutil = pytest.importorskip("psutil", reason="distributed is not installed: run make test-cluster")
+
+ROOT = Path(__file__).parents[2]
+# An ending of the file's header that Blender's importer does not survive.
+CRASHES = """ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+element face 4000000000
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+3 0 1 2
+"""
+
+
+def hands():
+    """The processes that have Blender, below this one."""
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        try:
+            if "cluster.worker.hand" in process.cmdline():
+                found.append(process)
+        except psutil.Error:  # it has just ended
+            pass
+    return found
+
+
+def started(*words):
+    """The command in a process and a session of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "cluster", "touch", *map(str, words)],
+        cwd=ROOT,
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for(true, seconds=60.0):
+    until = time.monotonic() + seconds
+    while not true() and time.monotonic() < until:
+        time.sleep(0.05)
+    assert true()
+
+
+def test_a_worker_killed_in_the_middle_costs_its_block(
+    command, cluster, objects, plain, tmp_path, in_the_middle
+):
+    killed = []
+
+    def kill():
+        pid = next(iter(cluster.run(os.getpid).values()))
+        killed.extend([psutil.Process(pid), *psutil.Process(pid).children(recursive=True)])
+        os.kill(pid, signal.SIGKILL)
+
+    in_the_middle(tmp_path, kill)
+    code, *_ = command(objects, *FEW, "--output", tmp_path)
+    assert code == 0 and killed
+    assert rows_of(tmp_path) == rows_of(plain)
+    assert nothing_is_aside(tmp_path)
+    wait_for(lambda: not any(p.is_running() and p.status() != "zombie" for p in killed))  # its Blender too
+
+
+def test_blender_killed_in_the_middle_is_tried_again_and_logged(
+    command, objects, plain, tmp_path, in_the_middle
+):
+    in_the_middle(tmp_path, lambda: [hand.kill() for hand in hands()])
+    code, *_ = command(objects, *FEW, "--output", tmp_path)
+    assert code == 0
+    assert rows_of(tmp_path) == rows_of(plain)
+    (trouble, *_) = [line for line in (tmp_path / "log.txt").read_text().splitlines() if "SIGKILL" in line]
+    assert " block " in trouble and ".ply) block" in trouble
+
+
+def test_workers_that_somebody_restarts_do_not_end_the_run(
+    command, cluster, objects, plain, tmp_path, in_the_middle
+):
+    in_the_middle(tmp_path, cluster.restart)
+    assert command(objects, *FEW, "--output", tmp_path)[0] == 0
+    assert rows_of(tmp_path) == rows_of(plain)
+
+
+def free_port():
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return found.getsockname()[1]
+
+
+@contextmanager
+def scheduler(port):
+    """A scheduler with one worker, as processes of their own."""
+    address, environment = f"tcp://127.0.0.1:{port}", os.environ | {"PYTHONPATH": str(ROOT)}
+    words = [
+        ["dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--dashboard-address", "127.0.0.1:0"],
+        ["dask_worker", address, "--nthreads", "1", "--dashboard-address", "127.0.0.1:0"],
+    ]
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.{name}", *more],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for name, *more in words
+    ]
+
+    def end():
+        for process in running:
+            process.kill()
+            process.wait()
+
+    try:
+        yield address, end
+    finally:
+        end()
+
+
+def test_a_scheduler_that_is_started_again_goes_on(command, objects, plain, tmp_path, in_the_middle):
+    port = free_port()
+    with ExitStack() as running:
+        address, end = running.enter_context(scheduler(port))
+
+        def restart():
+            end()
+            running.enter_context(scheduler(port))
+
+        in_the_middle(tmp_path, restart)
+        assert command(objects, *FEW, "--output", tmp_path, scheduler=address)[0] == 0
+    assert rows_of(tmp_path) == rows_of(plain)
+
+
+def test_no_scheduler_there_is_said(command, objects, tmp_path, monkeypatch):
+    from cluster import engine
+
+    monkeypatch.setattr(engine, "CONNECT", 1.0)
+    address = f"tcp://127.0.0.1:{free_port()}"
+    code, _, error = command(objects, *FEW, "--output", tmp_path, scheduler=address)
+    assert code == 1 and f'no scheduler answers at "{address}"' in error
+
+
+def test_a_scheduler_that_stays_away_ends_the_run(command, objects, tmp_path, in_the_middle, monkeypatch):
+    from cluster import engine
+
+    monkeypatch.setattr(engine, "CONNECT", 8.0)
+    with scheduler(free_port()) as (address, end):
+        in_the_middle(tmp_path, end)
+        code, _, error = command(objects, *FEW, "--output", tmp_path, scheduler=address)
+    assert code == 1
+    assert error.endswith("cluster: the scheduler is gone: start it again, and then this command\n")
+    assert blocks_of(tmp_path) and nothing_is_aside(tmp_path)
+
+
+def test_broken_and_empty_files_and_one_that_blender_dies_of_are_error_rows(command, objects, tmp_path):
+    bad = tmp_path / "bad"
+    write_ball(bad / "good.ply")
+    whole = (bad / "good.ply").read_bytes()
+    (bad / "half.ply").write_bytes(whole[: len(whole) // 2])
+    (bad / "crash.ply").write_text(CRASHES)
+    (bad / "no_faces.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    (bad / "broken.blend").write_bytes(b"BLENDER-v405" + bytes(3000))
+    for kind in ("ply", "stl", "obj", "blend"):
+        (bad / f"empty.{kind}").touch()
+    words = (bad, "--touches", "3", "--output", tmp_path / "set")
+    code, output, _ = command(*words)
+    assert code == 3
+    found = {
+        Path(row["file"]).name: row for row in pq.read_table(tmp_path / "set/objects.parquet").to_pylist()
+    }
+    good = found.pop("good.ply")
+    assert good["error"] == 0 and good["touches"] == 3
+    assert len(found) == 8
+    for row in found.values():
+        assert (row["touches"], row["error"], row["hash"]) == (3, 3, None)
+        assert row["message"] in output
+    assert found["crash.ply"]["message"] == "Blender ended by SIGABRT"
+    assert found["half.ply"]["message"] == 'no mesh could be read from "half.ply": is the file whole?'
+    rows = [row for path in blocks_of(tmp_path / "set") for row in pq.read_table(path).to_pylist()]
+    assert len(rows) == 27
+    assert {row["touch"] for row in rows if row["object"] == "crash"} == {0, 1, 2}
+    tried = [
+        line for line in (tmp_path / "set" / "log.txt").read_text().splitlines() if "crash.ply: B" in line
+    ]
+    assert len(tried) == 2
+    # They stay as they are, unless their rows are taken away.
+    assert command(*words)[0] == 3
+    (bad / "half.ply").write_bytes(whole)
+    for path in (tmp_path / "set" / "touches").glob("*-error.parquet"):
+        if pq.read_table(path)["object"][0].as_py() == "half":
+            path.unlink()
+    code, output, _ = command(*words)
+    assert code == 3 and "7 errors" not in output and output.startswith("8 objects")
+
+
+def test_a_process_that_takes_too_long_is_ended(objects, plain, tmp_path):
+    import json
+
+    from cluster.data_set import manifest
+    from cluster.worker.process import HandProcess, LostError
+
+    asked = json.loads((plain / "manifest.json").read_text())["options"] | {"touches": 5000, "block": 5000}
+    survey = ("survey", str(objects / "pebble.ply"), manifest.versions())
+    hand = HandProcess()
+    _, (facts,) = hand.ask(100.0, *survey)
+    with pytest.raises(LostError) as busy:  # some thousand touches, in half a second
+        hand.ask(0.5, "touch", facts, asked, 0, str(tmp_path / "block.parquet"))
+    assert str(busy.value).startswith("It took longer than the limit of 0.5 s\n")
+    assert "in touched" in str(busy.value)  # where it was
+    assert hand.is_worn and not list(tmp_path.iterdir())
+    hand = HandProcess()
+    hand.ask(100.0, *survey)
+    os.kill(hand._process.pid, signal.SIGSTOP)  # as where not even a watchdog runs any more
+    with pytest.raises(LostError, match=r"It took longer than the limit of 0.1 s"):
+        hand.ask(0.1, *survey)
+    assert hand.is_worn
+
+
+def test_a_block_that_fails_twice_is_error_rows(cluster, objects, tmp_path, plain, monkeypatch):
+    import json
+
+    from cluster.data_set.folder import DataSet
+    from cluster.data_set.options import Options
+    from cluster.engine import Engine, Outcome
+    from cluster.run import Run, summed_up
+
+    class Failing(Engine):
+        def performed(self, orders):
+            for order in orders:
+                if order.label.endswith("block 1"):
+                    yield Outcome(order, "failed", "It hung", [f"{order.label}: It hung"] * 2)
+                else:
+                    yield from super().performed([order])
+
+    options = Options.from_dict(json.loads((plain / "manifest.json").read_text())["options"])
+    run = Run(DataSet(tmp_path), options, [str(objects / "pebble.ply")])
+    run.work(Failing(cluster, 100.0))
+    (row,) = summed_up(run.data_set)
+    assert (row["touches"], row["error"], row["message"]) == (30, 10, "It hung")
+    _, failed, _ = (pq.read_table(path).to_pylist() for path in blocks_of(tmp_path))
+    assert [each["touch"] for each in failed] == list(range(10, 20))
+    assert {(each["status"], each["message"], each["hash"]) for each in failed} == {
+        ("error", "It hung", row["hash"])
+    }
+    assert (tmp_path / "log.txt").read_text().count("pebble.ply) block 1: It hung") == 2
+
+
+@pytest.mark.parametrize("place", ["/proc/nothing", "{file}/below"])
+def test_a_folder_that_takes_nothing_is_said_at_once(command, objects, tmp_path, place):
+    (tmp_path / "file").touch()
+    folder = place.format(file=tmp_path / "file")
+    code, _, error = command(objects, *FEW, "--output", folder)
+    assert code == 1
+    assert error.startswith(f'cluster: cannot write to the folder "{folder}"') and error.endswith("another\n")
+
+
+def test_a_full_disk_ends_the_run_and_loses_nothing(command, objects, plain, tmp_path):
+    least = min(path.stat().st_size for path in blocks_of(plain))
+    assert least > 15_000
+
+    run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")
+    # No file may become larger, for this process and those below it: all is as on a disk without room.
+    psutil.Process(run.pid).rlimit(psutil.RLIMIT_FSIZE, (10_000, 10_000))
+    _, error = run.communicate(timeout=100)
+    assert run.returncode == 1, error
+    assert "make room there, or choose another place" in error and "Traceback" not in error
+    assert not blocks_of(tmp_path) and nothing_is_aside(tmp_path)
+    assert command(objects, *FEW, "--output", tmp_path)[0] == 0
+    assert rows_of(tmp_path) == rows_of(plain)
+
+
+@pytest.mark.parametrize("ended", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_ends_cleanly_and_goes_on_later(command, objects, plain, tmp_path, ended):
+    run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")
+    wait_for(lambda: blocks_of(tmp_path))
+    below = psutil.Process(run.pid).children(recursive=True)
+    (os.killpg if ended == signal.SIGINT else os.kill)(run.pid, ended)
+    _, error = run.communicate(timeout=60)
+    assert run.returncode == 130
+    assert "cluster: interrupted; the same command goes on from here" in error and "Traceback" not in error
+    wait_for(lambda: not any(p.is_running() and p.status() != "zombie" for p in below))
+    made = len(blocks_of(tmp_path))
+    assert nothing_is_aside(tmp_path)
+    code, _, error = command(objects, *FEW, "--output", tmp_path)
+    assert code == 0 and f"{made} of 9 blocks are there already" in error
+    assert rows_of(tmp_path) == rows_of(plain)
+
+
+def test_a_worker_of_another_environment_is_refused(command, objects, tmp_path, monkeypatch):
+    from cluster.data_set import manifest
+
+    other = manifest.versions() | {"scipy": "0.1"}
+    monkeypatch.setattr(manifest, "versions", lambda: other)
+    code, _, error = command(objects, *FEW, "--output", tmp_path)
+    assert code == 1 and "the data set 0.1: start workers in the same environment" in error
+
+
+def test_a_worker_without_blender_is_said(objects, monkeypatch):
+    from cluster.worker import process, task
+
+    monkeypatch.setattr(process.sys, "executable", "/bin/false")
+    how, value, troubles = task.perform("pebble", 10.0, "survey", str(objects / "pebble.ply"), {})
+    assert how == "stop" and len(troubles) == 2
+    assert value.startswith("Blender cannot be started on ")
+    assert value.endswith("(it did not say why): start workers in an environment that has it")
+
+
+def test_a_process_that_has_opened_enough_gives_way(objects, monkeypatch):
+    from cluster.data_set import manifest
+    from cluster.worker import process
+
+    monkeypatch.setattr(process, "MOST_OPENED", 2)
+    hand = process.HandProcess()
+    path = str(objects / "pebble.ply")
+    for opened in (1, 2):
+        assert not hand.is_worn
+        how, (facts,) = hand.ask(100.0, "survey", path, manifest.versions())
+        assert (how, facts["name"], hand._opened) == ("done", "pebble", opened)
+    assert hand.is_worn
+    hand.close()

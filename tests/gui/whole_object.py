@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run in a window of Blender on the scene of make_scene.py: an object touched all over, as a user does it.
+
+Every step asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
+"""
+
+import sys
+from pathlib import Path
+from time import perf_counter
+
+import bpy
+import gui
+from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).parent))
+from common import ASIDE, FOLDER, check, data_blocks, look, open_tab, picture, picture_of_docs, probe, until
+
+SLICES = []  # seconds of each call of the operator's modal
+MIDDLE = (520, 380)  # of the viewport, where the object is
+
+
+def running():
+    windows = bpy.context.window_manager.windows
+    return any(op.bl_idname == "TACTILE_OT_touch_all_over" for w in windows for op in w.modal_operators)
+
+
+def surfaces():
+    return [obj for obj in bpy.data.objects if "tactile_object" in obj]
+
+
+def start(**inputs):
+    """Starts it as the dialog does once it is agreed to."""
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.touch_all_over("INVOKE_DEFAULT", True, **inputs)
+    yield 1
+    picture("whole_dialog")
+    gui.xdo("key", "Return")
+    yield from until(running, 5)
+
+
+def measure_slices():
+    """Notes how long each call of modal takes, which is how long a redraw waits."""
+    operator = bpy.types.TACTILE_OT_touch_all_over
+    inner = operator.modal
+
+    def modal(self, context, event):
+        begin = perf_counter()
+        try:
+            return inner(self, context, event)
+        finally:
+            SLICES.append(perf_counter() - begin)
+
+    operator.modal = modal
+
+
+def make_target():
+    """A scan where it is at hand, or an egg; nothing else is to be seen."""
+    for obj in bpy.data.objects:
+        obj.hide_set(True)
+    if (FOLDER / "pear.ply").is_file():
+        bpy.ops.wm.ply_import(filepath=str(FOLDER / "pear.ply"))
+    else:
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=128, ring_count=64)
+        bpy.context.object.scale = (0.04, 0.04, 0.05)
+    obj = bpy.context.object
+    obj.data.shade_smooth()
+    obj.name = "Target"
+    bpy.context.view_layer.update()
+    corners = [obj.matrix_world @ corner for corner in map(Vector, obj.bound_box)]
+    look(sum(corners, Vector((0, 0, 0))) / 8, (0.4, -1, 0.5), 2.2 * max(obj.dimensions))
+    bpy.ops.ed.undo_push(message="Target")
+
+
+def by_dialog():
+    before = data_blocks()
+    yield from start(target="Target")
+    check("the dialog starts it", running())
+    yield from until(lambda: any("Touches" in obj.name for obj in bpy.data.objects), 20)
+    yield 1
+    picture("whole_growing")
+    yield from until(lambda: not running(), 120)
+    (surface,) = surfaces() or [None]
+    if not check("it ends by itself with a surface", surface is not None, data_blocks()):
+        return
+    record = surface["tactile_object"].to_dict()
+    check("... that covers the object", record["uncovered"] == 0, record)
+    check("... and is near it", record["deviation_mean"] < 2e-3 * record["size"], record)
+    left = [obj.name for obj in bpy.data.objects if obj.name.endswith("Touches")]
+    check("... and the growing patches are gone", not left, left)
+    slowest = max(range(len(SLICES)), key=SLICES.__getitem__)
+    print(f"a redraw waits {1e3 * SLICES[slowest]:.0f} ms at most, at {slowest} of {len(SLICES)}", flush=True)
+    full = data_blocks()
+    yield 1
+    picture("whole_surface")
+    picture_of_docs("whole_object")
+    surface.tactile_colors = "height_std"
+    yield 1
+    picture("whole_height_std")
+    surface.tactile_colors = "gaussian_curvature"
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+    yield 1
+    check("one Ctrl Z takes it all away", data_blocks() == before, data_blocks())
+    gui.xdo("key", "ctrl+shift+z")
+    yield 1
+    check("Ctrl Shift Z brings it again", data_blocks() == full, data_blocks())
+
+
+def by_click():
+    """A click on the surface makes a probe on what was touched."""
+    (surface,) = surfaces()
+    bpy.context.view_layer.objects.active = surface
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.pick("INVOKE_DEFAULT", True, new=True)
+    yield 1
+    gui.click(*MIDDLE)
+    yield from until(lambda: probe() is not None, 10)
+    made = probe()
+    if check("a click on it makes a probe", made is not None):
+        check("... on what was touched", made.tactile_probe.target == bpy.data.objects["Target"])
+    yield 1
+    picture("whole_probe")
+    for _ in range(2):
+        gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+        yield 1
+
+
+def by_escape():
+    bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
+    before = data_blocks()
+    for times, kept in ((1, 1), (2, 0)):
+        yield from start(target="Target", tolerance=2e-5)
+        yield 3
+        check(f"{times} Esc: it is under way", running())
+        gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "Escape")
+        for _ in range(times - 1):
+            gui.xdo("sleep", 0.3, "key", "Escape")
+        yield from until(lambda: not running(), 120)
+        check(f"{times} Esc: {kept} surface stays", len(surfaces()) == kept, data_blocks())
+        if kept:
+            picture("whole_part")
+            record = surfaces()[0]["tactile_object"].to_dict()
+            check("... which is open", not record["is_closed"], record)
+            gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+            yield 1
+        check(f"{times} Esc: nothing else is left", data_blocks() == before, data_blocks())
+
+
+def steps():
+    yield from open_tab()
+    make_target()
+    measure_slices()
+    yield 1
+    yield from by_dialog()
+    yield from by_click()
+    yield from by_escape()
+
+
+gui.play(steps())

@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every sample of code in README.md and docs/ runs as it is written, page by page, in order.
+
+What a sample presupposes (a scan, contacts, a scene with Suzanne) lies in the folder that it runs in.
+"""
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+
+import core
+
+ROOT = Path(__file__).resolve().parents[1]
+BLOCK = re.compile(r"^( *)```(python|sh)\n(.*?)^ *```", re.DOTALL | re.MULTILINE)
+PAGES = {
+    path.relative_to(ROOT).as_posix(): found
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+    if (found := [(kind, code) for _, kind, code in BLOCK.findall(path.read_text(encoding="utf-8"))])
+}
+# Other commands: make and benchmarks are looked up by test_docs.py, examples/ is run by test_demo.py.
+ELSEWHERE = ("make ", "sudo apt install ", "git clone ", "python -m benchmarks.", "python examples/")
+ELSEWHERE += (
+    "python -m cluster ",
+    "blender --background scene.blend --python examples/",
+)
+RADIUS, TOP = 20.0, np.array([0.0, 0.0, 20.0])  # of the ball that contacts are of
+
+
+def curves():
+    """Three arrays of contacts on the ball, through its top; and the normals there."""
+    s = np.linspace(-0.4, 0.4, 21)[:, None]
+    for azimuth in np.radians([0.0, 60.0, 120.0]):
+        way = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        normals = np.sin(s) * way + np.cos(s) * [0.0, 0.0, 1.0]
+        yield RADIUS * normals, normals
+
+
+def rows():
+    """Contacts (n, 3) all around the top."""
+    x, y = (v.ravel() for v in np.meshgrid(np.linspace(-9.0, 9.0, 25), np.linspace(-9.0, 9.0, 12)))
+    return np.column_stack([x, y, np.sqrt(RADIUS**2 - x**2 - y**2)])
+
+
+def write(path, numbered):
+    lines = [f"{number},{x},{y},{z}" for number, points in numbered for x, y, z in points.tolist()]
+    path.write_text("\n".join(["curve,x [mm],y [mm],z [mm]", *lines]) + "\n")
+
+
+def suzanne(bpy):
+    """A scene with her, active, and a copy named Scan; returns a place on her forehead, the cursor."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.mesh.primitive_monkey_add(size=2.0)
+    obj, place = bpy.context.object, (0.32, -0.19, 0.84)
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    bpy.context.scene.cursor.location = place
+    scan = obj.copy()
+    scan.name = "Scan"
+    bpy.context.scene.collection.objects.link(scan)
+    return place
+
+
+def save(bpy, path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+
+
+@pytest.fixture
+def folder(empty, scans, tmp_path, monkeypatch):
+    """The files that samples read, in the current folder, and the scene that is open."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(scans / "pear.ply", tmp_path)
+    measured = [points for points, _ in curves()]
+    for name in ("contacts.csv", "scan.csv"):
+        write(tmp_path / name, enumerate(measured, 1))
+    for name, points in zip("abc", measured, strict=True):
+        write(tmp_path / f"{name}.csv", [(name, points)])
+    write(tmp_path / "strokes.csv", [("stroke", rows())])
+    place = suzanne(empty)
+    empty.ops.tactile.pick(target="Suzanne", location=place)
+    save(empty, tmp_path / "probes.blend")
+    suzanne(empty)
+    for name in ("scene", "scan"):
+        save(empty, tmp_path / f"{name}.blend")
+    return tmp_path
+
+
+def names(page):
+    """What Python samples leave to the reader."""
+    pairs = list(curves())
+    measured = pairs if page.endswith("contact_data.md") else [points for points, _ in pairs]
+    contours = [core.Contour(points) for points, _ in pairs]
+    return {
+        "measured": measured,
+        "contours": contours,
+        "point": TOP,
+        "place": TOP,
+        "rows": rows(),
+        "matrix": np.diag([2.0, 2.0, 2.0, 1.0]),
+    }
+
+
+def commands(code):
+    """The lines of a shell, its loops unrolled."""
+    lines = iter(line.strip() for line in code.splitlines() if line.strip())
+    for line in lines:
+        loop = re.fullmatch(r"for (\w+) in (.*); do", line)
+        if not loop:
+            yield line
+            continue
+        body = []
+        while (line := next(lines)) != "done":
+            body.append(line)
+        for value in loop[2].split():
+            yield from (each.replace(f"${loop[1]}", value) for each in body)
+
+
+def run_shell(bpy, command, line):
+    if line.startswith(ELSEWHERE):
+        return
+    words = shlex.split(line)
+    at = words.index("-c")
+    assert words[0] == "blender" and words[at + 1] == "tactile", line
+    bpy.ops.wm.read_homefile(use_empty=True)  # each line is a Blender of its own
+    if words[1] == "-b":
+        bpy.ops.wm.open_mainfile(filepath=str(Path(words[2]).resolve()))
+    code, out, err = command(*words[at + 2 :])
+    assert code == 0, f"{line}\n{out}\n{err}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_samples_run(page, empty, command, folder):
+    scope = names(page)
+    for kind, code in PAGES[page]:
+        if kind == "python":
+            exec(compile(code, f"{page}, a sample", "exec"), scope)
+        else:
+            for line in commands(code):
+                run_shell(empty, command, line)
+
+
+def test_the_sample_of_the_format_is_read(extension, tmp_path):
+    text = (ROOT / "docs" / "contact_data.md").read_text(encoding="utf-8")
+    (sample,) = re.findall(r"^```\n(# Tactile Patch contacts.*?)^```", text, re.DOTALL | re.MULTILINE)
+    (tmp_path / "sample.csv").write_text(sample)
+    found = extension.tactile_addon.files.measured.read([str(tmp_path / "sample.csv")], "FILE", 1.0)
+    assert found.unit == "mm"
+    assert [len(curve.points) for curve in found.contours] == [2, 1]

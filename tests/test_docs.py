@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Links between the pages lead somewhere, what commands name is there, and the site can be searched."""
+
+import re
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import core
+from tools import check_site
+
+ROOT = Path(__file__).parent.parent
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+SITE = ROOT / "build" / "site" / "html"
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+FENCE = re.compile(r"^ *```.*?^ *```", re.DOTALL | re.MULTILINE)
+MOST_BYTES, MOST_LINES = 300_000, 75
+
+
+def slug(heading):
+    """The anchor of a heading, as repositories' pages and the site have it."""
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)|[`*]", r"\1", heading.lower())
+    return re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", plain.strip()))
+
+
+def anchors(path):
+    text = FENCE.sub("", path.read_text(encoding="utf-8"))
+    return {slug(heading) for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for link in LINK.findall(FENCE.sub("", page.read_text(encoding="utf-8"))):
+        if re.match(r"https?://", link):
+            continue
+        # These two are pages of the site alone, which are made of those beside README.md.
+        name, _, anchor = link.partition("#")
+        target = page.parent / name if name else page
+        if page.parent.name == "docs" and name in ("contributing.md", "changelog.md"):
+            target = ROOT / name.upper().replace(".MD", ".md")
+        assert target.exists(), link
+        if anchor:
+            assert anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_name_what_is_there(page):
+    text = page.read_text(encoding="utf-8")
+    targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    for target in re.findall(r"(?:^|`)make ([a-z-]+)", text, re.MULTILINE):
+        assert target in targets
+    for module in re.findall(r"python -m ((?:benchmarks|tools)\.\w+)", text):
+        assert (ROOT / f"{module.replace('.', '/')}.py").is_file(), module
+    for script in re.findall(r"`((?:benchmarks|examples|tools|tests)/[\w/]+\.\w+)", text):
+        assert (ROOT / script).is_file(), script
+
+
+def test_the_readme_is_short_and_its_picture_small():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= MOST_LINES
+    assert (ROOT / "docs" / "film.webp").stat().st_size < MOST_BYTES
+
+
+def test_the_figures_of_the_readme_are_those_of_the_docs():
+    readme, speed, stability = (
+        " ".join((ROOT / name).read_text(encoding="utf-8").split())
+        for name in ("README.md", "docs/speed_and_accuracy.md", "docs/stability.md")
+    )
+    process, cubic = re.search(
+        r"is (\S+) of a Gaussian process's and (\S+) of a cubic spline's", readme
+    ).groups()
+    assert f"the mean error is {process} of the Gaussian process's, {cubic} of the cubic spline's" in speed
+    low, high = re.search(r"the 90 % intervals hold (\d+) to (\d+) % of the surface", readme).groups()
+    assert f"Its intervals hold {low} to {high} % here" in speed
+    rows = re.findall(r"\| \w+, 1/(?:8|32) \| (\d+) \| \d+ \| \d+ \| (\d+) \|", stability)
+    assert f"{sum(int(patches) for patches, _ in rows)} patches on scans" in readme
+    assert {silent for _, silent in rows} == {"0"}
+    (update,) = re.findall(r"\| 1000000 \| 454 \|(?: \S+ \|){4} (\S+) \|", speed)
+    assert f"in {float(update):.0f} ms" in readme
+
+
+def test_the_reference_has_all_that_core_offers():
+    page = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    offered = {name for name in core.__all__ if callable(getattr(core, name))}
+    assert set(re.findall(r"^::: core\.(\w+)$", page, re.MULTILINE)) == offered
+
+
+def test_the_citation_has_the_version():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert f"\nversion: {manifest['version']}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_the_checker_of_the_site_finds_what_is_broken(tmp_path):
+    (tmp_path / "a.html").write_text(
+        '<h1 id="top"></h1><a href="b.html#here">b</a><a href="#top">t</a><a href="https://elsewhere.org">e</a>'
+    )
+    (tmp_path / "b.html").write_text('<p id="here"></p><a href="a.html">a</a>')
+    assert list(check_site.problems(tmp_path)) == []
+    (tmp_path / "b.html").write_text(
+        '<a href="c.html">c</a><script src="https://elsewhere.org/x.js"></script>'
+    )
+    (tmp_path / "s.css").write_text("body { background: url(//elsewhere.org/x.png) }")
+    found = "\n".join(check_site.problems(tmp_path))
+    for words in (
+        "b.html#here names no place",
+        "c.html leads nowhere",
+        "x.js is loaded from another host",
+        "x.png is",
+    ):
+        assert words in found
+
+
+def test_the_site_is_searched_without_a_server():
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None or not SITE.is_dir():
+        pytest.skip("needs build/site/html, by make site, and a Chromium")
+    command = [
+        browser,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--virtual-time-budget=8000",
+        "--dump-dom",
+    ]
+    page = subprocess.run(
+        [*command, f"{SITE.as_uri()}/index.html?q=umbilic"], capture_output=True, text=True, timeout=120
+    )
+    assert re.search(r'md-search-result__meta">\d+ matching document', page.stdout)
+    assert "<mark>umbilic" in page.stdout
+
+
+def test_the_lesson_shows_what_core_finds():
+    lesson = pytest.importorskip("tools.lesson", reason="needs matplotlib: make chart installs it")
+    for curvatures in lesson.SHAPES.values():
+        assert lesson.felt(*curvatures) == pytest.approx(curvatures, abs=0.03)

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A release is one only where version, changelog, citation and tag agree; its zips have what fits them."""
+
+import hashlib
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tools import build, check_site, release
+
+ROOT = Path(__file__).resolve().parents[1]
+CHANGES = "# Changelog\n\n## [1.2.0] - {}\n\n### Added\n\n- More.\n\n## [1.1.0] - 2026-01-02\n\n- Less.\n"
+
+
+def git(folder, *arguments):
+    names = ["-c", "user.name=A", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false"]
+    subprocess.run(["git", *names, *arguments], cwd=folder, check=True, capture_output=True)
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A commit that is tagged 1.2.0, and all agrees."""
+    (tmp_path / "blender_manifest.toml").write_text('version = "1.2.0"\n')
+    (tmp_path / "CITATION.cff").write_text("title: T\nversion: 1.2.0\n")
+    (tmp_path / "CHANGELOG.md").write_text(CHANGES.format("2026-11-22"))
+    git(tmp_path, "init")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "--message", "All")
+    git(tmp_path, "tag", "v1.2.0")
+    return tmp_path
+
+
+def test_what_agrees_can_be_released(checkout):
+    assert list(release.disagreements(checkout)) == []
+    assert release.section(checkout, "1.2.0") == ("2026-11-22", "### Added\n\n- More.\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("CHANGELOG.md", CHANGES.format("unreleased"), "has [1.2.0] - unreleased: give it the date"),
+        ("CHANGELOG.md", "## [1.1.0] - 2026-01-02\n", "does not begin with a section [1.2.0]"),
+        ("CHANGELOG.md", "## [1.2.0] - 2026-01-02\n\n", "says nothing in its section [1.2.0]"),
+        ("CITATION.cff", "version: 1.1.0\n", "has another version than the manifest's 1.2.0"),
+        ("blender_manifest.toml", 'version = "1.2"\n', "wanted three numbers"),
+        ("blender_manifest.toml", 'version = "1.3.0"\n', "no tag v1.3.0: git tag v1.3.0"),
+    ],
+)
+def test_what_does_not_agree_is_said(checkout, name, text, words):
+    (checkout / name).write_text(text)
+    reasons = list(release.disagreements(checkout))
+    assert any(words in reason for reason in reasons), reasons
+    assert "there are changes that are not committed: commit them" in reasons
+
+
+def test_a_commit_after_the_tag_is_no_release(checkout):
+    git(checkout, "commit", "--allow-empty", "--message", "More")
+    assert list(release.disagreements(checkout)) == ["this commit has no tag v1.2.0: git tag v1.2.0"]
+
+
+def test_the_changelog_of_this_checkout_begins_with_the_version_of_the_manifest():
+    date, text = release.section(ROOT, release.manifest_version(ROOT))
+    assert date is not None
+    assert text
+
+
+def test_checksums_are_those_of_the_zips(tmp_path):
+    (tmp_path / "repository").mkdir()
+    (tmp_path / "a.zip").write_bytes(b"a")
+    (tmp_path / "repository" / "b.zip").write_bytes(b"b")
+    release.write_checksums(tmp_path)
+    lines = (tmp_path / "SHA256SUMS").read_text().splitlines()
+    wanted = [("a.zip", b"a"), ("repository/b.zip", b"b")]
+    assert lines == [f"{hashlib.sha256(data).hexdigest()}  {name}" for name, data in wanted]
+
+
+def test_the_manual_that_ships_leads_nowhere_else(tmp_path):
+    build.write_manual(tmp_path / "manual")
+    assert list(check_site.problems(tmp_path / "manual")) == []
+    text = (tmp_path / "manual" / "viewport.html").read_text(encoding="utf-8")
+    assert 'href="messages.html"' in text
+    assert ".md" not in text
+
+
+def test_a_zip_of_a_series_has_its_wheels_and_its_blenders_and_no_other(tmp_path, monkeypatch):
+    manifest = tomllib.loads(build.MANIFEST.read_text(encoding="utf-8"))
+    monkeypatch.setattr(build.shutil, "copy2", lambda source, target: None)  # wheels of 40 MB each
+    ranges = []
+    for python, series in build.SERIES.items():
+        wheels = [wheel for wheel in manifest["wheels"] if f"-cp{python}-" in wheel]
+        build.stage(tmp_path / python, ["linux-x64"], wheels, series)
+        staged = tomllib.loads((tmp_path / python / build.MANIFEST.name).read_text(encoding="utf-8"))
+        ranges.append((staged["blender_version_min"], staged.get("blender_version_max")))
+        assert staged["wheels"] == wheels
+        assert staged["version"] == manifest["version"]
+    # Each Blender from the manifest's own least on is in one of them.
+    assert ranges[0][0] == manifest["blender_version_min"]
+    assert [least for least, _ in ranges[1:]] == [most for _, most in ranges[:-1]]
+    assert ranges[-1][1] is None
+    assert sum(len([w for w in manifest["wheels"] if f"-cp{p}-" in w]) for p in build.SERIES) == len(
+        manifest["wheels"]
+    )

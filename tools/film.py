@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The moving picture of the README: a finger slides along three curves, a patch appears, its planes turn.
+
+`make film` draws it with Blender as a Python module, in some minutes, and writes docs/film.webp.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from tools import blender, demo
+
+OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "film.webp"
+WIDTH, HEIGHT, SAMPLES, QUALITY = 560, 420, 16, 88
+LARGEST = 300_000  # bytes, so that a README opens at once
+STROKES, TURNS = 7, 15  # pictures a curve, and pictures of the turn
+SHORT, LONG = 90, 1500  # milliseconds
+CAPTIONS = (
+    "A finger slides along three curves",
+    "From them alone: the patch, by Gaussian curvature",
+    "Turn the planes, and the patch follows",
+)
+CURVE, FINGER = (0.02, 0.02, 0.02, 1.0), (0.9, 0.35, 0.02, 1.0)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--zip", required=True, type=Path, help="the built extension")
+    parser.add_argument("--frames", type=Path, help="a folder for the single pictures, to look at")
+    options = parser.parse_args()
+    try:
+        from PIL import Image
+    except ImportError:
+        sys.exit("film: Pillow writes the moving picture: make film installs it")
+    folder = options.frames or blender.BUILD / "film"
+    folder.mkdir(parents=True, exist_ok=True)
+    extension = blender.start(options.zip)
+    with blender.quiet():
+        shots = list(Film(extension, folder).shots())
+    pictures = [Image.open(path).convert("RGB") for path, _ in shots]
+    times = [milliseconds for _, milliseconds in shots]
+    pictures[0].save(
+        OUTPUT,
+        save_all=True,
+        append_images=pictures[1:],
+        duration=times,
+        loop=0,
+        quality=QUALITY,
+        method=6,
+        minimize_size=True,
+    )
+    size = OUTPUT.stat().st_size
+    print(f"saved {OUTPUT}: {len(pictures)} pictures, {size} bytes, {sum(times) / 1e3:.1f} s")
+    if size > LARGEST:
+        sys.exit(f"film: wanted at most {LARGEST} bytes: lower QUALITY or the number of pictures")
+
+
+class Film:
+    """The scene of the demo, and what moves in it."""
+
+    def __init__(self, extension, folder):
+        import bpy
+
+        self.extension, self.folder, self.count = extension, folder, 0
+        self.patch = demo.touch(extension)
+        self.report = self.patch["tactile"].to_dict()
+        put = demo.stage(extension, self.report)
+        self.limit = self.report["color_limit"]
+        demo.color_bar(extension, put, self.limit, "m")
+        self.caption = put.text("", -3.3, -2.45, 0.24)
+        scene = bpy.context.scene
+        self.toward = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
+        scene.render.use_persistent_data = True
+        self.hide_results()
+
+    def shots(self):
+        """(path, milliseconds) of every picture."""
+        curves = [self.curve(contour) for contour in self.contours()]
+        finger = self.finger()
+        yield from self.slides(curves, finger)
+        self.caption.data.body = CAPTIONS[1]
+        self.show(self.patch)
+        for turn in range(TURNS):
+            yield self.shot(LONG if turn == 0 else SHORT)
+            self.caption.data.body = CAPTIONS[2]
+            self.touch_again(np.radians(60.0) * (turn + 1) / TURNS)
+            for curve in curves:
+                self.remove(curve)
+            curves = [self.curve(contour) for contour in self.contours()]
+            self.show(self.patch)
+        yield self.shot(LONG)
+
+    def slides(self, curves, finger):
+        """One curve after the other, with the finger at its end."""
+        self.caption.data.body = CAPTIONS[0]
+        for curve in curves:
+            curve.hide_render = True
+        for curve, contour in zip(curves, self.contours(), strict=True):
+            curve.hide_render = False
+            for share in np.linspace(0.0, 1.0, STROKES):
+                curve.data.bevel_factor_end = max(share, 1e-3)
+                at = share * (len(contour) - 1)
+                low = min(int(at), len(contour) - 2)
+                place = contour[low] + (at - low) * (contour[low + 1] - contour[low])
+                finger.location = place + 1.5 * np.array(self.toward)
+                yield self.shot(SHORT)
+        self.remove(finger)
+
+    def contours(self):
+        """Points (n, 3) of each contour."""
+        return [c.points for c in self.extension.reconstruction_of(self.patch).contours]
+
+    def curve(self, points):
+        """A tube along points (n, 3), in front of the mesh."""
+        import bpy
+
+        data = bpy.data.curves.new("Curve", "CURVE")
+        data.dimensions, data.bevel_depth = "3D", 0.02 * self.report["radius"]
+        spline = data.splines.new("POLY")
+        spline.points.add(len(points) - 1)
+        rows = np.column_stack([points + 1.5 * np.array(self.toward), np.ones(len(points))])
+        spline.points.foreach_set("co", rows.ravel())
+        return self.link("Curve", data, CURVE)
+
+    def finger(self):
+        """A ball."""
+        import bpy
+
+        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.09 * self.report["radius"])
+        ball = bpy.context.object
+        material = self.extension.tactile_addon.scene.mesh_data.emission("Finger", color=FINGER)
+        ball.data.materials.append(material)
+        ball.visible_shadow = False  # it floats, like all that is drawn in front of the mesh
+        return ball
+
+    def link(self, name, data, color):
+        import bpy
+
+        data.materials.append(self.extension.tactile_addon.scene.mesh_data.emission(name, color=color))
+        obj = bpy.data.objects.new(name, data)
+        obj.visible_shadow = False
+        bpy.context.scene.collection.objects.link(obj)
+        return obj
+
+    def touch_again(self, angle):
+        """The patch with all planes turned by so much, in place of the one before."""
+        import bpy
+
+        report = self.report
+        azimuths = [np.radians(azimuth) + angle for azimuth, _ in report["planes"]]
+        old = (self.patch, *self.patch.children)
+        bpy.ops.tactile.reconstruct(
+            target=report["source"],
+            location=demo.SPOT,
+            extent=report["extent"],
+            step=report["step"],
+            noise=report["noise"],
+            azimuths=[*azimuths, 0.0, 0.0, 0.0],
+        )
+        self.patch = bpy.context.view_layer.objects.active
+        for obj in old:
+            self.remove(obj)
+        self.extension.tactile_addon.scene.color_range.set_range(self.patch, self.limit)
+        self.hide_results()
+
+    def hide_results(self):
+        for obj in (self.patch, *self.patch.children):
+            obj.hide_render = True
+
+    def show(self, patch):
+        patch.hide_render, patch.visible_shadow, patch.delta_location = False, False, self.toward
+
+    @staticmethod
+    def remove(obj):
+        import bpy
+
+        bpy.data.objects.remove(obj, do_unlink=True)
+
+    def shot(self, milliseconds):
+        import bpy
+
+        path = self.folder / f"{self.count:03}.png"
+        self.count += 1
+        bpy.context.view_layer.update()
+        demo.photograph(bpy.context.scene, path, WIDTH, HEIGHT, SAMPLES)
+        return path, milliseconds
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Docstrings of core as Markdown: arguments as a list, examples as code. mkdocs.yml names this for Griffe."""
+
+import re
+from textwrap import dedent
+
+import griffe
+
+ARGUMENT = re.compile(r"^(\w+(?:, \w+)*) : ")
+AGAIN = re.compile(r"; (\w+) : ")  # more than one in a line
+
+
+class HouseStyle(griffe.Extension):
+    """`name : what it is`, with what belongs to it indented, and `>>>` examples."""
+
+    def on_instance(self, *, obj, **_):
+        """Rewrites the docstring of whatever was found."""
+        if obj.docstring is not None:
+            obj.docstring.value = markdown_of(obj.docstring.value)
+
+
+def markdown_of(text):
+    """A docstring in the style of this house as Markdown."""
+    lines = []
+    for block in re.split(r"\n\s*\n", dedent(text)):
+        lines += [*_block(block.splitlines()), ""]
+    return "\n".join(lines)
+
+
+def _block(lines):
+    if lines and lines[0].startswith(">>>"):
+        return ["```pycon", *lines, "```"]
+    if lines and lines[0].startswith("    "):  # a formula
+        return ["```text", *map(dedent, lines), "```"]
+    if not any(map(ARGUMENT.match, lines)):
+        return lines
+    shown = []
+    for line in lines:
+        parts = AGAIN.sub(r"\n\1 : ", line).split("\n") if ARGUMENT.match(line) else [line]
+        for part in parts:
+            found = ARGUMENT.match(part)
+            shown.append(f"- **{found[1]}**: {part[found.end() :]}" if found else f"  {part.strip()}")
+    return shown
