@@ -26,13 +26,13 @@ from collections import defaultdict
 from contextlib import contextmanager
 from functools import partial
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import NamedTuple
 
 import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
-from core.bayes import residual_evidence
+from core.bayes import residual_evidence, rough_fit
 from core.patch import residual
 from core.patch.monge import exponents, monomials
 from tools import blender
@@ -43,6 +43,7 @@ from .peers import Fit, quadric_process, radial_basis
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
 HOLD_OUT, LEAST = 90, 20  # points of the mesh above a domain
 LAYERS = 4
+NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 4, 0.3, 0.2  # toward a surface: a step in radii, and of its height
 WIDE, OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 0.02, 3.0, 5.0, 10.0, 0.05
 DENSE = 150  # points for the true frame
 
@@ -109,7 +110,7 @@ class Touch(NamedTuple):
     """A case of benchmarks.accuracy, as far as the peers need it."""
 
     point: np.ndarray
-    axes: np.ndarray  # whose last column is outward
+    axes: np.ndarray  # the paper's frame
     contours: list
     hold_out: np.ndarray  # (m, 3), relative to the point
 
@@ -123,7 +124,9 @@ class Score(NamedTuple):
 @contextmanager
 def constants(**values):
     """The residual's, for a while."""
-    modules = [m for m in (residual, residual_evidence) if any(hasattr(m, name) for name in values)]
+    modules = [
+        m for m in (residual, residual_evidence, rough_fit) if any(hasattr(m, name) for name in values)
+    ]
     before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
     try:
         for module, old in zip(modules, before, strict=True):
@@ -170,18 +173,33 @@ def touches(scan, count):
                     continue
                 hold_out = scan.above(r, r.domain.grid(HOLD_OUT)[0]) - point
                 if len(hold_out) >= LEAST:
-                    axes = np.column_stack([np.zeros((3, 2)), normal])
-                    yield (planes, extent), Touch(point, axes, contours, hold_out), r.radius
+                    yield (planes, extent), Touch(point, r.frame.axes, contours, hold_out), r.radius
 
 
 def score(fit, touch, radius):
-    x, y, z = (touch.hold_out @ fit.axes).T
-    miss = np.abs(fit.height(x, y) - z) / radius
+    at, off, change = met(fit, touch, radius)
+    miss = np.abs(off) / radius
     if fit.height_std is None:
         return Score(1e3 * miss.mean())
-    half = 1.645 * fit.height_std(x, y) / radius
+    half = 1.645 * fit.height_std(*at[:, :2].T) / change / radius
     beyond = np.maximum(miss - half, 0.0)
     return Score(1e3 * miss.mean(), np.mean(miss <= half), 1e3 * np.mean(2.0 * half + 20.0 * beyond))
+
+
+def met(fit, touch, radius):
+    """Where the surface meets the paper's normals through held-out points, (m, 3) in the frame of the fit.
+
+    And how far along them that is, and how much nearer to it in height a unit along them leads.
+    """
+    at, normal = touch.hold_out @ fit.axes, fit.axes.T @ touch.axes[:, 2]
+    off, change, small = np.zeros(len(at)), np.ones(len(at)), 1e-4 * radius
+    for _ in range(NEWTON_STEPS if normal[2] < 1.0 - 1e-12 else 1):
+        above = fit.height(*at[:, :2].T) - at[:, 2]
+        ahead = at + small * normal
+        change = np.maximum((above - fit.height(*ahead[:, :2].T) + ahead[:, 2]) / small, LEAST_CHANGE)
+        step = np.clip(above / change, -FARTHEST * radius, FARTHEST * radius)
+        at, off = at + step[:, None] * normal, off + step
+    return at, off, change
 
 
 def fixed_scores(scan, count, methods):
@@ -250,13 +268,13 @@ def automatic_row(scan, count):
     planes = [SamplingPlane(math.pi * i / 3) for i in range(3)]
     sure, doubtful, refused, seconds = [], [], 0, []
     for point, normal in scan.places(count, 1):
-        start = perf_counter()
+        start = process_time()
         try:
             r = explore(scan, point, normal, planes, farthest=0.5, degree="auto").result
         except ValueError:
             refused += 1
             continue
-        seconds.append(perf_counter() - start)
+        seconds.append(process_time() - start)
         (sure if r.status == "ok" else doubtful).append((r, _off(scan, r)))
     is_right = [
         off > OFF * r.radius or off > TOO_FAR * r.mean_height_std or _turned(scan, r) for r, off in doubtful
@@ -280,7 +298,12 @@ def _off(scan, r):
 
 
 def _turned(scan, r):
-    """Whether the frame is off by TURNED degrees, where curvatures are not ALIKE; by a dense quartic fit."""
+    """Whether the frame is off by TURNED degrees, where curvatures are not ALIKE; by a dense quartic fit.
+
+    Not where the message says that there are no principal directions.
+    """
+    if r.posterior.is_round:
+        return False
     azimuths, reach = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(DENSE), 0.6 * r.radius
     shares = np.sqrt((np.arange(DENSE) + 0.5) / DENSE)
     flat = reach * np.column_stack([shares * np.cos(azimuths), shares * np.sin(azimuths)])
@@ -298,7 +321,8 @@ def automatic_table(rows):
         "(c) Automatic touches. Right is a doubt where the heights are off by over 2 % of the radius or three"
     )
     print(
-        "deviations, or the frame by 10 degrees where curvatures differ. Areas in permille of size squared.\n"
+        "deviations, or the frame by 10 degrees where curvatures differ. Areas in permille of size squared, "
+        "ms of the processor.\n"
     )
     head = "scan|sure|in doubt|refused|doubts right|sure, off > 2 %|> 5 deviations|turned|all areas|radius|ms"
     total = [sum(row[i] for row in rows.values()) for i in range(8)]

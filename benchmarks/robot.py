@@ -118,7 +118,7 @@ def some(contacts, most):
 
 def averaged(contacts):
     """What the strokes are thinned to."""
-    return means(contacts)[0]
+    return means(contacts, np.array([1.0, 0.0]))[0]
 
 
 KERNELS = {

@@ -7,7 +7,8 @@ led from harmless to hopeless on exact surfaces, with every method. Prints Markd
 build/charts/stability.png, the sheet of all sweeps, and stability.csv. A warning or a refusal is due wherever
 
 - the mean |dz| over the domain is more than three times the patch's own mean height_std, or
-- the frame is turned by more than 10 degrees, where |kappa1 - kappa2| L > 0.05;
+- the frame is turned by more than 10 degrees, where |kappa1 - kappa2| L > 0.05, and the message does not
+  say that there are no principal directions;
 
 of the cases where all is harmless and none is due, 5 % at most are to be warned of; and the uncertainty
 stated is not to be blown up: the median of mean height_std over mean |dz| is to be 2 at most. In mm.
@@ -69,7 +70,7 @@ class Outcome(NamedTuple):
     status: str
     error: float = np.nan  # mean |dz|, of the radius
     std: float = np.nan  # mean height_std, of the radius
-    turn: float = np.nan  # degrees; 0 where the point is an umbilic
+    turn: float = np.nan  # degrees; 0 where the point is an umbilic, or said to be one
     condition: float = np.nan
 
     @property
@@ -142,7 +143,7 @@ def outcome(surface, setting, point, outward, contours, method):
     rotation = true_axes.T @ r.frame.axes
     half = max(np.trace(rotation), np.trace(rotation * [-1, -1, 1]))
     turn = np.degrees(np.arccos(np.clip((half - 1.0) / 2.0, -1.0, 1.0)))
-    if (kappas[1] - kappas[0]) * r.radius / setting.scale <= UMBILIC:
+    if (kappas[1] - kappas[0]) * r.radius / setting.scale <= UMBILIC or r.posterior.is_round:
         turn = 0.0
     return Outcome(r.status, error, r.mean_height_std / r.radius, turn, r.condition_number)
 

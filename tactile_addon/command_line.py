@@ -10,7 +10,18 @@ from .command_run import Misuse, run, write
 from .files import contact_file
 from .touch.settings import METHODS, SOLVERS
 
-NOT_OF_ALL = ("file", "contacts", "json", "onto", "verify", "normal_std", "degree", "azimuths", "tilts")
+NOT_OF_ALL = (
+    "file",
+    "contacts",
+    "json",
+    "report",
+    "onto",
+    "verify",
+    "normal_std",
+    "degree",
+    "azimuths",
+    "tilts",
+)
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
 

@@ -74,6 +74,17 @@ def block(a=1.0, b=0.7, c=0.5):
     return Solid(distance, (0.05, 0.03, c), (0.0, 0.0, 1.0))
 
 
+def egg(across=0.6, along=1.0):
+    """An ellipsoid around z; its distance is of first order, and a tenth less."""
+
+    def distance(x, y, z):
+        r = math.hypot(x / across, y / across, z / along)
+        steep = math.hypot(x / across**2, y / across**2, z / along**2)
+        return min(across, along) * (r - 1.0) if steep < 1e-9 or r < 0.5 else 0.9 * r * (r - 1.0) / steep
+
+    return Solid(distance, (0.0, 0.0, along), (0.0, 0.0, 1.0))
+
+
 @dataclass(frozen=True)
 class Topology:
     """Of triangles: edges with one triangle, edges with more than two, Euler's number, and the pieces."""

@@ -106,3 +106,9 @@ def test_the_site_is_searched_without_a_server():
     )
     assert re.search(r'md-search-result__meta">\d+ matching document', page.stdout)
     assert "<mark>umbilic" in page.stdout
+
+
+def test_the_lesson_shows_what_core_finds():
+    lesson = pytest.importorskip("tools.lesson", reason="needs matplotlib: make chart installs it")
+    for curvatures in lesson.SHAPES.values():
+        assert lesson.felt(*curvatures) == pytest.approx(curvatures, abs=0.03)

@@ -47,7 +47,7 @@ TESTS = {  # of each module of core, those that fail soonest first
     "paper/tagc": "fitting",
     "patch/differential_geometry": "monge geometry",
     "patch/domain": "domain reconstruction strokes",
-    "patch/geometry": "geometry verification residual fitting",
+    "patch/geometry": "geometry verification residual",
     "patch/monge": "monge geometry fitting",
     "patch/residual": "residual",
     "patch/triangulation": "triangulation",

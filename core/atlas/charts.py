@@ -6,6 +6,8 @@ A patch with a residual costs a kernel with each of its contacts at every place.
 cubic B-spline, which is C2 and off the patch by less than the residual's own grain.
 """
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cache, cached_property
 from typing import Any, NamedTuple
@@ -14,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..contours.contour import Vector
 
 SIDE = 33  # knots of a table along each axis
 MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
 AZIMUTHS = 96  # samples of a domain's radius
 REACH = 0.5  # of the radius, that a place may be off its patch
+DISK = 36  # places of a disk around a place
 CHUNK = 200_000  # pairs at once
 
 
@@ -62,44 +66,30 @@ class Charts:
     rims: Array
 
     @cached_property
-    def tree(self) -> Any:
-        """Of the origins."""
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self.origins)
-
-    @cached_property
     def reaches(self) -> Array:
         """How far from its origin a patch is asked, (n,)."""
         flat: Array = MARGIN * self.rims.max(axis=1)
         return self.radii * np.hypot(flat, np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5) + REACH)
 
-    def pairs(self, points: Array, nodes: NDArray[np.intp] | None = None) -> Pairs:
-        """What patches say of places (k, 3); with `nodes` (k,), only that one of each."""
-        found = [self._pairs_at(points, *some) for some in self._near(points, nodes)]
+    def pairs(self, points: Array, room: float = 0.0) -> Pairs:
+        """What patches say of places (k, 3) within REACH of them, and within `room`, a length."""
+        found = [self._pairs_at(points, room, *some) for some in self._near(points, room)]
         return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
-    def _near(self, points: Array, nodes: NDArray[np.intp] | None) -> Any:
+    def _near(self, points: Array, room: float) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of places and patches that may be within reach, sorted by place, CHUNK at once or so."""
-        if nodes is not None:
-            yield np.arange(len(points)), nodes
-            return
-        rows = max(1, CHUNK // 16)
-        for start in range(0, max(len(points), 1), rows):
-            lists = self._tree_of(points[start : start + rows])
-            counts = [len(some) for some in lists]
-            node = np.repeat(np.arange(len(lists)), counts)
-            place = np.fromiter((i for some in lists for i in some), dtype=np.intp, count=sum(counts))
-            order = np.argsort(place, kind="stable")
-            yield start + place[order], node[order]
-
-    def _tree_of(self, points: Array) -> list[list[int]]:
         from scipy.spatial import cKDTree
 
-        if not len(points):
-            return [[]]
-        found: list[list[int]] = cKDTree(points).query_ball_point(self.origins, self.reaches).tolist()
-        return found
+        rows = max(1, CHUNK // 16)
+        for start in range(0, max(len(points), 1), rows):
+            some = points[start : start + rows]
+            reaches = self.reaches + room
+            lists = cKDTree(some).query_ball_point(self.origins, reaches).tolist() if len(some) else [[]]
+            counts = [len(near) for near in lists]
+            node = np.repeat(np.arange(len(lists)), counts)
+            place = np.fromiter((i for near in lists for i in near), dtype=np.intp, count=sum(counts))
+            order = np.argsort(place, kind="stable")
+            yield start + place[order], node[order]
 
     def local(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Array:
         """Places in the frames of patches and in unit radius, (m, 3)."""
@@ -116,16 +106,17 @@ class Charts:
         radius = np.einsum("mk,mk->m", self.rims[node[:, None], steps], weights)
         return np.hypot(x, y) / np.maximum(radius, 1e-6)
 
-    def _pairs_at(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
+    def _pairs_at(self, points: Array, room: float, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
         """Distances to the tangent plane at the foot, which is where the share and the deviation are of."""
         x, y, z = self.local(points, place, node).T
-        inside = (self.shares(x, y, node) < MARGIN + REACH) & (np.abs(z) < 2.0)
-        place, node, x, y, z = (values[inside] for values in (place, node, x, y, z))
+        reach = np.maximum(REACH, room / self.radii[node])
+        inside = (self.shares(x, y, node) < MARGIN + reach) & (np.abs(z) < 1.5 + reach)
+        place, node, x, y, z, reach = (values[inside] for values in (place, node, x, y, z, reach))
         h, hx, hy, _ = self._heights(x, y, node)
         off = (z - h) / (1.0 + hx**2 + hy**2)
         foot_x, foot_y = x + off * hx, y + off * hy
         share = self.shares(foot_x, foot_y, node)
-        inside = (share < MARGIN) & (np.abs(off) < REACH)
+        inside = (share < MARGIN) & (np.abs(off) < reach)
         place, node, x, y, z, foot_x, foot_y, share = (
             values[inside] for values in (place, node, x, y, z, foot_x, foot_y, share)
         )
@@ -210,3 +201,16 @@ def _b_spline_tables() -> tuple[Array, Array]:
         / 6.0
     )
     return values, values[1:] * np.array([[1.0], [2.0], [3.0]])
+
+
+def disk_around(normal: Vector, ahead: Vector) -> Array:
+    """Places (DISK, 3) spread evenly over the unit disk across a normal: a sunflower's."""
+    i = np.arange(DISK) + 0.5
+    turn, out = math.pi * (3.0 - math.sqrt(5.0)) * i, np.sqrt(i / DISK)
+    e1 = np.cross(normal, ahead)
+    if not np.linalg.norm(e1) > 1e-3:
+        e1 = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    e1 /= np.linalg.norm(e1)
+    across = np.array([out * np.cos(turn), out * np.sin(turn)])
+    found: Array = across.T @ np.array([e1, np.cross(normal, e1)])
+    return found

@@ -34,9 +34,9 @@ class Blend(NamedTuple):
     node: NDArray[np.intp]
 
 
-def blended(charts: Charts, points: Array) -> Blend:
-    """The field at places (k, 3)."""
-    return blend_of(charts, charts.pairs(points), len(points))
+def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
+    """The field at places (k, 3); `room` is a length that patches reach at least."""
+    return blend_of(charts, charts.pairs(points, room), len(points))
 
 
 def blend_of(charts: Charts, pairs: Pairs, count: int) -> Blend:
@@ -106,8 +106,8 @@ def _mean(
     """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
 
     def total(values: Array) -> Array:
-        found: Array = np.bincount(place, w * values, count)  # type: ignore[assignment]
-        return found
+        # Of nothing numpy counts integers.
+        return np.bincount(place, w * values, count).astype(np.float64)
 
     some = total(np.ones(len(w)))
     there = some > 0.0

@@ -20,7 +20,7 @@ from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.tracking import Surface
 from ..reconstruction.result import Reconstruction
-from .charts import AZIMUTHS, Charts
+from .charts import AZIMUTHS, DISK, Charts, disk_around
 from .join import charts_of
 
 RIM = 24  # places of a rim
@@ -29,7 +29,6 @@ LAYER = 0.15  # of the radius, that a covered place is off its patch at most
 FACING = 0.34  # cosine of the angle between the normals there, at least
 REACHES = (0.35, 0.12, 0.04)  # of the radius, that the finger goes on; the first that finds what is new
 DISK_REACHES = 3.0  # of these, the radius of the disk around it that tells how much, at most the patch's
-DISK = 36  # places around it that tell how much
 SLIVER = 0.03  # of the disk: less is bridged by what blends patches
 TRIES = 3  # touches that a place of a rim is worth
 APART = 2.2  # radii between touches that are made side by side
@@ -201,7 +200,7 @@ class Frontier:
         above = self.surface.ray_cast(along(point, normal, HAIR * radius), normal, ABOVE * radius)
         height = ABOVE * radius if above is None else 0.5 * math.dist(point, above[0])
         hits = [contact]
-        for offset in _disk(normal, place.ahead) * radius:
+        for offset in disk_around(normal, place.ahead) * radius:
             start = along(along(point, normal, height), vector_of(offset), 1.0)
             hit = self.surface.ray_cast(start, down, height + ABOVE * radius)
             felt = None if hit is None else self.felt(hit)
@@ -224,19 +223,6 @@ def side_of(surface: Surface, point: Array, outward: Array, reach: float) -> flo
 def _is_near(place: Place, touch: Next) -> bool:
     room = APART * max(place.radius, touch.place.radius)
     return math.dist(place.point, touch.point) < room
-
-
-def _disk(normal: Vector, ahead: Vector) -> Array:
-    """Places (DISK, 3) spread evenly over the unit disk across a normal: a sunflower's."""
-    i = np.arange(DISK) + 0.5
-    turn, out = math.pi * (3.0 - math.sqrt(5.0)) * i, np.sqrt(i / DISK)
-    e1 = np.cross(normal, ahead)
-    if not np.linalg.norm(e1) > 1e-3:
-        e1 = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    e1 /= np.linalg.norm(e1)
-    across = np.array([out * np.cos(turn), out * np.sin(turn)])
-    found: Array = across.T @ np.array([e1, np.cross(normal, e1)])
-    return found
 
 
 def rim_of(chart: Charts, r: Reconstruction) -> list[Place]:

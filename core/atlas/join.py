@@ -20,8 +20,11 @@ from .charts import AZIMUTHS, MARGIN, SIDE, Charts
 
 LAYER = 0.15  # of the radius, that a neighbor's contact is off the patch at most
 FACING = 0.34  # cosine of the angle between its normal and the patch's, at least
+SURE, DEVIATIONS = 0.8, 1.2816  # quantile of |dz|, and how many standard deviations that is
+BETWEEN = 2.0  # times that between the contacts, for at them the fit has taken some of it; benchmarks.atlas
 AT_ONCE = 6  # patches in a step
 
+Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
 Joining = Generator[float, None, tuple[list[Reconstruction], Charts]]
 
 
@@ -31,7 +34,7 @@ def joined(
     """The patches fitted again, and their charts; yields the share that is done."""
     strokes = neighbors_contacts(contours, charts)
     found: list[Reconstruction] = []
-    tables = []
+    tables: list[Table] = []
     for start in range(0, len(results), AT_ONCE):
         some = slice(start, start + AT_ONCE)
         fits = reconstruct_many(
@@ -43,9 +46,19 @@ def joined(
         )
         for old, new in zip(results[some], fits, strict=True):
             found.append(new if isinstance(new, Reconstruction) else old)
-            tables.append(table_of(found[-1]))
+            tables.append(table_of(found[-1], unexplained(found[-1], strokes[len(tables)], noise)))
         yield len(found) / len(results)
     return found, stacked(found, tables)
+
+
+def unexplained(r: Reconstruction, strokes: Array, noise: float) -> float:
+    """How far contacts are off a patch beyond their noise: texture that a fit takes for noise.
+
+    Off all contacts, not their means; by the quantile of SURE, which outlying ones do not change.
+    """
+    x, y, z = np.vstack([r.contacts, r.frame.to_local(strokes)]).T
+    off = float(np.quantile(np.abs(r.height(x, y) - z), SURE)) / DEVIATIONS
+    return BETWEEN * float(np.sqrt(max(off**2 - noise**2, 0.0)))
 
 
 def neighbors_contacts(contours: Sequence[list[Contour]], charts: Charts) -> list[Array]:
@@ -72,10 +85,7 @@ def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[
 
 def charts_of(results: Sequence[Reconstruction], deviations: bool = True) -> Charts:
     """Patches as tables; or without their deviations, which cost most."""
-    return stacked(results, [table_of(r, deviations) for r in results])
-
-
-Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
+    return stacked(results, [table_of(r, 0.0 if deviations else None) for r in results])
 
 
 def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Charts:
@@ -92,8 +102,8 @@ def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Chart
     )
 
 
-def table_of(r: Reconstruction, deviations: bool = True) -> Table:
-    """The table of a patch."""
+def table_of(r: Reconstruction, beside: float | None) -> Table:
+    """The table of a patch, with a deviation beside its own; with none at all for None."""
     from scipy.ndimage import spline_filter
 
     rim = _rim(r)
@@ -105,7 +115,9 @@ def table_of(r: Reconstruction, deviations: bool = True) -> Table:
     # A sextic that is asked farther out runs away, and the spline would carry that inward.
     pull = r.radius * np.minimum(1.0, 1.3 / np.maximum(share, 1e-9))
     heights = r.height(pull * x, pull * y).reshape(SIDE, SIDE) / r.radius
-    stds = _stds(r, pull * x, pull * y) if deviations else np.zeros((SIDE, SIDE))
+    stds = np.zeros((SIDE, SIDE))
+    if beside is not None:
+        stds = np.hypot(_stds(r, pull * x, pull * y), beside / r.radius)
     return rim, half, spline_filter(heights, order=3, mode="mirror"), stds
 
 

@@ -22,6 +22,7 @@ Indices = NDArray[np.intp]
 
 CELL = 2.1  # edges of the mesh in a cell of the lattice
 CLIP = 0.25  # of a lattice edge, that a vertex is off its ends at least
+ROOM = 1.2  # cubes, that patches reach at least
 STEEP = 1.8  # slope of the field beyond which it jumps, from wall to wall, and has no surface
 SMOOTHINGS, EVEN = 3, 0.6  # passes, and share of the way to the mean of its neighbors
 AT_ONCE = 8000  # places of the field in a step
@@ -63,7 +64,7 @@ def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
     values, known = np.zeros(len(points)), np.zeros(len(points), dtype=bool)
     for start in range(0, len(points), AT_ONCE):
         some = slice(start, start + AT_ONCE)
-        field = blended(charts, points[some])
+        field = blended(charts, points[some], ROOM * size)
         values[some], known[some] = field.distance, field.node >= 0
         yield 0.5 * start / len(points)
     ends, triangles = _cut(tetrahedra, values, known, size)

@@ -19,7 +19,14 @@ LEAST_DEGREE = 2  # of a patch
 DISK = 0.95  # radius, that a patch of lower degree is fitted over: not all curves end at L
 ALIKE = 0.05  # a difference of curvatures that makes no directions, as in the rule of benchmarks.stability
 CONFIDENCE = 0.95
+ROUND = 12.59  # quantile at CONFIDENCE of chi squared with six degrees of freedom
 INVISIBLE = 0.9  # A direction of which this share of the prior's variance is left is invisible.
+
+
+# What spheres and planes have not: a difference of curvatures, a mixed second derivative, third derivatives.
+_UNLIKE_SPHERE = np.zeros((6, len(TERMS)))
+_UNLIKE_SPHERE[0, [2, 4]] = -1.0, 1.0
+_UNLIKE_SPHERE[range(1, 6), [3, *range(FREE, FREE + 4)]] = 1.0
 
 
 class Posterior(NamedTuple):
@@ -126,6 +133,18 @@ class Posterior(NamedTuple):
         angles[2.0 * np.hypot(difference, mixed) <= ALIKE] = 0.0
         angle = float(np.sort(angles)[int(confidence * len(angles))])
         return math.hypot(angle, x, y, math.sqrt(c[0, 0] + c[1, 1])) if angle > 0.0 else 0.0
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it may be a sphere or a plane, as far as its terms to degree 3 tell with CONFIDENCE.
+
+        Then there are no principal directions. Curvatures known to no better than ALIKE do not tell.
+        """
+        if self.curvature_std() > ALIKE:
+            return False
+        apart = _UNLIKE_SPHERE @ self.mean
+        told = float(apart @ np.linalg.solve(_UNLIKE_SPHERE @ self.covariance @ _UNLIKE_SPHERE.T, apart))
+        return told <= ROUND
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin where it is known least."""

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether contacts ask for a residual, how large it is, and what they say of it.
 
-Where a sextic describes the contacts to their accuracy, or with white noise makes them as likely as a
-residual does, there is none. Otherwise its variances and the noise follow from the marginal likelihood on
-a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
+Where a sextic describes the contacts to their accuracy there is none; nor where it describes most of them,
+and makes all as likely, with outliers, as a residual does. Otherwise its variances and the noise follow from
+the marginal likelihood on a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
 """
 
 import math
@@ -27,20 +27,18 @@ from ..patch.residual import (
 )
 from .evidence import USUAL_WAVINESS, prior_variances
 from .measured_slopes import slope_equations
-from .posterior import FREE, Posterior
+from .posterior import FREE
 
 # Chosen with benchmarks.real.
-ROUGH_MISFIT = 7e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
-FACETS = 1e-3  # Share of the radius: misfits of a smooth surface, whose curvatures a polynomial tells best.
-UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic in the root mean square
+ROUGH_MISFIT = 5e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
 ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
 RESIDUAL_NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
 UPWARD = np.arange(RESIDUAL_NOISES) / (RESIDUAL_NOISES - 1.0)
 MOST_PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
 ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
-NEGLIGIBLE = 80.0  # -2 log likelihood beside the best, at which no other noise is tried
-FREE_VARIANCE = 0.03  # of slopes and second derivatives: where curves end early, of 100 they run away
+NEGLIGIBLE = 160.0  # -2 log likelihood beside the best, at which no other noise is tried
+FREE_VARIANCE = 0.06  # of slopes and second derivatives: where curves end early, of 100 they run away
 TEMPER = 0.15  # of the log likelihood: contacts side by side tell of waves between the curves no more
 
 
@@ -67,15 +65,6 @@ class Observations(NamedTuple):
             most=self.most / scale,
             normals=None if self.normals is None else self.normals @ turn,
         )
-
-
-def asking(contacts: Array, weights: Array, posterior: Posterior, accuracy: Array) -> NDArray[np.intp]:
-    """Which of b touches have contacts (b, n, 3) that their sextics do not describe to an accuracy (b,)."""
-    flat = contacts.reshape(-1, 3)
-    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
-    off = contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0]
-    rms = np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0))
-    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, FACETS))
 
 
 class System(NamedTuple):

@@ -5,32 +5,34 @@
 A real surface has other curvatures at each scale; at the point itself they are those of its texture.
 Those of the patch are of the quartic nearest to sextic and residual over a disk of QUARTIC_SHARE. Off dense
 fits of the scans they are by half as much, or less, as those of the sextic that was fitted to the contacts
-alone, and their intervals are true.
+alone, and their intervals are true. Where contacts are off that sextic by less than MISFIT it is
+otherwise, as on a smooth surface whose mesh has facets: its frame and curvatures stay, for it averages them.
 """
 
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..patch import residual as beside
 from ..patch.monge import TERMS, exponents, monomials
 from ..patch.residual import Residual, kernel, kernels, weighted_kernel, whitened
-from .joint_fit import turned
+from .joint_fit import MISFIT, turned
 from .posterior import DISK, FREE, Posterior, nodes
 from .residual_evidence import (
     ROUGH_MISFIT,
     Observations,
     Sizes,
     System,
-    asking,
     fitted,
     mean_given,
     sizes,
     system_of,
 )
 
+UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic (benchmarks.real)
 QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's (benchmarks.real).
 
 
@@ -51,6 +53,7 @@ def rough_fit(
     weights: Array,
     posterior: Posterior,
     accuracy: Array,
+    told: NDArray[np.bool_],
     tangent: Array,
     normals: Array | None = None,
     through: bool = True,
@@ -61,13 +64,15 @@ def rough_fit(
     weights : (b, n), 0 where there is none
     posterior : the stack of the sextics that were fitted to them
     accuracy : (b,), standard deviation of a contact, at least
+    told : (b,), whether that is known to be all their noise
     tangent : (b, 3), which d1 is to follow
     normals : (b, n, 3), measured, over their standard deviation; they act on the terms alone
     through : whether the origin was touched
     """
     b = len(contacts)
     found = RoughFit(np.eye(3)[None].repeat(b, axis=0), np.ones(b), posterior, [None] * b)
-    candidates = asking(contacts, weights, posterior, accuracy)
+    missed = _misfit(contacts, weights, posterior)
+    candidates = _asking(missed.rms, accuracy)
     if not len(candidates):
         return found
     found = found._replace(posterior=Posterior(*(values.copy() for values in posterior)))
@@ -83,9 +88,41 @@ def rough_fit(
         )
         system = system_of(touch)
         size = sizes(touch, system)
-        if size.asked:
+        if not (size.asked or (told[i] and _is_texture(missed.off[i][there], float(accuracy[i])))):
+            continue
+        if missed.rms[i] <= MISFIT:
+            _refine(found, i, fitted(touch, system, size.variances, size.noise))
+        else:
             _settle(found, i, touch, system, size, tangent[i])
     return found
+
+
+class _Misfit(NamedTuple):
+    """How far contacts are off their sextics: |dz| (..., n), and its root mean square (...)."""
+
+    off: Array
+    rms: Array
+
+
+def _misfit(contacts: Array, weights: Array, posterior: Posterior) -> _Misfit:
+    """For b touches of contacts (b, n, 3) with weights (b, n)."""
+    flat = contacts.reshape(-1, 3)
+    basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
+    off = np.abs(contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0])
+    return _Misfit(off, np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0)))
+
+
+def _asking(rms: Array, accuracy: Array) -> NDArray[np.intp]:
+    """Which of b touches have contacts that their sextics do not describe to an accuracy (b,)."""
+    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, ROUGH_MISFIT))
+
+
+def _is_texture(off: Array, accuracy: float) -> bool:
+    """Whether most contacts of a touch, |dz| (n,) off their sextic, are so by more than it may be off.
+
+    White noise beside the sextic, or outliers, would not do there: its deviation would not know of them.
+    """
+    return 1.4826 * float(np.median(off)) > max(UNEXPLAINED * accuracy, MISFIT)
 
 
 def _settle(
@@ -102,6 +139,12 @@ def _settle(
     second = fitted(touch, system_of(touch), size.variances / scale**2, size.noise / scale)
     found.turns[place], found.scales[place] = turn, scale
     _put(found, place, second)
+
+
+def _refine(found: RoughFit, place: int, residual: Residual) -> None:
+    """One fit in the frame of the sextic, which it stays beside."""
+    residual.mean[: len(TERMS)] -= found.posterior.mean[place]
+    found.residuals[place] = residual
 
 
 def _put(found: RoughFit, place: int, residual: Residual) -> None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How rough a surface is, by one linear solve: what a sextic of usual waviness leaves of its contacts.
 
-A fit takes forty times as long and tells no more where this alone forbids to trust it.
+A fit takes twenty times as long and tells no more where this alone forbids to trust it.
 """
 
 import math

@@ -136,7 +136,8 @@ def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: f
     found = yield from _seed(felt, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
     noisy = found.result.accuracy > MISFIT and found is not list(known.values())[-1]
-    most = np.inf if noisy else NEAR if len(known) > 1 else 1.0
+    longest = (found.counts == np.minimum(SEEDS[0], felt.whole)).all()
+    most = np.inf if noisy else 1.0 if longest else NEAR
     growing = np.full(found.counts.shape, noisy or found.doubt <= 1.0)
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
@@ -158,7 +159,7 @@ def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: f
 
 def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
     """The longest of SEEDS that is in no doubt, or the one in the least; what is tried becomes `known`."""
-    error, seeds = None, list(SEEDS)
+    error, seeds, rough = None, list(SEEDS), []
     while seeds:
         counts = np.minimum(seeds.pop(0), felt.whole)
         doubt = felt.roughness(counts) if seeds else 0.0  # the shortest are fitted however rough they are
@@ -172,8 +173,12 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
             if trial.doubt <= 1.0:
                 break
             doubt = trial.spread
+        else:
+            rough.append(counts)
         if doubt > HOPELESS and len(seeds) > 1:
             seeds.pop(0)
+    if not known and rough:  # where a shorter one carries no fit
+        known[rough[-1].tobytes()] = yield from tried(felt, rough[-1])
     if not known and error is not None:
         raise error
     return min(known.values(), key=lambda trial: (trial.doubt, trial.counts.max()))

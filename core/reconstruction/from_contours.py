@@ -158,7 +158,7 @@ def options_of(
 
 
 def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: Options) -> Given:
-    found = Given(contours, *gathered(strokes))
+    found = Given(contours, *gathered(strokes, contours))
     if len(found.strokes) and options.method != "bayes":
         raise ValueError(
             f'strokes: wanted none with "{options.method}", which is a method of contours: take "bayes"'

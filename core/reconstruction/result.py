@@ -226,8 +226,10 @@ class Reconstruction:
 
     @property
     def message(self) -> str:
-        """The status in a sentence, with advice; and the blind directions."""
+        """The status in a sentence, with advice; and whether directions are undefined, or blind."""
         _, message = self._verdict
+        if self.posterior.is_round:
+            message += " The curvatures are alike, so there are no principal directions."
         if self.blind:
             verb = "is" if self.blind == 1 else "are"
             terms = terms_to(self.patch.degree)

@@ -135,6 +135,7 @@ def _with_residuals(start: Start, fit: _Fit, posteriors: Posterior, weights: Arr
         weights,
         posteriors.scaled(1.0 / farthest),
         start.stds / radii,
+        start.told,
         (start.tangents[:, None] @ axes)[:, 0],
         _normals(start.curves, axes, contacts),
         through=not start.alone,

@@ -23,7 +23,7 @@ from ..contours.local_geometry import (
 from ..contours.thinning import thinned
 from ..patch.domain import BRINK, Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
-from .strokes import STRIPS, FirstFrame, first_frame, means
+from .strokes import STRIPS, FirstFrame, first_frame, means, unit_in
 
 MOST_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
 
@@ -59,6 +59,7 @@ class Start(NamedTuple):
     curves: Curves  # relative to the points, in the world
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
+    told: NDArray[np.bool_]  # (b,), whether these are known to be all their noise; of means it is more
 
     @property
     def alone(self) -> bool:
@@ -97,18 +98,22 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     curves = curves.at(good)
     axes, k1, k2, radii = darboux_frames(curves, normals[good])
     local = curves.points @ axes[:, None] / radii[:, None, None, None]
-    strokes, stds = [], []
+    strokes, stds, told = [], [], []
     for row, i in enumerate(good):
         beside, size = given[i].strokes, 1
         if len(beside):
             beside = (beside - points[i]) @ axes[row] / radii[row]
             turned = replace(curves.at(row), points=local[row], tangents=curves.tangents[row] @ axes[row])
-            beside, size = means(beside[_over(turned, touches[i], beside)])
+            along = unit_in(axes[row], curves.tangents[row, 0])
+            beside, size = means(beside[_over(turned, touches[i], beside)], along)
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
         stds.append(_std(noise, max(size, min(sizes)), [*known, given[i].noise / math.sqrt(size)]))
-    first = Start(points[good], axes, k1, k2, radii, curves.tangents[:, 0], curves, strokes, np.array(stds))
+        told.append(not len(beside) and (noise is not None or None not in [c.noise for c in touches[i]]))
+    tangents = curves.tangents[:, 0]
+    noises = np.array(stds), np.array(told)
+    first = Start(points[good], axes, k1, k2, radii, tangents, curves, strokes, *noises)
     return first, touches, errors
 
 
@@ -130,33 +135,30 @@ def strokes_start(
     points: Array, given: Sequence[Given], outward: Array, noise: float | None, radius: float | None
 ) -> Started:
     """What `curves_start` gives, of strokes alone."""
-    found = [
+    frames = [
         first_frame(touch.strokes - point, up, radius)
         for point, touch, up in zip(points, given, outward, strict=True)
     ]
     for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
-        first = found[i]
+        first = frames[i]
         if isinstance(first, FirstFrame) and gap > MOST_ROUNDING * first.radius:
-            found[i] = _coarse(gap, first.radius)
-    errors = [None if isinstance(first, FirstFrame) else first for first in found]
-    firsts = {i: first for i, first in enumerate(found) if isinstance(first, FirstFrame)}
+            frames[i] = _coarse(gap, first.radius)
+    errors = [None if isinstance(first, FirstFrame) else first for first in frames]
+    firsts = {i: first for i, first in enumerate(frames) if isinstance(first, FirstFrame)}
     none: list[list[Contour]] = [[] for _ in given]
     if not firsts:
         return None, none, errors
     good = list(firsts)
-    thin = [means(first.contacts) for first in firsts.values()]
+    thin = [means(first.contacts, first.along) for first in firsts.values()]
     stds = [
         _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
     ]
     axes = np.array([first.axes for first in firsts.values()])
     k1, k2, radii = np.array([(first.k1, first.k2, first.radius) for first in firsts.values()]).T
     curves = curves_through(*stacked(points[good], [[]] * len(good)))
-    strokes = [beside for beside, _ in thin]
-    return (
-        Start(points[good], axes, k1, k2, radii, axes[:, :, 0], curves, strokes, np.array(stds)),
-        none,
-        errors,
-    )
+    strokes, told = [beside for beside, _ in thin], np.zeros(len(good), dtype=bool)
+    start = Start(points[good], axes, k1, k2, radii, axes[:, :, 0], curves, strokes, np.array(stds), told)
+    return start, none, errors
 
 
 def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:

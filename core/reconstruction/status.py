@@ -18,7 +18,6 @@ DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise this many times larg
 DOUBTFUL_TURN = math.radians(10.0)  # Angle that the frame may be off.
 LIKELY = 0.5  # Probability of that on a rough surface, whose directions are others at each scale.
 DOUBTFUL_CURVATURE = 0.1  # Deviation in units of 1 / radius: what a curve tells that ends at a quarter of it.
-FLAT = 1e-4  # Curvature in units of 1 / radius that is none.
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point,
 SIGNIFICANT = 5.0  # and standard deviations of it.
 LEAST_SCATTER = 0.3  # Share of a contact's accuracy: few contacts may happen to scatter less.
@@ -107,9 +106,7 @@ def _about_frame(r: _Judged) -> tuple[str, str] | None:
             ", more than its scatter explains: set the point where the curves meet."
         )
     turn = r.posterior.turn() if r.residual is None else r.posterior.turn(LIKELY)
-    # A plane has no directions to be off, and a longer extent would give it none.
-    has_directions = r.radius * max(abs(r.patch.k1), abs(r.patch.k2)) > FLAT
-    if turn > DOUBTFUL_TURN and has_directions:
+    if turn > DOUBTFUL_TURN and not r.posterior.is_round:
         return "uncertain", (
             f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
             "extent, or add sampling planes."

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, SMALLEST, Array, finite_array, list_of
 from ..bayes.joint_fit import turned
@@ -20,13 +20,17 @@ from ..contours.contour import Contour, cross
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.monge import exponents, monomials
 
-# Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot, for all).
-STRIPS = 10
+# Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot).
+STRIPS, LEAST_STRIPS = 10, 6
+ROWS = 4  # that a mean takes in at least, in the mean
+CELL = 0.02  # of the radius: contacts in one such square tell of one place
 SOME = 2000  # contacts that the quartic is fitted to
 NEAR = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
 DETERMINED = 0.02  # the least singular value of a quadric's terms in the mean over contacts, in unit radius
 QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 OPEN = 1e-3  # share of the largest singular value: contacts on a few lines leave such terms of a quartic open
+STRAY = 2.0  # times as far as all others: contacts that are none of the surface there,
+FEW = 0.02  # if they are but this share of all
 FAR = 0.999  # of the greatest distance, that is as far: rounding must not choose
 
 
@@ -36,6 +40,7 @@ class FirstFrame(NamedTuple):
     k1, k2 : curvatures in unit radius
     radius : the largest distance of a contact from the place in the tangent plane
     contacts : (n, 3), relative to the place, in these axes and in unit radius
+    along : (2,), toward the farthest of them, which is the same whatever the side of the normal
     """
 
     axes: Array
@@ -43,12 +48,13 @@ class FirstFrame(NamedTuple):
     k2: float
     radius: float
     contacts: Array
+    along: Array
 
 
-def gathered(strokes: Sequence[ArrayLike | Contour]) -> tuple[Array, float]:
+def gathered(strokes: Sequence[ArrayLike | Contour], contours: Sequence[Contour] = ()) -> tuple[Array, float]:
     """All contacts of strokes, (n, 3), each once, and the largest deviation they bring. Raises ValueError.
 
-    A sensor at rest writes one contact many times: it is no more certain for that.
+    A sensor at rest writes one contact many times, and strokes may repeat contours: that tells no more.
     """
     given: list[object] = list_of("strokes", strokes, object)
     if not given:  # as mostly: touches of contours alone are not to pay for them
@@ -58,24 +64,28 @@ def gathered(strokes: Sequence[ArrayLike | Contour]) -> tuple[Array, float]:
         for stroke in given
     ]
     noise = max((stroke.noise or 0.0 for stroke in given if isinstance(stroke, Contour)), default=0.0)
-    points = np.vstack(arrays)
+    points = np.vstack([*(contour.points for contour in contours), *arrays])
     first = np.unique(points, axis=0, return_index=True)[1]
-    return points[np.sort(first)], noise
+    beside = len(points) - sum(map(len, arrays))
+    return points[np.sort(first[first >= beside])], noise
 
 
-def means(contacts: Array) -> tuple[Array, int]:
-    """Contacts (n, 3) in unit radius, or STRIPS^2 means of neighbors; and of how many these are, at least.
+def means(contacts: Array, along: Array, strips: int = STRIPS) -> tuple[Array, int]:
+    """Contacts (n, 3) in unit radius, or strips^2 means of neighbors; and of how many these are, at least.
 
-    By equal counts in strips along the first axis, and along the second in each strip.
+    By equal shares of the area that was felt, in strips across the direction `along` (2,) and in each strip:
+    where a sensor dwells it tells no more of the shape. Contacts that follow each other share the error of
+    their row, so where these are far apart strips are fewer.
     """
     n = len(contacts)
-    if n <= STRIPS**2:
+    if n <= strips**2:
         return contacts, 1
-    firsts = np.arange(STRIPS) * n // STRIPS
-    lengths = np.diff(firsts, append=n)
-    order = np.argsort(contacts[:, 0], kind="stable")
-    order = order[np.lexsort((contacts[order, 1], np.repeat(np.arange(STRIPS), lengths)))]
-    starts = (firsts[:, None] + np.arange(STRIPS) * lengths[:, None] // STRIPS).ravel()
+    groups = _groups(contacts[:, :2], along, strips)
+    order = np.argsort(groups, kind="stable")
+    starts = np.flatnonzero(np.diff(groups[order], prepend=-1))
+    rows = np.count_nonzero((np.diff(order) != 1) | (np.diff(groups[order]) != 0)) + 1
+    if strips > LEAST_STRIPS and rows < ROWS * len(starts):
+        return means(contacts, along, strips - 2)
     counts = np.diff(starts, append=n)[:, None]
     some = contacts[:: max(1, n // SOME)]
     quartic = np.linalg.lstsq(_basis(some), some[:, 2], rcond=OPEN)[0]
@@ -84,6 +94,28 @@ def means(contacts: Array) -> tuple[Array, int]:
     found: Array = np.add.reduceat(over, starts, axis=0) / counts
     found[:, 2] += _basis(found) @ quartic
     return found, int(counts.min())
+
+
+def _groups(flat: Array, along: Array, strips: int) -> NDArray[np.intp]:
+    """The group of each of n contacts, (n,): by equal shares of the cells that (n, 2) are in."""
+    run, across = flat @ along, flat[:, 1] * along[0] - flat[:, 0] * along[1]
+    across *= np.copysign(1.0, np.sum(across**3))  # the same whatever the side of the normal
+    places = np.clip(np.column_stack([run, across]), -1.0, 1.0) / CELL
+    cells = places.round().astype(np.intp) @ [1, round(4.0 / CELL)]
+    cells -= cells.min()
+    shares = 1.0 / np.bincount(cells)[cells]
+    first = _equal(shares, np.argsort(run, kind="stable"), np.zeros(len(flat), dtype=np.intp), strips)
+    return strips * first + _equal(shares, np.lexsort((across, first)), first, strips)
+
+
+def _equal(shares: Array, order: NDArray[np.intp], within: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
+    """Numbers (n,) of so many parts of equal shares, in that order in each group of `within`."""
+    passed = np.cumsum(shares[order]) - 0.5 * shares[order]
+    totals = np.bincount(within, shares)
+    passed -= (np.cumsum(totals) - totals)[within[order]]
+    found = np.empty(len(order), dtype=np.intp)
+    found[order] = np.clip(parts * passed / totals[within[order]], 0, parts - 1)
+    return found
 
 
 def _basis(contacts: Array) -> Array:
@@ -99,8 +131,8 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
     are of another side of the object.
     """
     distances = np.sqrt(np.einsum("ni,ni->n", r, r))
-    if radius is not None:
-        r, distances = r[distances <= radius], distances[distances <= radius]
+    used = distances <= (radius or _farthest(distances))
+    r, distances = r[used], distances[used]
     reach = float(distances.max(initial=0.0))
     if len(r) < len(QUADRIC) or reach < SMALLEST:
         return _too_few(len(r))
@@ -124,7 +156,21 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
         return _too_few(len(local))
     radius = float(np.hypot(local[:, 0], local[:, 1]).max())
     scale = radius / (share * reach)
-    return FirstFrame(axes, k1 * scale, k2 * scale, radius, local / radius)
+    return FirstFrame(axes, k1 * scale, k2 * scale, radius, local / radius, unit_in(axes, tangent))
+
+
+def _farthest(distances: Array) -> float:
+    """The largest of the distances (n,), but for stray contacts: a gap sets them apart."""
+    last = np.sort(distances)[-1 - int(FEW * len(distances)) :]
+    gaps = np.flatnonzero(last[1:] > STRAY * last[:-1])
+    return float(last[gaps[0] if len(gaps) else -1]) if len(last) else 0.0
+
+
+def unit_in(axes: Array, direction: Array) -> Array:
+    """A direction's part in the tangent plane of axes (3, 3), (2,), of length 1."""
+    flat = direction @ axes[:, :2]
+    found: Array = flat / max(float(np.hypot(*flat)), 1e-300)
+    return found
 
 
 def _too_few(count: int) -> DegenerateCurvesError:

@@ -43,7 +43,7 @@ def verification_columns(report):
 
 
 def verification_table(found, unit):
-    """Rows of a label and what a verification found for the mesh and the contacts; the head has the unit."""
+    """Rows of a label and what was found for the mesh and for the contacts, lengths without unit."""
     symbol, bare = units.symbol(1, unit), ("", unit[1])
 
     def lengths(key):

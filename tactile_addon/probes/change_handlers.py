@@ -118,13 +118,14 @@ def _concerned(depsgraph):
     global _unsure, _seen
     layer = depsgraph.scene.session_uid, depsgraph.view_layer.name
     updates, known, unsure = depsgraph.updates, targets(), _unsure or layer != _seen
+    updated = {u.id.original for u in updates if u.is_updated_geometry or u.is_updated_transform}
+    objects = [datablock for datablock in updated if isinstance(datablock, bpy.types.Object)]
+    owners = {probe_of(obj) for obj in objects} - {None}
     # Where an object comes or goes, all others are among the updates too, with none of these two; and so
     # is one that gets another name.
-    named = {u.id.original for u in updates if isinstance(u.id, bpy.types.Object)}
-    updated = {u.id.original for u in updates if u.is_updated_geometry or u.is_updated_transform}
-    owners = {probe_of(obj) for obj in updated & named} - {None}
+    named = {u.id.name for u in updates if isinstance(u.id, bpy.types.Object)}
     scene = unsure or _has_come_or_gone(depsgraph)
-    if not (scene or owners or any(obj.session_uid in known for obj in named)):
+    if not (scene or owners or len(named) > len(objects) or any(o.session_uid in known for o in objects)):
         return [], False
     _unsure, _seen = False, layer
     there = set(depsgraph.view_layer.objects)
@@ -137,9 +138,13 @@ def _concerned(depsgraph):
         if unsure
         or obj in owners
         or obj.tactile_probe.target in updated
-        or ((scene or obj.tactile_probe.target in named) and may_be_outdated(obj, there))
+        or ((scene or _name_of(obj.tactile_probe.target) in named) and may_be_outdated(obj, there))
     ]
     return concerned, unsure
+
+
+def _name_of(target):
+    return None if target is None else target.name
 
 
 def is_pending(probe):

@@ -7,6 +7,7 @@ from time import perf_counter
 
 from .operators import report_error
 
+AT_ONCE = 0.2  # seconds of work before a window is told that there is more
 SLICE = 0.05  # seconds of work between two events
 NEXT = 0.01  # seconds from one slice to the next
 
@@ -26,6 +27,8 @@ class InSlices:
     def invoke(self, context, event):
         try:
             self._begin(context)
+            if self._advance(context, AT_ONCE):
+                return self._finish(context)
         except ValueError as error:
             return report_error(self, error)
         return self._go_on(context)
@@ -53,17 +56,20 @@ class InSlices:
         if event.type != "TIMER":
             return self.meanwhile
         try:
-            self._check(context)
-            end = perf_counter() + SLICE
-            for _ in self._steps:
-                if perf_counter() > end:
-                    context.workspace.status_text_set(_status(self.stop, *self._done()))
-                    return self.meanwhile
+            if not self._advance(context, SLICE):
+                context.workspace.status_text_set(_status(self.stop, *self._done()))
+                return self.meanwhile
             self._leave(context)
             return self._finish(context)
         except ValueError as error:
             self._leave(context)
             return report_error(self, error)
+
+    def _advance(self, context, seconds):
+        """Works so long; whether all is done then."""
+        self._check(context)
+        end = perf_counter() + seconds
+        return not any(perf_counter() > end for _ in self._steps)
 
     def _check(self, context):
         """Nothing that happens meanwhile matters."""

@@ -13,7 +13,7 @@ from bpy.props import FloatProperty
 from ..touch.settings import TouchSettings
 
 DECADES = range(-6, 6)  # of the object's size
-STEPS = {"extent": 5e-4, "step": 5e-5, "noise": 5e-6}  # of the object's size; a pixel is three of them
+STEPS = {"extent": 0.15, "step": 0.015, "noise": 0.0015}  # of the object's size; a pixel moves 1/100 of it
 
 
 def annotations(found):

@@ -202,8 +202,8 @@ def _digest(probe, depsgraph, seat):
 
 
 def _extent_of(probe):
-    record = record_of(probe)
-    return 0.0 if record is None else record.get("extent", 0.0)
+    patch = patch_of(probe)
+    return 0.0 if patch is None else patch_record.extent_of(patch)
 
 
 def measure_shape(settings, depsgraph, reshaped=None):

@@ -11,15 +11,7 @@ from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
 from ..stability_map.stability import NOTHING
 from ..touch import units
-from . import drawing, page, parts
-
-MOST_DOTS = 4000  # in a picture
-# Words, the axes to the right and up, the axis of sight and its sign toward the viewer.
-VIEWS = (
-    ("from the front", (0, 2), 1, -1.0),
-    ("from the right", (1, 2), 0, 1.0),
-    ("from above", (0, 1), 2, 1.0),
-)
+from . import page, parts, views
 
 
 def map_page(painted):
@@ -28,7 +20,11 @@ def map_page(painted):
     unit = units.unit_of(bpy.context.scene, record["extent"])
     sections = [
         page.verdict(map_summary(record), record["patches"] > 0 and not record["in_doubt"]),
-        page.section("Pictures", _legend(painted, record, unit), *_views(painted)),
+        page.section(
+            "Pictures",
+            _legend(painted, record, unit),
+            *views.three_sides(painted.data, _screen_colors(painted.data)),
+        ),
         *_errors(painted.data, record, unit),
         *parts.ending(map_table_rows(record), record),
     ]
@@ -54,26 +50,15 @@ def _errors(mesh, record, unit):
         return []
     weights, std = np.ones(known.sum()), float(np.median(values(mesh, "height_std")[known]))
     words = (
-        "Shares of the vertices by the mean error of the touch that is nearest. The end counts all beyond."
+        "Shares of the vertices by the error of the touch nearest to them. The last bar counts all beyond."
     )
     return [
         page.section("Errors", parts.spread(errors[known], weights, unit, words)),
         page.section(
-            "Tolerance bands", parts.bands(errors[known], weights, std, unit, record["extent"], "extent")
+            "Tolerance bands",
+            parts.bands(errors[known], weights, std, unit, parts.shares_of(record["extent"], "extent")),
         ),
     ]
-
-
-def _views(painted):
-    """The vertices that face the viewer as dots, the nearest last."""
-    points, colors = values(painted.data, "position"), _screen_colors(painted.data)
-    normals = np.empty_like(points)
-    painted.data.vertices.foreach_get("normal", normals.ravel())
-    mixed = np.random.default_rng(0).permutation(len(points))
-    for words, axes, sight, sign in VIEWS:
-        facing = mixed[sign * normals[mixed, sight] > 0.0][:MOST_DOTS]
-        order = facing[np.argsort(sign * points[facing, sight])]
-        yield page.figure(drawing.dots(points[order][:, axes], colors[order]), words)
 
 
 def _screen_colors(mesh):

@@ -25,14 +25,19 @@ def spread(values, weights, unit, caption):
     return page.figure(drawing.histogram(values, weights, limit, label(1, unit)), caption)
 
 
-def bands(values, weights, std, unit, length, what):
-    """How much of the weights (n,) is within shares of a length, and within so many standard deviations."""
+def shares_of(length, what):
+    """Names and lengths of bands that are shares of a length."""
+    return [(f"± {100.0 * share:g} % of the {what}", share * length) for share in SHARES]
+
+
+def bands(values, weights, std, unit, reaches):
+    """How much of the weights (n,) is within named lengths, and within so many standard deviations."""
 
     def row(name, reach, due=""):
         within = weights[np.abs(values) <= reach].sum() / weights.sum()
         return name, units.say(reach, 1, unit), f"{100.0 * within:.1f} %", due
 
-    rows = [row(f"± {100.0 * share:g} % of the {what}", share * length) for share in SHARES]
+    rows = [row(*reach) for reach in reaches]
     for count, due in DEVIATIONS:
         rows.append(
             row(
@@ -59,7 +64,7 @@ def label(power, unit):
 
 
 def _settings(record):
-    names = ("method", "degree", "spacing", "extent", "step", "noise", "seed")
+    names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
     rows = [
         (name, f"{record[name]:.4g}" if isinstance(record[name], float) else record[name])
         for name in names
@@ -79,3 +84,17 @@ def _versions():
         ("numpy", np.__version__),
         ("scipy", scipy.__version__),
     ]
+
+
+def corners(mesh):
+    """The triangles of a mesh that has no other faces, (m, 3)."""
+    indices = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", indices)
+    return indices.reshape(-1, 3)
+
+
+def vertex_areas(points, triangles):
+    """A third of the area of the triangles (m, 3) at each of points (n, 3), (n,)."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    thirds = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+    return np.bincount(triangles.ravel(), np.repeat(thirds, 3), len(points))

@@ -34,7 +34,8 @@ def patch_page(patch):
     r, record = patch_record.reconstruction_of(patch), patch[patch_record.RECORD].to_dict()
     unit = units.unit_of(bpy.context.scene, r.radius)
     off = _deviations(patch, r, record)
-    bands = parts.bands(off.lengths, off.weights, r.mean_height_std, unit, r.radius, "radius")
+    reaches = parts.shares_of(r.radius, "radius")
+    bands = parts.bands(off.lengths, off.weights, r.mean_height_std, unit, reaches)
     sections = [
         page.verdict(f"{record['status']}: {record['message']}", record["status"] == "ok"),
         page.section("Pictures", *_pictures(patch, r, record, unit)),
@@ -46,7 +47,7 @@ def patch_page(patch):
 
 
 def _pictures(patch, r, record, unit):
-    points, corners = values(patch.data, "position").astype(float), _corners(patch.data)
+    points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # as the object's mesh has them
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
         shown = values(patch.data, attribute)
@@ -63,23 +64,12 @@ def _has_mesh(record):
 
 def _deviations(patch, r, record):
     if _has_mesh(record):
-        points, corners = values(patch.data, "position").astype(float), _corners(patch.data)
-        words = "Shares of the patch's area by its distance from the mesh. Both ends count all beyond."
+        points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
+        words = (
+            "Shares of the patch's area by its distance from the mesh. The outermost bars count all beyond."
+        )
         off = values(patch.data, "deviation").astype(float)
-        return Deviations(off, _vertex_areas(points, corners), words)
+        return Deviations(off, parts.vertex_areas(points, corners), words)
     x, y, z = r.contacts.T
-    words = "Shares of the contacts by the patch's height above them. Both ends count all beyond."
+    words = "Shares of the contacts by the patch's height above them. The outermost bars count all beyond."
     return Deviations(r.height(x, y) - z, np.ones(len(x)), words)
-
-
-def _corners(mesh):
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    return corners.reshape(-1, 3)
-
-
-def _vertex_areas(points, corners):
-    """A third of the area of the triangles (m, 3) at each of points (n, 3), (n,)."""
-    a, b, c = (points[corners[:, i]] for i in range(3))
-    thirds = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(corners.ravel(), np.repeat(thirds, 3), len(points))

@@ -13,21 +13,25 @@ from ..probes import probe
 from ..probes.operators import report_error
 from ..scene import patch_record
 from .map_page import map_page
+from .object_page import object_page
 from .patch_page import patch_page
 
 
 def write(path, obj):
-    """The page of a patch or map object as the file `path`.
+    """The page of a patch, map or whole object as the file `path`.
 
     Raises ValueError where the patch was edited, OSError where the file cannot be written.
     """
-    whole_file.write_text(path, map_page(obj) if patch_record.MAP_RECORD in obj else patch_page(obj))
+    pages = {patch_record.MAP_RECORD: map_page, patch_record.ATLAS_RECORD: object_page}
+    make = next((pages[key] for key in pages if key in obj), patch_page)
+    whole_file.write_text(path, make(obj))
 
 
 def _reported(context):
-    """The map or patch that is active, or that the active object belongs to, or None."""
+    """The map or whole object that is active, or the patch that the active object belongs to, or None."""
     obj = context.view_layer.objects.active
-    return obj if obj is not None and patch_record.MAP_RECORD in obj else probe.patch_near(obj)
+    alone = (patch_record.MAP_RECORD, patch_record.ATLAS_RECORD)
+    return obj if obj is not None and any(key in obj for key in alone) else probe.patch_near(obj)
 
 
 class TACTILE_OT_export_report(ExportHelper, bpy.types.Operator):
@@ -41,7 +45,9 @@ class TACTILE_OT_export_report(ExportHelper, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if _reported(context) is None:
-            cls.poll_message_set("Select a patch, its probe or its contours, or a stability map first")
+            cls.poll_message_set(
+                "Select a patch, its probe or its contours, a stability map or a touched object first"
+            )
             return False
         return True
 

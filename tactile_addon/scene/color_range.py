@@ -64,7 +64,7 @@ def register():
         description="Where the colors of the patch end, in the unit of the legend; 0 for what its values ask",
         min=0.0,
         precision=4,
-        step=1e-3,  # a share of what is common in a unit that suits the patch
+        step=0.1,  # small beside what is common in a unit that suits the patch
         get=_get,
         set=_set,
     )

@@ -52,6 +52,15 @@ def report_of(patch):
     return report if good and numbers[0] > 0.0 and all(isinstance(word, str) for word in words) else None
 
 
+def extent_of(patch):
+    """The extent in its report, which needs not be whole; 0 where there is none."""
+    try:
+        extent = patch[RECORD]["extent"]
+    except (KeyError, TypeError):
+        return 0.0
+    return extent if isinstance(extent, float) else 0.0
+
+
 def require_whole(patch):
     """Raises ValueError where the patch object has been edited into what is none."""
     if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):

@@ -16,7 +16,7 @@ from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
 
 COLOR = "stability_color"
 SHADES = 256
-ABOVE = 5e-3  # of the object's size
+ABOVE = 5e-3  # of the object's size; 20000 clip starts away, as a scan in mm is, less flickers
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
 SHOWN = [
     ("error", "Error", "How far patch and mesh are apart, in height", 1),

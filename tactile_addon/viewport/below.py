@@ -70,10 +70,10 @@ def point_below(context, event):
         hit, point, _, _, found, matrix = cast(depsgraph, start, direction)
         if not hit:
             return None
-        obj = found.original
-        obj = _touched_by_map(obj, space)
+        obj = _touched_by_map(found.original, space)
         if not probe.is_result(obj) and (obj != found.original or obj.visible_in_viewport_get(space)):
-            _require_touchable(obj, matrix)
+            if obj == found.original:  # A map's own transform differs from its source's by rounding.
+                _require_touchable(obj, matrix)
             # Cast again from close by: from far away it is not exact.
             surface = MeshSurface(obj, depsgraph)
             depth = (point - eye).dot(direction) - surface.size

@@ -12,7 +12,7 @@ class TactileTool(bpy.types.WorkSpaceTool):
     bl_idname = "tactile.tool"
     bl_label = "Tactile Probe"
     bl_description = "Click on a mesh to have a probe there, or the active probe moved there"
-    bl_icon = "ops.generic.cursor"
+    bl_icon = "ops.paint.eyedropper_add"
     bl_keymap = (
         (
             TACTILE_OT_pick.bl_idname,

@@ -15,19 +15,22 @@ def unit_of(record):
 
 def object_readable(record):
     """Lines of label and value; lengths in the unit of the scene or file."""
+    return table(object_table_rows(record))
+
+
+def object_table_rows(record):
+    """(label, value) of all that a whole object has to say."""
     unit = unit_of(record)
-    return table(
-        [
-            ("touched", f"{record['source']}, {record['touches']} times"),
-            ("surface", _surface(record)),
-            ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
-            ("edges of their graph", str(record["edges"])),
-            ("tolerance", units.say(record["tolerance"], 1, unit)),
-            ("height std", units.say(record["height_std"], 1, unit)),
-            ("off the mesh", f"mean {_off(record, 'mean', unit)}; max {_off(record, 'max', unit)}"),
-            ("mesh", f"{record['vertices']} vertices, {record['triangles']} triangles"),
-        ]
-    )
+    return [
+        ("touched", f"{record['source']}, {record['touches']} times"),
+        ("surface", _surface(record)),
+        ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
+        ("edges of their graph", str(record["edges"])),
+        ("tolerance", units.say(record["tolerance"], 1, unit)),
+        ("height std", units.say(record["height_std"], 1, unit)),
+        ("off the mesh", f"mean {_off(record, 'mean', unit)}; max {_off(record, 'max', unit)}"),
+        ("mesh", f"{record['vertices']} vertices, {record['triangles']} triangles"),
+    ]
 
 
 def object_summary(record):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The report is one whole page, and its figures are those of the patch or map."""
 
+import json
 import re
 from html.parser import HTMLParser
 
@@ -107,6 +108,24 @@ def test_the_page_of_a_map(command, files, tmp_path):
     assert re.search(r"(\d+) patches at \1 points, 0 in doubt", text)
 
 
+def test_the_page_of_a_whole_object(command, files, tmp_path):
+    arguments = (
+        "--tolerance",
+        0.02,
+        "--report",
+        tmp_path / "object.html",
+        "--json",
+        tmp_path / "object.json",
+    )
+    assert command("object", files / "ball.ply", *arguments)[0] == 0
+    page = Page((tmp_path / "object.html").read_text(encoding="utf-8"))
+    record = json.loads((tmp_path / "object.json").read_text())
+    assert page.counts["figure"] == 5  # three views, their scale and the histogram
+    assert band(page, "± 5 × the tolerance") == 100.0 * (record["deviation_max"] < 0.1)
+    rows = {row[0]: row[1] for row in page.rows if len(row) == 2}
+    assert rows["touched"].endswith(f"{record['touches']} times")
+
+
 def test_what_cannot_be_reported_is_said(empty, command, files, tmp_path):
     code, _, err = command("reconstruct", files / "ball.ply", *PLACE, "--report", tmp_path / "r.txt")
     assert code == 2
@@ -114,7 +133,7 @@ def test_what_cannot_be_reported_is_said(empty, command, files, tmp_path):
     report = tmp_path / "nowhere" / "r.html"
     assert command("reconstruct", files / "ball.ply", *PLACE, "--report", report)[0] == 1
     empty.ops.wm.read_homefile(use_empty=True)
-    with pytest.raises(RuntimeError, match="Select a patch, its probe or its contours, or a stability map"):
+    with pytest.raises(RuntimeError, match="Select a patch, its probe or its contours, a stability map"):
         empty.ops.tactile.export_report(filepath=str(tmp_path / "r.html"))
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A first result in a window as it comes: colors at once, a verdict, numbers with what they mean.
 
-And what else the panel has: numbers that are dragged, what hides a patch, a point of a map, the tool of the
+And what else the panel has: what freezes or hides a patch, a point of a map, the tool of the
 toolbar, and what is said while a large mesh is touched first.
 """
 
@@ -17,9 +17,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from common import PICK_BUTTON, check, is_complete, last_report, look, open_tab, patch, picture, probe, until
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
-NUMBER, EXTENT, SENSOR, NOISE = (790, 524), (943, 180), (815, 321), (943, 378)
-CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 234)
-PIXELS = 20
+NUMBER, SENSOR = (790, 524), (815, 321)
+CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 284)
 
 
 def probes():
@@ -59,48 +58,38 @@ def first():
     check("a click on the name of a number copies it", " ± " in copied and copied.endswith("1/m"), copied)
 
 
-def dragged(place):
-    """Presses on a number and moves it by some pixels, slowly enough for each to count."""
-    x, y = place
-    moves = [arg for i in range(2, PIXELS + 1, 2) for arg in ("mousemove", x + i, y, "sleep", 0.1)]
-    gui.xdo("mousemove", x, y, "sleep", 0.3, "mousedown", 1, "sleep", 0.3, *moves, "mouseup", 1)
-    yield from until(is_complete)
-
-
 def numbers():
-    settings, size = probe().tactile_probe, max(probe().tactile_probe.target.dimensions)
-    found = patch()["tactile"]["extent"]
+    """Numbers are not dragged here: Blender takes the pointer back while it is, and xdotool moves it away."""
+    settings = probe().tactile_probe
     settings.live = False
-    yield 0.5
-    yield from dragged(EXTENT)
-    share = (settings.extent - found) / size
-    check("a drag of 20 pixels moves the extent, from what was found, by its size", 0 < share < 0.2, share)
-    settings.extent = 0.0
     gui.click(*SENSOR)
     yield 1
-    yield from dragged(NOISE)
-    share = settings.noise / size
-    check("... and the noise by little", 0.0 < share < 0.005, share)
     picture("panel_frozen")
-    settings.noise, settings.live = 0.0, True
+    settings.live = True
     gui.click(*SENSOR)
     yield from until(is_complete)
+
+
+def toggled(place, reached):
+    """Presses a button once the mouse is known to be over it."""
+    gui.xdo("mousemove", place[0] - 5, place[1], "sleep", 0.3, "mousemove", *place)
+    yield 0.7
+    gui.click(*place)
+    yield from until(reached, 10)
 
 
 def hidden():
-    (lines,) = patch().children
-    for place in (CONTOURS, HANDLES):
-        gui.click(*place)
-        yield 1
+    (lines,), settings = patch().children, probe().tactile_probe
+    yield from toggled(CONTOURS, lambda: lines.hide_viewport)
     check("a button hides the contours", lines.hide_viewport and not lines.visible_get())
-    check("... and one the handles", not probe().tactile_probe.show_handles)
+    yield from toggled(HANDLES, lambda: not settings.show_handles)
+    check("... and one the handles", not settings.show_handles)
     picture("panel_hidden")
-    probe().tactile_probe.azimuths[0] += 0.1
+    settings.azimuths[0] += 0.1
     yield from until(is_complete)
-    for place in (CONTOURS, HANDLES):
-        gui.click(*place)
-        yield 1
-    check("... and they come back", lines.visible_get() and probe().tactile_probe.show_handles)
+    yield from toggled(CONTOURS, lambda: not lines.hide_viewport)
+    yield from toggled(HANDLES, lambda: settings.show_handles)
+    check("... and they come back", lines.visible_get() and settings.show_handles)
 
 
 def on_map():

@@ -66,15 +66,15 @@ def test_the_verdict_on_an_earlier_patch_is_none(wording):
 
 @pytest.mark.parametrize("size", [0.065, 2.0, 65.0])
 def test_a_number_is_dragged_by_the_size_of_the_object(empty, extension, size):
-    """What 20 pixels move a number by is 65 times its step, as measured in a window of Blender 5.2."""
+    """What 20 pixels move a number by is a fifth of its step: Blender counts it in hundredths."""
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.5 * size)
     empty.ops.tactile.pick(location=(0.0, 0.0, 0.5 * size))
     settings = empty.context.object.tactile_probe
     fields = extension.tactile_addon.probes.number_fields.fields(max(settings.target.dimensions))
-    moves = {name: 65.0 * settings.bl_rna.properties[shown].step / size for name, shown in fields.items()}
-    assert 0.01 < moves["extent"] < 0.11
-    assert 0.001 < moves["step"] < 0.011
-    assert 0.0001 < moves["noise"] < 0.0011
+    moves = {name: 0.2 * settings.bl_rna.properties[shown].step / size for name, shown in fields.items()}
+    assert 0.009 < moves["extent"] < 0.1
+    assert 0.0009 < moves["step"] < 0.01
+    assert 0.00009 < moves["noise"] < 0.001
     (patch,) = empty.context.object.children
     assert getattr(settings, fields["extent"]) == pytest.approx(patch["tactile"]["extent"])  # as found
     assert settings.extent == getattr(settings, fields["noise"]) == 0.0
@@ -180,11 +180,11 @@ def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty
         extension.tactile_addon.sidebar.panel.TACTILE_PT_result.draw_active(None, context, layout, probe)
         return layout.drawn
 
-    numbers = ("κ1 Curvature", "κ2 Curvature", "Height", "Curvedness", "Overlap")
+    numbers = ("κ1", "κ2", "Height", "Curvedness", "Overlap")
     assert "Last Touch" not in dict(drawn())
     assert all(dict(drawn())[name] for name in numbers[:4])
     probe.tactile_probe.extent = 0.2
     empty.context.view_layer.update()
     texts = [text for text, _ in drawn()]
-    assert texts.index("Last Touch") < texts.index("κ1 Curvature")
+    assert texts.index("Last Touch") < texts.index("κ1")
     assert not any(dict(drawn())[name] for name in numbers)

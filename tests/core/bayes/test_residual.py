@@ -251,7 +251,7 @@ def test_it_moves_with_its_contacts(scale):
 
 
 def test_a_stack_of_rough_and_smooth_touches_gives_what_each_gives_alone():
-    smooth = surfaces.graph({(2, 0): -0.02, (0, 2): 0.0075})
+    smooth = surfaces.graph({(2, 0): -0.01, (0, 2): 0.0075})
     exact = smooth.track(surfaces.UPRIGHT, extent=EXTENT, step=1.5)
     touches = [
         contours_of(rough(0)),
@@ -374,6 +374,6 @@ def test_the_factor_of_places_is_that_of_their_covariance():
     assert np.array_equal(factor, np.tril(factor))
 
 
-def test_contacts_beside_a_residual_are_known_to_seven_ten_thousandths_of_the_radius_at_best():
+def test_contacts_beside_a_residual_are_known_to_five_ten_thousandths_of_the_radius_at_best():
     noises = [float(touched(seed)[1].residual.noise) for seed in range(6)]
-    assert 7e-4 <= min(noises) < 1e-3
+    assert 5e-4 <= min(noises) < 1e-3

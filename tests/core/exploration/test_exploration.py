@@ -7,8 +7,9 @@ import pytest
 import surfaces
 
 import core
-from core.exploration import one_touch
+from core.exploration import growth, one_touch, touches
 from core.exploration.one_touch import NOTICEABLE, is_enough
+from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
 
 PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
@@ -82,6 +83,38 @@ def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_leng
     assert true_error(surface, found) < 1.5 * found.result.mean_height_std
 
 
+def short_waves():
+    return bowl_with(
+        lambda x, y: 0.12 * np.sin(2.0 * x) * np.sin(2.0 * y),
+        lambda x, y: (
+            0.24 * np.cos(2.0 * x) * np.sin(2.0 * y),
+            0.24 * np.sin(2.0 * x) * np.cos(2.0 * y),
+        ),
+    )
+
+
+def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
+    asked = []
+    monkeypatch.setattr(touches, "fitted", lambda *given: asked.append(1) or fitted(*given))
+    found, few = explore(short_waves()), len(asked)
+    monkeypatch.setattr(growth, "TOO_ROUGH", np.inf)
+    assert explore(short_waves()).extent == found.extent
+    assert len(asked) - few > few
+
+
+def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
+    tried = growth.tried
+
+    def of_more_than_the_least(felt, counts):
+        if counts.max() <= growth.SEEDS[-1]:
+            raise core.DegenerateCurvesError("too few")
+        return (yield from tried(felt, counts))
+
+    monkeypatch.setattr(growth, "tried", of_more_than_the_least)
+    monkeypatch.setattr(growth.Felt, "roughness", lambda *_: 2.0)
+    assert explore(surfaces.plane()).result.status == "ok"
+
+
 def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
     found = explore(surfaces.plane(), noise=0.01, rng=0)
     assert found.extent == pytest.approx(30.0)
@@ -89,9 +122,10 @@ def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
     assert {stop for contour in found.contours for stop in contour.stops} == {core.EXTENT}
 
 
-def test_curves_end_before_a_rib_and_go_on_elsewhere():
+@pytest.mark.parametrize("options", [{}, {"step": 0.25}], ids=["any step", "a fine step"])
+def test_curves_end_before_a_rib_and_go_on_elsewhere(options):
     surface = rib(at=9.0, high=0.8, wide=1.0)
-    found = explore(surface)
+    found = explore(surface, **options)
     for contour in found.contours:
         assert contour.points[:, 0].max() < 8.5  # the rib rises from there
     assert core.UNEXPLAINED in found.contours[0].stops

@@ -97,8 +97,11 @@ def test_the_area_is_that_within_the_spline(ends):
 
 
 def test_a_curve_that_ends_at_the_point_is_no_end():
-    domain = closed_spline_domain(np.vstack([circle(SIXTH), [[1e-5, 0.0]], circle([0])]), 1.0)
-    assert len(domain.ends) == 6
+    for reach, ends in ((1e-5, 6), (9e-4, 6), (1.1e-3, 7)):
+        given = np.vstack([circle(SIXTH), circle([30], reach), circle([0])])
+        assert len(closed_spline_domain(8.0 * given, 8.0).ends) == ends
+    for degrees, ends in ((0.05, 6), (0.06, 7)):  # a thousandth of the radius is 0.0573 degrees
+        assert len(closed_spline_domain(8.0 * circle([*SIXTH, degrees]), 8.0).ends) == ends
 
 
 def test_fewer_than_three_ends_bound_nothing():

@@ -7,7 +7,9 @@ import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
-from core import METHODS, SamplingPlane, explore
+from core import METHODS, MongePatch, SamplingPlane, explore
+from core.patch.domain import closed_spline_domain
+from core.patch.geometry import total_absolute_curvature
 
 SURFACE = surfaces.torus(40, 20, 0.6)
 TURN, SHIFT = Rotation.from_rotvec([0.4, -0.9, 0.3]).as_matrix(), np.array([20.0, -7.0, 3.0])
@@ -96,3 +98,12 @@ def test_results_are_compared_and_hashed_by_identity():
         assert value == value and value != other
         assert len({value, other, value}) == 2
     assert r.posterior == r.posterior and len({r.posterior, touched().posterior}) == 2
+
+
+@pytest.mark.parametrize("k", [-0.5, 1.5])
+def test_the_total_curvature_of_a_steep_bowl_is_what_its_normals_cover(k):
+    """Gauss and Bonnet: 2 pi (1 - 1 / sqrt(1 + k^2)) up to radius 1, where the slope is k."""
+    ends = [(np.cos(a), np.sin(a)) for a in np.radians(np.arange(0, 360, 30))]
+    bowl, disk = MongePatch(k, k, np.empty(0)), closed_spline_domain(ends, 1.0)
+    wanted = 2.0 * np.pi * (1.0 - 1.0 / np.sqrt(1.0 + k**2))
+    assert total_absolute_curvature(bowl, disk) == pytest.approx(wanted, rel=0.02)

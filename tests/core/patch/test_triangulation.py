@@ -168,10 +168,3 @@ def test_a_touch_has_a_mesh_as_fine_as_what_is_known_of_it(surface, noise, metho
     assert angles(points, triangles).min() > LEAST_ANGLE
     assert points[0].tolist() == [0.0, 0.0, 0.0]  # the reference point
     assert len(points) < 2000
-
-
-def test_where_it_is_flat_neighbors_are_a_quarter_of_the_radius_apart():
-    points, triangles = patch_mesh(PATCHES["plane"], DOMAINS["even"], 0.1)
-    inner = triangles[(np.linalg.norm(points[triangles], axis=2) < 0.6).all(axis=1)]
-    edges = np.linalg.norm(points[inner] - points[np.roll(inner, 1, axis=1)], axis=2)
-    assert edges.min() > 0.1 and edges.max() < 0.275

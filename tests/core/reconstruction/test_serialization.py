@@ -140,6 +140,15 @@ def test_a_covariance_that_is_none_is_refused(change):
         from_dict(d)
 
 
+def test_a_covariance_may_be_singular_but_for_rounding():
+    d = to_dict(touched(noise=0.0))
+    values, axes = np.linalg.eigh(d["posterior"]["covariance"])
+    values[0] = -1e-10 * values[-1]
+    singular = axes * values @ axes.T
+    d["posterior"]["covariance"] = (0.5 * (singular + singular.T)).tolist()
+    assert from_dict(d).blind == touched(noise=0.0).blind
+
+
 def rough():
     """A dict with a residual, of contacts on waves that no sextic follows."""
     t, contours = np.linspace(-1.0, 1.0, 31), []

@@ -20,7 +20,7 @@ from core import (
     suggest_plane,
     to_dict,
 )
-from core.reconstruction.strokes import STRIPS, means
+from core.reconstruction.strokes import LEAST_STRIPS, STRIPS, means
 
 EXTENT = 10.0
 SURFACES = {
@@ -141,7 +141,7 @@ def test_beside_contours_the_point_l_and_domain_are_theirs_and_far_strokes_are_i
     assert len(r.strokes) == 0
     assert json.dumps(to_dict(r)) == json.dumps(to_dict(plain))
     r = surface.fit(contours, strokes=[wiped("pear", 200, 9), far])
-    assert len(r.strokes) == STRIPS**2
+    assert LEAST_STRIPS**2 <= len(r.strokes) <= STRIPS**2
     assert r.radius == pytest.approx(plain.radius, rel=1e-3)
     assert r.domain.boundary(40) == pytest.approx(plain.domain.boundary(40), abs=0.02 * EXTENT)
     assert len(r.contacts) == len(plain.contacts) + len(r.strokes)
@@ -232,24 +232,27 @@ def test_the_patch_moves_with_its_contacts(count, with_contours, scale, turn, sh
     assert again.mean_height_std == pytest.approx(scale * one.mean_height_std)
 
 
+ALONG = np.array([0.6, 0.8])
+
+
 def test_means_of_neighbors_lie_on_a_quartic_and_take_all_contacts():
     def height(x, y):
         return 0.3 * x**2 - 0.2 * y**2 + 0.1 * x**3 * y
 
     contacts = np.random.default_rng(0).uniform(-1.0, 1.0, (5000, 3))
     contacts[:, 2] = height(*contacts[:, :2].T)
-    found, size = means(contacts)
+    found, size = means(contacts, ALONG)
     assert len(found) == STRIPS**2
-    assert size == 5000 // STRIPS**2
+    assert 0.6 * 5000 / STRIPS**2 < size <= 5000 / STRIPS**2
     assert found[:, 2] == pytest.approx(height(*found[:, :2].T), abs=1e-12)
     contacts[:, 2] = 1.0
     contacts[17, 2] += 500.0
-    assert means(contacts)[0][:, 2].max() > 5.0
-    few, size = means(contacts[: STRIPS**2])
+    assert means(contacts, ALONG)[0][:, 2].max() > 5.0
+    few, size = means(contacts[: STRIPS**2], ALONG)
     assert size == 1
     assert np.array_equal(few, contacts[: STRIPS**2])
     # All in one place, or in one row, are no other case.
-    assert np.isfinite(means(np.zeros((5000, 3)))[0]).all()
+    assert np.isfinite(means(np.zeros((5000, 3)), ALONG)[0]).all()
 
 
 def test_the_residual_takes_what_a_sextic_leaves_of_strokes_too():
@@ -317,6 +320,56 @@ def test_a_stroke_may_be_a_contour_and_brings_its_noise():
     assert np.array_equal(r.height(1.0, 2.0), one.height(1.0, 2.0))
 
 
+def test_a_mean_takes_in_several_rows():
+    """Contacts that follow each other are off by one offset: of a row alone no mean would tell it."""
+    rng = np.random.default_rng(0)
+    for rows, most in ((12, LEAST_STRIPS), (100, STRIPS)):
+        x, y = np.meshgrid(np.linspace(-1.0, 1.0, 100), np.linspace(-1.0, 1.0, rows))
+        points = np.column_stack([x.ravel(), y.ravel(), np.repeat(rng.normal(0.0, 1.0, rows), 100)])
+        assert len(means(points, np.array([0.0, 1.0]))[0]) == most**2
+    assert len(means(rng.permutation(points), ALONG)[0]) == STRIPS**2
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_where_a_sensor_dwells_it_tells_no_more_of_the_shape(name):
+    points = wiped(name, 3000)
+    dwelling = np.vstack(
+        [points[:1234], noisy(np.repeat(points[1234:1235], 2000, axis=0), 1e-3, 0), points[1234:]]
+    )
+    plain, dwelled = alone(name, points), alone(name, dwelling)
+    assert dwelled.radius == pytest.approx(plain.radius, rel=0.005)
+    kappas = [dwelled.patch.k1, dwelled.patch.k2]
+    assert kappas == pytest.approx([plain.patch.k1, plain.patch.k2], abs=1e-3 / plain.radius)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_a_stray_contact_far_off_changes_nothing(name):
+    points = wiped(name, 500)
+    plain, other = alone(name, points), alone(name, np.vstack([points, [[300.0, 200.0, 50.0]]]))
+    assert other.radius == plain.radius
+    assert np.array_equal(other.contacts, plain.contacts)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_strokes_that_repeat_the_contours_change_nothing(name):
+    contours = crossed(name)
+    one, other = (SURFACES[name].fit(contours, strokes=s) for s in ([], [c.points for c in contours]))
+    assert np.array_equal(one.contacts, other.contacts)
+    assert np.array_equal(one.height([1.0, 2.0], 3.0), other.height([1.0, 2.0], 3.0))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_from_inside_strokes_show_the_mirror_image(name):
+    s, points = SURFACES[name], noisy(wiped(name, 3000), 0.05, 3)
+    outside, inside = (reconstruct(s.point, [], outward=n, strokes=[points]) for n in (s.normal, -s.normal))
+    assert inside.radius == pytest.approx(outside.radius, rel=1e-5)
+    assert inside.patch.k1 == pytest.approx(-outside.patch.k2, abs=1e-5 / outside.radius)
+    x, y = 0.5 * outside.radius * np.random.default_rng(0).uniform(-1.0, 1.0, (2, 200))
+    over = outside.frame.to_world(np.column_stack([x, y, outside.height(x, y)]))
+    u, v, w = inside.frame.to_local(over).T
+    assert inside.height(u, v) == pytest.approx(w, abs=1e-5 * outside.radius)
+
+
 ACROSS = np.array([0.0, 1.0, 0.0])
 LINE = np.column_stack([np.linspace(-9, 9, 200), np.zeros(200), np.zeros(200)])
 TURNS = np.linspace(0.0, 6.0, 200)
@@ -364,3 +417,12 @@ def test_coarse_coordinates_and_bad_arguments_are_refused_with_a_sentence():
             surface.fit([], strokes=strokes)
     with pytest.raises(ValueError, match='strokes: wanted none with "tagc", which is a method of contours'):
         surface.fit(crossed("pear"), strokes=[points], method="tagc")
+
+
+def test_on_a_plane_d1_points_to_the_farthest_contact():
+    flat = np.random.default_rng(2).uniform(-5.0, 5.0, (300, 2))
+    stroke = np.column_stack([np.vstack([flat, [[6.0, 8.0]]]), np.zeros(301)])
+    r = reconstruct((0, 0, 0), [], outward=(0, 0, 1), strokes=[Contour(stroke)])
+    assert r.frame.axes == pytest.approx(
+        np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]), abs=1e-6
+    )
