@@ -287,7 +287,7 @@ def edges():
     check("... whose patch ends at the edge, where its curves did", reach < 1.005, reach)
     record = seen["tactile"].to_dict()
     said = record["message"]
-    check("... and says so", "at a crease" in said and "directions" not in said, said)
+    check("... and says so", "at a crease" in said and "degrees" not in said, said)
     check("... and is flat", max(abs(record["k1"]), abs(record["k2"])) < 1e-4, (record["k1"], record["k2"]))
     picture("edge")
 
