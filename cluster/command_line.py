@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python -m cluster touch OBJECTS...`: a data set of touches from the shell."""
+"""`python -m cluster touch OBJECTS...`, or `whole`: a data set of touches, or of surfaces, from the shell."""
 
 import argparse
 import os
@@ -14,6 +14,7 @@ from typing import Any
 
 from .data_set.folder import DataSet
 from .data_set.options import Length, Options
+from .data_set.whole_options import WholeOptions
 from .engine import Engine, EngineError, connected
 from .extension import core
 from .input_files import KINDS, files_of
@@ -30,7 +31,8 @@ def main(words: Sequence[str] | None = None) -> int:
     if given.dashboard and find_spec("bokeh") is None:
         parser.error("--dashboard: wanted bokeh beside Dask, which draws it: install it")
     try:
-        run = Run(DataSet(given.output), _options(given), files_of(given.objects))
+        options = _whole_options(given) if given.command == "whole" else _options(given)
+        run = Run(DataSet(given.output, options.parts), options, files_of(given.objects))
         with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:
             if given.dashboard:
                 print(f"Dashboard: {client.dashboard_link}", file=sys.stderr)
@@ -77,6 +79,11 @@ def _options(given: argparse.Namespace) -> Options:
     )
 
 
+def _whole_options(given: argparse.Namespace) -> WholeOptions:
+    tolerance = given.tolerance and str(given.tolerance)
+    return WholeOptions(given.seed, str(given.noise), tolerance, given.most)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m cluster", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
@@ -85,6 +92,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_work(touch.add_argument)
     _add_touches(touch.add_argument)
+    whole = commands.add_parser("whole", help="touch objects all over, each as one surface and graph")
+    _add_work(whole.add_argument)
+    _add_whole(whole.add_argument)
     return parser
 
 
@@ -122,6 +132,16 @@ def _add_touches(add: Any) -> None:
     add("--degree", choices=["auto", *"23456"], default="auto", help="of the polynomial (%(default)s)")
     add("--weight", type=_positive, help="lambda L^2 of tagc and quadratic-variation (1000, 1e5)")
     add("--solver", choices=core.SOLVERS, default="fast", help="of tagc (%(default)s)")
+
+
+def _add_whole(add: Any) -> None:
+    """How to touch all over; all of it is in the manifest."""
+    add("--seed", type=int, default=0, help="of beginning and noise (%(default)s)")
+    help = "standard deviation of the sensor (0)"
+    add("--noise", type=_length, metavar="LENGTH", default=Length(0.0, False), help=help)
+    help = "how well the height of each patch is to be known (0.2%% of the object's size)"
+    add("--tolerance", type=_length, metavar="LENGTH", help=help)
+    add("--most", type=_count, default=1000, metavar="COUNT", help="touches of each object (%(default)s)")
 
 
 def _length(text: str) -> Length:

@@ -3,37 +3,32 @@
 """How far a run is, in one line: on a terminal it is written over, elsewhere a line now and then."""
 
 import sys
-from collections import Counter
 from time import monotonic
 
 EVERY = {True: 0.5, False: 10.0}  # seconds between lines, by whether they go to a terminal
 
 
 class Progress:
-    """Counts touches, of `total` that are to be made now, and says how many there are a second."""
+    """Counts touches or surfaces, of `total` to be made now, and says how many there are a second."""
 
-    def __init__(self) -> None:
+    def __init__(self, noun: str) -> None:
+        self.noun = noun
         self._is_terminal, self._width = sys.stderr.isatty(), 0
         self.begin(0)
 
     def begin(self, total: int) -> None:
-        """So many touches are to be made, from now on."""
-        self.total, self.counts = total, Counter[str]()
+        """So many are to be made, from now on."""
+        self.total, self.done, self.errors = total, 0, 0
         self.start = self._said = monotonic()
 
     @property
-    def done(self) -> int:
-        """Touches that were made."""
-        return sum(self.counts.values())
-
-    @property
     def rate(self) -> float:
-        """Touches a second."""
+        """How many a second."""
         return self.done / max(monotonic() - self.start, 1e-9)
 
-    def add(self, counts: dict[str, int], workers: int) -> None:
-        """Notes touches by their status, and says so where it is time."""
-        self.counts.update(counts)
+    def add(self, done: int, errors: int, workers: int) -> None:
+        """Notes that more are done, and says so where it is time."""
+        self.done, self.errors = self.done + done, self.errors + errors
         if monotonic() - self._said >= EVERY[self._is_terminal] or self.done == self.total:
             self._said = monotonic()
             self._say(self.line(workers))
@@ -42,12 +37,12 @@ class Progress:
         """As in "1,200 of 9,000 touches, 80 a second on 2 workers, 2 min left, 3 errors"."""
         left = (self.total - self.done) / self.rate if self.done else 0.0
         words = [
-            f"{self.done:,} of {self.total:,} touches",
+            f"{self.done:,} of {self.total:,} {self.noun}",
             f"{self.rate:.3g} a second on {workers} worker{'s'[: workers != 1]}",
         ]
         words.append(f"{_duration(left)} left")
-        if self.counts["error"]:
-            words.append(f"{self.counts['error']:,} errors")
+        if self.errors:
+            words.append(f"{self.errors:,} errors")
         return ", ".join(words)
 
     def note(self, text: str) -> None:

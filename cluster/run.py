@@ -12,6 +12,7 @@ from .data_set import manifest
 from .data_set.columns import COUNTS
 from .data_set.folder import DataSet, file_key
 from .data_set.options import Options
+from .data_set.whole_options import WholeOptions
 from .engine import Engine, Order, Outcome
 from .progress import Progress
 from .worker.process import FAILED, STOP
@@ -24,7 +25,7 @@ class StoppedError(Exception):
 class Run:
     """What is to be done for a data set, and how far it is."""
 
-    def __init__(self, data_set: DataSet, options: Options, files: list[str]) -> None:
+    def __init__(self, data_set: DataSet, options: Options | WholeOptions, files: list[str]) -> None:
         """Raises ValueError for the folder of another data set, OSError where it cannot be written to."""
         self.data_set, self.options, self.files = data_set, options, files
         self.old = manifest.read(data_set)
@@ -33,7 +34,7 @@ class Run:
         data_set.create()
         if self.old is None:
             manifest.write(data_set, options, {})
-        self.progress = Progress()
+        self.progress = Progress(options.parts)
 
     def work(self, engine: Engine) -> None:
         """All that is missing. Raises ValueError for files that have changed, StoppedError and OSError."""
@@ -51,13 +52,12 @@ class Run:
         orders = {self._label(*each): each for each in missing}
         for outcome in self._outcomes(engine, (self._order(*each) for each in missing)):
             facts, block = orders[outcome.order.label]
-            counts = outcome.value["counts"] if outcome.how != FAILED else {}
+            numbers, errors = self.options.numbers(block), 0
             if outcome.how == FAILED:
-                numbers = self.options.numbers(block)
                 self.progress.note(f"{outcome.order.label}: {outcome.value}")
                 self.data_set.write_errors(facts, block, numbers, outcome.value)
-                counts = {"error": len(numbers)}
-            self.progress.add(counts, engine.threads)
+                errors = len(numbers)
+            self.progress.add(len(numbers), errors, engine.threads)
         self.progress.end()
 
     def _survey(self, engine: Engine, done: set[str]) -> list[dict[str, Any]]:
@@ -101,7 +101,9 @@ class Run:
 
     def _order(self, facts: dict[str, Any], block: int) -> Order:
         path = str(self.data_set.block_path(facts["hash"], block).resolve())
-        return Order(self._label(facts, block), "touch", (facts, self.options.to_dict(), block, path))
+        return Order(
+            self._label(facts, block), self.options.command, (facts, self.options.to_dict(), block, path)
+        )
 
     def _label(self, facts: dict[str, Any], block: int) -> str:
         return f"{_title(facts)} block {block}"

@@ -15,7 +15,7 @@ def summary(rows: list[dict[str, Any]], run: Any) -> str:
     words = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in totals.items())
     lines = [f"{len(rows):,} objects, {sum(totals.values()):,} touches: {words}"]
     if run.progress.done:
-        lines.append(f"{run.progress.done:,} of them now, {run.progress.rate:.3g} a second")
+        lines.append(f"{run.progress.done:,} {run.progress.noun} now, {run.progress.rate:.3g} a second")
     wrong = [row for row in rows if row["error"]]
     for row in wrong[:MOST]:
         lines.append(f"{row['object']} ({row['file']}): {row['error']:,} errors: {row['message']}")

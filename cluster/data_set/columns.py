@@ -51,10 +51,43 @@ OBJECTS = (
     ("unit", NUMBER, "m", "length of the object's unit; null where the file does not say"),
     ("vertices", pa.int64(), "", "of its evaluated mesh"),
     ("triangles", pa.int64(), "", "of its evaluated mesh"),
-    ("touches", pa.int64(), "", "rows of it"),
+    ("touches", pa.int64(), "", "how many there are of it; one where there is none but an error"),
     *((name, pa.int64(), "", "how many of the touches are so") for name in COUNTS),
     ("seconds", NUMBER, "s", "processor time of its touches"),
     ("message", WORD, "", "of its first error"),
+)
+INTEGERS = pa.list_(pa.int32())
+FOUND = (
+    ("tolerance", NUMBER, LENGTH, "that each patch's height was to be known to"),
+    ("uncovered", pa.int64(), "", "places of rims beyond which there is something that was not felt"),
+    ("is_closed", pa.bool_(), "", "whether the surface is, all round"),
+    ("height_std", NUMBER, LENGTH, "standard deviation of the surface, in the mean of its vertices"),
+    ("deviation_mean", NUMBER, LENGTH, "mean distance of the surface's vertices to the mesh"),
+    ("deviation_max", NUMBER, LENGTH, "largest distance of one of the surface's vertices to the mesh"),
+)
+SURFACES = (
+    *TOUCHES[:2],
+    ("seed", pa.int64(), "", "of the whole data set; beginning and noise follow from it and hash"),
+    ("status", WORD, "", "ok, uncertain; error: no surface"),
+    ("message", WORD, "", "the status in a sentence"),
+    ("noise", NUMBER, LENGTH, "standard deviation of the simulated sensor"),
+    ("touches", pa.int64(), "", "that found a patch"),
+    ("in_doubt", pa.int64(), "", "how many of the patches are so"),
+    *FOUND,
+    ("vertices", NUMBERS, LENGTH, "x, y, z of each vertex of the surface, in the file's coordinates"),
+    ("triangles", INTEGERS, "", "three vertices each, counterclockwise from outside, from 0"),
+    ("vertex_stds", NUMBERS, LENGTH, "standard deviation of the surface at each vertex"),
+    ("vertex_deviations", NUMBERS, LENGTH, "of each vertex from the mesh, positive outside it"),
+    ("vertex_nodes", INTEGERS, "", "the node that counts most at each vertex"),
+    ("origins", NUMBERS, LENGTH, "x, y, z of the origin of each node's frame, in the file's coordinates"),
+    ("axes", NUMBERS, "", "d1, d2 and normal of each node's frame, nine numbers each"),
+    ("radii", NUMBERS, LENGTH, "L of each node's patch"),
+    ("k1", NUMBERS, PER_LENGTH, "smaller principal curvature of each node"),
+    ("k2", NUMBERS, PER_LENGTH, "larger principal curvature of each node"),
+    ("k1_stds", NUMBERS, PER_LENGTH, "standard deviation of k1 of each node"),
+    ("k2_stds", NUMBERS, PER_LENGTH, "standard deviation of k2 of each node"),
+    ("height_stds", NUMBERS, LENGTH, "of each node's patch, in the mean over its domain"),
+    ("edges", INTEGERS, "", "of the graph: two nodes each, whose patches share a boundary"),
 )
 
 
@@ -65,7 +98,12 @@ def _schema(columns: tuple[tuple[str, pa.DataType, str, str], ...]) -> pa.Schema
     )
 
 
-TOUCH_SCHEMA, OBJECT_SCHEMA = _schema(TOUCHES), _schema(OBJECTS)
+TOUCH_SCHEMA = _schema(TOUCHES)
+# By the name of the folder that has them: of its files, and of the file of objects beside it.
+SCHEMAS = {
+    "touches": (TOUCH_SCHEMA, _schema(OBJECTS)),
+    "surfaces": (_schema(SURFACES), _schema((*OBJECTS, *FOUND))),
+}
 
 
 def table(rows: list[dict[str, Any]], schema: pa.Schema, metadata: dict[str, str] | None = None) -> pa.Table:

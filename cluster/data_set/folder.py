@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The folder of a data set: a file of touches for each block, a manifest, and a file of objects at the end.
+"""The folder of a data set: a file for each task's rows, a manifest, and a file of objects at the end.
 
 All are written aside and renamed, so that there are only whole ones.
 """
@@ -14,7 +14,7 @@ from typing import Any
 import pyarrow.parquet as pq
 
 from ..extension import addon
-from .columns import OBJECT_SCHEMA, REPEATED, TOUCH_SCHEMA, kind_of, table
+from .columns import REPEATED, SCHEMAS, TOUCH_SCHEMA, table
 
 whole_file = addon("files.whole_file")
 SUMMARY = "summary"  # key of a file's metadata
@@ -37,10 +37,10 @@ def file_key(path: str, name: str) -> str:
 
 
 class DataSet:
-    """The files of a data set in `folder`."""
+    """The files of a data set in `folder`; its rows are in the folder `parts`: touches, or surfaces."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.touches = folder, folder / "touches"
+    def __init__(self, folder: Path, parts: str = "touches") -> None:
+        self.folder, self.parts = folder, folder / parts
         self.manifest, self.objects = folder / "manifest.json", folder / "objects.parquet"
         self.log = folder / "log.txt"
 
@@ -50,8 +50,8 @@ class DataSet:
         Raises OSError, with a sentence, where nothing can be written to it.
         """
         try:
-            self.touches.mkdir(parents=True, exist_ok=True)
-            for left in self.touches.glob(".*.parquet"):
+            self.parts.mkdir(parents=True, exist_ok=True)
+            for left in self.parts.glob(".*.parquet"):
                 left.unlink(missing_ok=True)
         except OSError as error:
             raise OSError(
@@ -60,16 +60,16 @@ class DataSet:
 
     def block_path(self, key: str, block: int) -> Path:
         """Of the file of a block."""
-        return self.touches / f"{key}-{block:05d}.parquet"
+        return self.parts / f"{key}-{block:05d}.parquet"
 
     def done(self) -> set[str]:
-        """Names, without what follows the block, of all files of touches."""
-        names = (path.name for path in self.touches.glob("[!.]*.parquet"))
+        """Names, without what follows the block, of all files of rows."""
+        names = (path.name for path in self.parts.glob("[!.]*.parquet"))
         return {name.removesuffix(ERROR).removesuffix(".parquet") for name in names}
 
     def summaries(self) -> Iterator[dict[str, Any]]:
-        """The summary of each file of touches, in the order of their names."""
-        for path in sorted(self.touches.glob("[!.]*.parquet")):
+        """The summary of each file of rows, in the order of their names."""
+        for path in sorted(self.parts.glob("[!.]*.parquet")):
             yield json.loads(pq.read_schema(path).metadata[SUMMARY.encode()])
 
     def write_errors(self, facts: dict[str, Any], block: int | None, numbers: range, message: str) -> None:
@@ -78,24 +78,23 @@ class DataSet:
         rows = [common | {"touch": i, "status": "error", "message": message} for i in numbers]
         key = facts.get("hash") or file_key(facts["file"], facts["name"])
         path = self.block_path(key, block or 0)
-        write_block(path.with_name(path.stem + ERROR), rows, facts, 0.0)
+        write_block(path.with_name(path.stem + ERROR), rows, facts, 0.0, {"error": len(rows)})
 
     def write_objects(self, rows: Sequence[dict[str, Any]]) -> None:
         """The file of objects."""
-        _write(self.objects, table(list(rows), OBJECT_SCHEMA))
+        _write(self.objects, table(list(rows), SCHEMAS[self.parts.name][1]))
 
 
-def write_block(path: Path, rows: list[dict[str, Any]], facts: dict[str, Any], seconds: float) -> dict:
-    """Writes rows of touches of the object of these facts; returns the file's summary.
+def write_block(
+    path: Path, rows: list[dict[str, Any]], facts: dict[str, Any], seconds: float, counts: dict[str, int]
+) -> dict:
+    """Writes rows about the object of these facts, and how many touches ended how; the file's summary.
 
     Raises OSError, with a sentence, where the file cannot be written.
     """
-    counts: dict[str, int] = {}
-    for row in rows:
-        counts[kind_of(row["status"])] = counts.get(kind_of(row["status"]), 0) + 1
     message = rows[0]["message"] if "error" in counts else None
     summary = {"facts": facts, "counts": counts, "seconds": seconds, "message": message}
-    _write(path, table(rows, TOUCH_SCHEMA, {SUMMARY: json.dumps(summary)}))
+    _write(path, table(rows, SCHEMAS[path.parent.name][0], {SUMMARY: json.dumps(summary)}))
     return summary
 
 

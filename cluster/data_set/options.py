@@ -38,8 +38,17 @@ class Length:
         return f"{100.0 * self.value:.12g}%" if self.is_share else f"{self.value:.12g}"
 
 
+class Lengths:
+    """Options of which some are lengths, as words."""
+
+    def length(self, name: str, size: float) -> float | None:
+        """One of the lengths on an object of that size; None where it is chosen."""
+        words = getattr(self, name)
+        return None if words is None else Length.of(words).on(size)
+
+
 @dataclass(frozen=True)
-class Options:
+class Options(Lengths):
     """All that rows depend on beside the object; lengths are words, see Length, None where they are chosen.
 
     touches : of each object; block : touches of a task, which are one file
@@ -60,6 +69,8 @@ class Options:
     degree: str
     weight: float | None
     solver: str
+
+    command, parts = "touch", "touches"
 
     def __post_init__(self) -> None:
         """Raises ValueError, with a sentence, for options that no touch can have."""
@@ -86,11 +97,6 @@ class Options:
         """The sampling planes."""
         pairs = zip(self.azimuths, self.tilts, strict=True)
         return [core.SamplingPlane(math.radians(a), math.radians(t)) for a, t in pairs]
-
-    def length(self, name: str, size: float) -> float | None:
-        """One of the lengths on an object of that size; None where it is chosen."""
-        words = getattr(self, name)
-        return None if words is None else Length.of(words).on(size)
 
     def fit(self) -> dict[str, Any]:
         """What core.reconstruct takes."""

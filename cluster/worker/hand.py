@@ -12,15 +12,18 @@ import queue
 import signal
 import sys
 import threading
+from collections import Counter
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from ..data_set import manifest
+from ..data_set.columns import FOUND, kind_of
 from ..data_set.folder import write_block
 from ..data_set.options import Options
-from . import objects, touches
+from ..data_set.whole_options import WholeOptions
+from . import objects, surfaces, touches
 from .process import DONE, FAILED, STOP
 
 
@@ -53,10 +56,13 @@ class Hand:
     def touch(self, facts: dict[str, Any], options: dict[str, Any], block: int, path: str) -> dict[str, Any]:
         """Touches an object, and writes the rows of that block to the file `path`; their summary."""
         rows, seconds = touches.touched(self._object(facts), Options.from_dict(options), block)
-        try:
-            return write_block(Path(path), rows, facts, seconds)
-        except OSError as error:
-            raise HopelessError(str(error)) from error
+        return _written(path, rows, facts, seconds, Counter(kind_of(row["status"]) for row in rows))
+
+    def whole(self, facts: dict[str, Any], options: dict[str, Any], block: int, path: str) -> dict[str, Any]:
+        """Touches an object all over, and writes its row to the file `path`; the file's summary."""
+        row, seconds = surfaces.surface(self._object(facts), WholeOptions(**options))
+        counts = {"ok": row["touches"] - row["in_doubt"], "in_doubt": row["in_doubt"]}
+        return _written(path, [row], facts | {name: row[name] for name, *_ in FOUND}, seconds, counts)
 
     def _object(self, facts: dict[str, Any]) -> Any:
         if self._target is None or self._target.facts != facts:
@@ -67,6 +73,13 @@ class Hand:
                 self._target = None
                 raise OSError(f'"{facts["file"]}" has changed since it was first read')
         return self._target
+
+
+def _written(path: str, *content: Any) -> dict[str, Any]:
+    try:
+        return write_block(Path(path), *content)
+    except OSError as error:
+        raise HopelessError(str(error)) from error
 
 
 def answered(run: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:

@@ -19,6 +19,7 @@ SCENES = (".blend", ".obj")  # files of several objects, which have names of the
 class Touchable:
     """An evaluated mesh object of the open scene, to be touched many times.
 
+    obj : of the scene, which is good until another file is opened
     surface : for core, in the directions of the world from the object's origin
     offset : (3,), of that origin in the world
     points, triangles : (n, 3) and (m, 3), counterclockwise from outside, as in `surface`
@@ -28,6 +29,7 @@ class Touchable:
     def __init__(self, obj: Any, path: str) -> None:
         """Raises ValueError, with a sentence, where `obj` cannot be touched."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
+        self.obj = obj
         evaluated, linear, self.offset = evaluated_mesh.evaluated_object(obj, depsgraph)
         self.surface = detached_mesh.DetachedMesh(obj, depsgraph)
         self.points, self.triangles = self.surface.points, _triangles(evaluated.data, linear)

@@ -68,7 +68,7 @@ def test_units_and_meanings_are_in_the_file_and_in_the_manual(plain):
     schema = pq.read_schema(blocks_of(plain)[0])
     assert schema.field("k1").metadata[b"unit"] == b"1 / object's unit"
     page = (Path(__file__).parents[2] / "docs" / "data_sets.md").read_text(encoding="utf-8")
-    for name, _, unit, meaning in (*columns.TOUCHES, *columns.OBJECTS):
+    for name, _, unit, meaning in (*columns.TOUCHES, *columns.OBJECTS, *columns.SURFACES):
         assert f"| `{name}` | {unit} | {meaning} |" in page, name
 
 

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How whole objects are touched: what the words of `whole` say, checked."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from .options import Length, Lengths
+
+
+@dataclass(frozen=True)
+class WholeOptions(Lengths):
+    """All that surfaces depend on beside the object; an object is one task, and one row.
+
+    tolerance : deviation of the height that each patch is to be below, a length as in Options; None for auto
+    most : touches of an object
+    """
+
+    seed: int
+    noise: str
+    tolerance: str | None
+    most: int
+
+    command, parts, touches = "whole", "surfaces", 1
+
+    def __post_init__(self) -> None:
+        """Raises ValueError, with a sentence, for options that no object can be touched with."""
+        if self.seed < 0:
+            raise ValueError(f"seed: wanted a number of 0 or more, got {self.seed}")
+        if self.tolerance is None:
+            return
+        tolerance, noise = Length.of(self.tolerance), Length.of(self.noise)
+        if tolerance.is_share == noise.is_share and tolerance.value < noise.value:
+            raise ValueError(f"tolerance: wanted the noise {noise} or more, got {tolerance}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+    def blocks(self) -> range:
+        """The number of the only task."""
+        return range(1)
+
+    def numbers(self, block: int) -> range:
+        """The number of its only row."""
+        return range(1)
