@@ -27,7 +27,7 @@ from . import ROOT, SCANS_FOLDER, machine, table
 from .real import Scan
 
 SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
-TOLERANCES = (0.008, 0.004, 0.002, 0.001, 0.0005)
+TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
 NOISE, COMPARED, POINTS, MOST = 0.0005, 0.001, 2500, 1500
 EDGE = 0.01
 
@@ -112,13 +112,13 @@ def poisson(points, normals, depth, weight):
     meshes.generate_surface_reconstruction_screened_poisson(
         depth=depth, fulldepth=5, pointweight=weight, threads=1
     )
-    return meshes.current_mesh()
+    return _matrices(meshes)
 
 
 def moving_squares(points, normals, method, scale):
     meshes = _cloud(points, normals)
     getattr(meshes, f"generate_marching_cubes_{method}")(filterscale=scale, resolution=150)
-    return meshes.current_mesh()
+    return _matrices(meshes)
 
 
 def _cloud(points, normals):
@@ -127,6 +127,12 @@ def _cloud(points, normals):
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
     return meshes
+
+
+def _matrices(meshes):
+    """Of the mesh, before its set is gone."""
+    mesh = meshes.current_mesh()
+    return mesh.vertex_matrix(), mesh.face_matrix()
 
 
 def implicit_basis(points, normals, at, smoothing, offset=0.01):
@@ -163,15 +169,14 @@ def peers(thing, found):
 
     def meshed(method):
         def run(*options):
-            mesh = method(points, normals, *options)
-            return off_mesh(mesh.vertex_matrix(), mesh.face_matrix(), at)
+            return off_mesh(*method(points, normals, *options), at)
 
         return run
 
     tried = {
-        "screened Poisson": (meshed(poisson), list(product((6, 7, 8, 9), (4.0, 10.0)))),
-        "RIMLS": (meshed(moving_squares), [("rimls", s) for s in (3.0, 6.0, 10.0)]),
-        "APSS": (meshed(moving_squares), [("apss", s) for s in (3.0, 6.0, 10.0)]),
+        "screened Poisson": (meshed(poisson), list(product((7, 8), (4.0, 10.0)))),
+        "RIMLS": (meshed(moving_squares), [("rimls", s) for s in (4.0, 8.0)]),
+        "APSS": (meshed(moving_squares), [("apss", s) for s in (4.0, 8.0)]),
         "RBF implicit": (lambda s: implicit_basis(points, normals, at, s), [(0.0,), (1e-6,), (1e-4,)]),
         "GP implicit": (lambda s: implicit_process(points, normals, at, s), [(0.3,), (1.0,)]),
     }

@@ -53,6 +53,23 @@ def write(path, numbered):
     path.write_text("\n".join(["curve,x [mm],y [mm],z [mm]", *lines]) + "\n")
 
 
+def suzanne(bpy):
+    """A scene with her, active, and a copy named Scan; returns a place on her forehead, the cursor."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.mesh.primitive_monkey_add(size=2.0)
+    obj, place = bpy.context.object, (0.32, -0.19, 0.84)
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    bpy.context.scene.cursor.location = place
+    scan = obj.copy()
+    scan.name = "Scan"
+    bpy.context.scene.collection.objects.link(scan)
+    return place
+
+
+def save(bpy, path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+
+
 @pytest.fixture
 def folder(empty, scans, tmp_path, monkeypatch):
     """The files that samples read, in the current folder, and the scene that is open."""
@@ -64,15 +81,12 @@ def folder(empty, scans, tmp_path, monkeypatch):
     for name, points in zip("abc", measured, strict=True):
         write(tmp_path / f"{name}.csv", [(name, points)])
     write(tmp_path / "strokes.csv", [("stroke", rows())])
-    empty.ops.mesh.primitive_monkey_add(size=2.0)
-    suzanne = empty.context.object
-    suzanne.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    empty.context.scene.cursor.location = (0.32, -0.19, 0.84)
-    scan = suzanne.copy()
-    scan.name = "Scan"
-    empty.context.scene.collection.objects.link(scan)
+    place = suzanne(empty)
+    empty.ops.tactile.pick(target="Suzanne", location=place)
+    save(empty, tmp_path / "probes.blend")
+    suzanne(empty)
     for name in ("scene", "scan"):
-        empty.ops.wm.save_as_mainfile(filepath=str(tmp_path / f"{name}.blend"), copy=True)
+        save(empty, tmp_path / f"{name}.blend")
     return tmp_path
 
 
@@ -112,6 +126,7 @@ def run_shell(bpy, command, line):
     words = shlex.split(line)
     at = words.index("-c")
     assert words[0] == "blender" and words[at + 1] == "tactile", line
+    bpy.ops.wm.read_homefile(use_empty=True)  # each line is a Blender of its own
     if words[1] == "-b":
         bpy.ops.wm.open_mainfile(filepath=str(Path(words[2]).resolve()))
     code, out, err = command(*words[at + 2 :])

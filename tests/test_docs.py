@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import core
 from tools import check_site
 
 ROOT = Path(__file__).parent.parent
@@ -62,6 +63,30 @@ def test_the_readme_is_short_and_its_picture_small():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= MOST_LINES
     assert (ROOT / "docs" / "film.webp").stat().st_size < MOST_BYTES
+
+
+def test_the_figures_of_the_readme_are_those_of_the_docs():
+    readme, speed, stability = (
+        " ".join((ROOT / name).read_text(encoding="utf-8").split())
+        for name in ("README.md", "docs/speed_and_accuracy.md", "docs/stability.md")
+    )
+    process, cubic = re.search(
+        r"is (\S+) of a Gaussian process's and (\S+) of a cubic spline's", readme
+    ).groups()
+    assert f"the mean error is {process} of the Gaussian process's, {cubic} of the cubic spline's" in speed
+    low, high = re.search(r"the 90 % intervals hold (\d+) to (\d+) % of the surface", readme).groups()
+    assert f"Its intervals hold {low} to {high} % here" in speed
+    rows = re.findall(r"\| \w+, 1/(?:8|32) \| (\d+) \| \d+ \| \d+ \| (\d+) \|", stability)
+    assert f"{sum(int(patches) for patches, _ in rows)} patches on scans" in readme
+    assert {silent for _, silent in rows} == {"0"}
+    (update,) = re.findall(r"\| 1000000 \| 454 \|(?: \S+ \|){4} (\S+) \|", speed)
+    assert f"in {float(update):.0f} ms" in readme
+
+
+def test_the_reference_has_all_that_core_offers():
+    page = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    offered = {name for name in core.__all__ if callable(getattr(core, name))}
+    assert set(re.findall(r"^::: core\.(\w+)$", page, re.MULTILINE)) == offered
 
 
 def test_the_citation_has_the_version():

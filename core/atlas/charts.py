@@ -116,7 +116,7 @@ class Charts:
         off = (z - h) / (1.0 + hx**2 + hy**2)
         foot_x, foot_y = x + off * hx, y + off * hy
         share = self.shares(foot_x, foot_y, node)
-        inside = (share < MARGIN) & (np.abs(off) < reach)
+        inside = (share < np.maximum(MARGIN, 1.0 + room / self.radii[node])) & (np.abs(off) < reach)
         place, node, x, y, z, foot_x, foot_y, share = (
             values[inside] for values in (place, node, x, y, z, foot_x, foot_y, share)
         )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from .charts import MARGIN, Charts, Pairs
 
+BEYOND = 0.999  # of MARGIN, at which a weight stays: no more than that is one beyond it
 FLOOR = 1e-3  # of the radius, that no deviation is taken below in a weight
 AGREE, DIFFER = 0.64, 0.34  # cosines of 50 and 70 degrees: between them a patch fades out of a blend
 LAYER = 0.15  # of the radius, that patches of one wall may differ in height at most
@@ -35,8 +36,16 @@ class Blend(NamedTuple):
 
 
 def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
-    """The field at places (k, 3); `room` is a length that patches reach at least."""
-    return blend_of(charts, charts.pairs(points, room), len(points))
+    """The field at places (k, 3); `room` is a length that patches reach at least.
+
+    Beyond its rim a patch tells on which side of it a place is, where no other does.
+    """
+    pairs = charts.pairs(points, room)
+    if room:
+        sure = (pairs.share <= 1.0) & (np.abs(pairs.distance) < room)
+        known = np.bincount(pairs.place[sure], minlength=len(points)) > 0
+        pairs = pairs.chosen((pairs.share < MARGIN) | ~known[pairs.place])
+    return blend_of(charts, pairs, len(points))
 
 
 def blend_of(charts: Charts, pairs: Pairs, count: int) -> Blend:
@@ -57,7 +66,7 @@ _Wall = tuple[Blend, Array]  # with the places of the patches' origins
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
     """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), u the share of MARGIN times the domain's radius."""
-    u = pairs.share / MARGIN
+    u = np.minimum(pairs.share / MARGIN, BEYOND)
     floor = FLOOR * charts.radii[pairs.node]
     weights: Array = (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (pairs.std**2 + floor**2)
     return weights
@@ -106,8 +115,7 @@ def _mean(
     """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
 
     def total(values: Array) -> Array:
-        # Of nothing numpy counts integers.
-        return np.bincount(place, w * values, count).astype(np.float64)
+        return np.bincount(place, w * values, count).astype(np.float64)  # of nothing: whole numbers
 
     some = total(np.ones(len(w)))
     there = some > 0.0

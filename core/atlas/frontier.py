@@ -117,8 +117,7 @@ class Frontier:
     def uncovered(self) -> list[Place]:
         """Places where a touch would bring something, but there was none, or it brought nothing."""
         self._forget_covered()
-        given_up = self._still_open(self.left)
-        return [place for _, _, place in sorted(self.queue)] + given_up
+        return [place for _, _, place in sorted(self.queue)] + self._still_open(self.left)
 
     def _still_open(self, places: list[Place]) -> list[Place]:
         """Those of places that no patch has come to cover."""
@@ -163,18 +162,15 @@ class Frontier:
             return None
         at = along(found[0], up, HAIR * place.radius)
         for way, length in ((t, s), (down, 1.5 * s), (scaled(t, -1.0), 2.5 * s), (up, 1.5 * s)):
-            hit = self.surface.ray_cast(at, way, length)
-            if hit is not None:
-                contact = self.felt(hit)
-                return contact if dot(contact[1], way) < 0.0 else None
+            if self.surface.ray_cast(at, way, length) is not None:
+                return self.toward(at, way, length)
             at = along(at, way, length)
         return None
 
     def toward(self, start: Vector, way: Vector, length: float) -> Contact | None:
         """The first contact on a ray; none at the back of a surface: there the finger would be inside."""
         hit = self.surface.ray_cast(start, way, length)
-        contact = None if hit is None else self.felt(hit)
-        return contact if contact is not None and dot(contact[1], way) < 0.0 else None
+        return None if hit is None or dot(self.felt(hit)[1], way) >= 0.0 else self.felt(hit)
 
     def covered(self, point: Vector, normal: Vector) -> bool:
         """Whether a place lies inside a patch that faces its way."""

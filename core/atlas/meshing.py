@@ -24,6 +24,7 @@ CELL = 2.1  # edges of the mesh in a cell of the lattice
 CLIP = 0.25  # of a lattice edge, that a vertex is off its ends at least
 ROOM = 1.2  # cubes, that patches reach at least
 STEEP = 1.8  # slope of the field beyond which it jumps, from wall to wall, and has no surface
+SPECK = 40  # triangles that a piece of the mesh has at least, beside the largest
 SMOOTHINGS, EVEN = 3, 0.6  # passes, and share of the way to the mean of its neighbors
 AT_ONCE = 8000  # places of the field in a step
 MOST_CELLS = 20_000_000
@@ -81,7 +82,21 @@ def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
             parts.append(part)
             yield 0.5 + 0.5 * (done + start / max(len(vertices), 1)) / (SMOOTHINGS + 1)
         field = Blend(*(np.concatenate(values) for values in zip(*parts, strict=True)))
-    return Mesh(vertices, triangles, field.std, field.node)
+    return _felt(vertices, triangles, field)
+
+
+def _felt(vertices: Array, triangles: Indices, field: Blend) -> Mesh:
+    """The mesh without triangles that reach beyond what was felt, and without specks at rims."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    triangles = triangles[(field.node >= 0)[triangles].all(axis=1)]
+    links = np.ones(2 * len(triangles)), (triangles[:, :2].ravel(), triangles[:, 1:].ravel())
+    piece = connected_components(coo_matrix(links, (len(vertices),) * 2))[1][triangles[:, 0]]
+    sizes = np.bincount(piece, minlength=1)
+    triangles = triangles[sizes[piece] >= min(SPECK, sizes.max())]
+    used, index = np.unique(triangles, return_inverse=True)
+    return Mesh(vertices[used], index.reshape(-1, 3), field.std[used], field.node[used])
 
 
 def _cells(charts: Charts, size: float) -> Indices:

@@ -85,8 +85,7 @@ class Reconstruction:
     @cached_property
     def misses(self) -> Array:
         """At which distance each of the c curves passes the reference point, and its deviation, (c, 2)."""
-        origin = self.frame.origin
-        curves = self.known_curves or curves_through(*stacked(origin[None], [self.contours]))
+        curves = self.known_curves or curves_through(*stacked(self.frame.origin[None], [self.contours]))
         return misses(curves)[0, : len(self.contours)]
 
     @cached_property
@@ -231,8 +230,7 @@ class Reconstruction:
         if self.posterior.is_round:
             message += " The curvatures are alike, so there are no principal directions."
         if self.blind:
-            verb = "is" if self.blind == 1 else "are"
-            terms = terms_to(self.patch.degree)
+            verb, terms = "is" if self.blind == 1 else "are", terms_to(self.patch.degree)
             message += f" {self.blind} of {terms} coefficients {verb} invisible to these planes."
         return message
 

@@ -91,7 +91,7 @@ def _draw_planes(layout, settings):
     heading = column.row(align=True)
     for text in ("Azimuth", "Tilt"):
         heading.label(text=text)
-    heading.label(icon="BLANK1")  # above the buttons of the rows
+    heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
     for i in range(settings.plane_count):
         row = column.row(align=True)
         row.use_property_split = False
@@ -145,7 +145,6 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             _draw_verification(context, column, record["verification"], unit)
         if found is not None:
             draw_rows(context, layout, plane_rows(record, unit), active=not is_outdated)
-            layout.operator(TACTILE_OT_add_plane.bl_idname, icon="ADD")
 
 
 class TACTILE_PT_object(_Sidebar, bpy.types.Panel):

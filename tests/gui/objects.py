@@ -261,7 +261,7 @@ def handles():
 
 
 def edges():
-    """A point near the edge of a block: what the ring of a pick and the patch promise there."""
+    """A point near a corner of a block: what the ring of a pick and the patch promise there."""
     bpy.data.objects[TARGET].hide_set(True)
     bpy.ops.mesh.primitive_cube_add(location=(0, 0, 8))
     block = bpy.context.object
@@ -270,7 +270,7 @@ def edges():
     yield 1
     gui.click(*PICK_BUTTON)
     yield 1
-    at = gui.view_point((0.8, 0.2, 9.0))
+    at = gui.view_point((0.85, 0.8, 9.0))
     gui.xdo("mousemove", *map(round, at))
     yield 2
     picture("edge_preview")
@@ -287,7 +287,7 @@ def edges():
     check("... whose patch ends at the edge, where its curves did", reach < 1.005, reach)
     record = seen["tactile"].to_dict()
     said = record["message"]
-    check("... and says so", "at a crease" in said and "directions" not in said, said)
+    check("... and says so", "at a crease" in said and "degrees" not in said, said)
     check("... and is flat", max(abs(record["k1"]), abs(record["k2"])) < 1e-4, (record["k1"], record["k2"]))
     picture("edge")
 

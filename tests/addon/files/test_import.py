@@ -152,7 +152,7 @@ def test_strokes_beside_contours_are_fitted_and_go_out_again(extension, empty, t
     path = wiped(extension, tmp_path / "both.csv", True, also=contours_of(SURFACE))
     _, report = imported(empty, path, point=list(SURFACE.point))
     assert (report["curves"], report["strokes"]) == (3, 12)
-    assert report["contacts"] > 150
+    assert report["contacts"] > 100  # of the strokes 36 to 100 means
     out = tmp_path / "out.csv"
     empty.ops.tactile.export_contacts(filepath=str(out))
     _, again = imported(empty, str(out))

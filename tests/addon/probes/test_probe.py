@@ -810,7 +810,7 @@ def test_disabling_takes_handler_and_properties_away_and_enabling_brings_them_ba
 
 
 def test_an_instance_is_not_touched_for_what_it_shows(empty, ball, extension):
-    touchable = extension.tactile_addon.viewport.pick._require_touchable
+    touchable = extension.tactile_addon.viewport.below._require_touchable
     touchable(ball, ball.matrix_world.copy())
     with pytest.raises(ValueError, match=f'This is an instance of "{ball.name}": make it real'):
         touchable(ball, Matrix.Translation((5.0, 0.0, 0.0)))

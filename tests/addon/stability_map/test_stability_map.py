@@ -37,7 +37,9 @@ def edited(bpy, **cuts):
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_a_ball_is_alike_all_over(empty, ball):
+def test_a_ball_is_alike_all_over(empty):
+    # Facets twice as large are texture to some touches and none to others.
+    empty.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128, radius=2.0)
     painted, record = stability_map(empty, spacing=0.4, degree=4)
     assert record["points"] == record["touched"] == record["patches"]
     assert record["in_doubt"] == 0
@@ -46,7 +48,7 @@ def test_a_ball_is_alike_all_over(empty, ball):
     assert not values(mesh, "reason").any()
     error, std = values(mesh, "error"), values(mesh, "height_std")
     assert error.min() > 0.0
-    assert error.max() < 0.001  # facets are 0.0006 inside the ball
+    assert error.max() < 0.001  # facets are 0.00015 inside the ball
     assert std.max() < 2.0 * std.min()
     assert values(mesh, "blind_share") == pytest.approx(3 / 14)
     assert values(mesh, "condition_number").min() > 1.0

@@ -388,3 +388,16 @@ def test_six_planes_are_the_most_unless_more_are_wanted(monkeypatch):
     assert len(core.explore(s, s.point, s.normal, **given).planes) == 6
     assert len(core.explore_many(s, [s.point], [s.normal], **given)[0].planes) == 6
     assert len(core.explore(s, s.point, s.normal, most_planes=4, **given).planes) == 4
+
+
+def test_a_deviation_that_is_large_enough_ends_growth():
+    """Half curves end sooner where the patch is to be known better."""
+    place = surfaces.sphere(30.0)
+    wide, narrow = (
+        core.explore(place, place.point, place.normal, farthest=24.0, largest_std=std, noise=0.02, rng=0)
+        for std in (0.2, 0.02)
+    )
+    assert narrow.extent < wide.extent
+    assert narrow.result.mean_height_std < wide.result.mean_height_std
+    with pytest.raises(ValueError, match="largest_std: wanted a finite number above 0"):
+        core.explore(place, place.point, place.normal, largest_std=0.0)

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole objects where methods fail: far away, in other units, noisy, outlying, thin, in contact, endless."""
+
+import math
+
+import numpy as np
+import pytest
+
+import core
+from tests import solids
+
+
+def explored(solid, **options):
+    return core.explore_object(solid, solid.start, solid.outward, rng=0, **{"tolerance": 8e-3} | options)
+
+
+class Outlying:
+    """Every tenth ray hits beside the surface."""
+
+    def __init__(self, solid, off):
+        self.solid, self.off, self.count = solid, off, 0
+
+    def ray_cast(self, origin, direction, distance):
+        hit = self.solid.ray_cast(origin, direction, distance)
+        self.count += 1
+        if hit is None or self.count % 10:
+            return hit
+        return tuple(np.add(hit[0], np.multiply(self.off, hit[1]))), hit[1]
+
+
+@pytest.mark.parametrize(
+    ("scale", "shift"), [(1e-6, (0, 0, 0)), (1e6, (0, 0, 0)), (1.0, (1e5, -2e5, 3e5)), (1e3, (1e6, 0, 1e6))]
+)
+def test_no_unit_and_no_origin_matters(scale, shift):
+    plain = explored(solids.ball())
+    solid = solids.ball().placed(scale, shift)
+    atlas = explored(solid, tolerance=8e-3 * scale)
+    assert abs(len(atlas.patches) - len(plain.patches)) <= 4
+    mesh = atlas.mesh(0.15 * scale)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    off = np.linalg.norm(mesh.vertices - np.array(shift), axis=1) / scale - 1.0
+    assert np.abs(off).mean() < 2e-3
+
+
+def test_noise_of_a_hundredth_leaves_a_closed_ball():
+    atlas = explored(solids.ball(), tolerance=0.02, noise=0.01)
+    mesh = atlas.mesh(0.15)
+    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).mean() < 0.01
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+
+
+def test_a_tenth_of_outlying_contacts_is_ignored():
+    solid = solids.ball()
+    atlas = core.explore_object(
+        Outlying(solid, 0.02), solid.start, solid.outward, tolerance=8e-3, rng=0, most=60
+    )
+    mesh = atlas.mesh(0.15)
+    assert np.isfinite(mesh.std).all()
+    off = np.linalg.norm(mesh.vertices, axis=1) - 1.0
+    assert np.median(np.abs(off)) < 4e-3
+
+
+def test_both_sides_of_a_wall_stay_apart():
+    solid = solids.block(1.0, 0.8, 0.05)
+    atlas = explored(solid, tolerance=4e-3, most=150)
+    x, y = np.random.default_rng(0).uniform(-0.6, 0.6, (2, 200))
+    for z, side in ((0.05, 0.0), (-0.05, 0.0), (0.0, -0.05), (0.08, 0.03), (-0.08, 0.03)):
+        distance, _ = atlas.distance(np.column_stack([x, y, np.full(200, z)]))
+        assert distance == pytest.approx(np.full(200, side), abs=4e-3)
+
+
+def test_two_balls_in_contact_do_not_end_the_touches_or_fill_what_is_between():
+    def distance(x, y, z):
+        return min(math.hypot(x + 1.0, y, z), math.hypot(x - 1.0, y, z)) - 1.0
+
+    solid = solids.Solid(distance, (-2.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    atlas = explored(solid, tolerance=8e-3, most=150)
+    y = np.linspace(0.45, 0.9, 20)
+    between, std = atlas.distance(np.column_stack([np.zeros(20), y, np.zeros(20)]))
+    assert (between[np.isfinite(std)] > 0.0).all()
+    felt = np.array([r.frame.origin[0] for r in atlas.patches])
+    assert felt.min() < -1.0
+    assert felt.max() > 1.0
+
+
+def test_a_plane_without_end_takes_the_budget_and_no_more():
+    solid = solids.Solid(lambda x, y, z: z, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    atlas = explored(solid, most=12)
+    assert 1 < len(atlas.patches) <= 12
+    assert atlas.status == "uncertain"
+
+
+def test_a_surface_finer_than_the_tolerance_ends():
+    def distance(x, y, z):
+        waves = 0.02 * math.sin(60.0 * x) * math.sin(60.0 * y) * math.sin(60.0 * z)
+        return 0.5 * (math.hypot(x, y, z) - 1.0 + waves)
+
+    solid = solids.Solid(distance, (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+    atlas = explored(solid, tolerance=1e-3, most=10)
+    assert len(atlas.patches) <= 10
+    distance, std = atlas.distance(np.zeros((1, 3)))
+    assert np.isfinite(distance).all()
+    assert not np.isnan(std).any()
