@@ -2,11 +2,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whole objects, a row each: their surfaces and graphs, always the same, and what is refused."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from data_sets import blocks_of, rows_of, write_ball, write_torus
 
 pq = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed: run make test-cluster")
+MOVED = """
+import sys
+import bpy
+bpy.ops.wm.read_homefile(use_empty=True)
+bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, location=(5.0, -3.0, 2.0))
+bpy.context.object.scale = (-1.0, 1.0, 1.0)
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
+"""
 WORDS = ("--tolerance", "0.4%", "--limit", "120")
 AROUND = 1.0  # of the torus, whose tube is 0.4
 
@@ -94,6 +105,21 @@ def test_objects_have_the_numbers_and_a_broken_file_its_reason(surfaces, rows):
         for name in (*names, "deviation_mean", "deviation_max"):
             assert row[name] == found[name]
         assert row["tolerance"] == pytest.approx(0.004 * row["size"])
+
+
+def test_an_object_that_was_moved_and_mirrored_is_touched_where_it_is(cluster, tmp_path):
+    (tmp_path / "objects").mkdir()
+    made = [sys.executable, "-c", MOVED, str(tmp_path / "objects" / "moved.blend")]
+    subprocess.run(made, check=True, stdout=subprocess.DEVNULL)
+    assert whole(tmp_path, "--scheduler", cluster.scheduler.address, "--noise", "0.001") == 0
+    (path,) = blocks_of(tmp_path / "set", "surfaces")
+    (row,) = pq.read_table(path).to_pylist()
+    assert row["is_closed"] and row["noise"] == 0.001
+    apart = np.reshape(row["vertices"], (-1, 3)) - (5.0, -3.0, 2.0)
+    assert np.abs(np.linalg.norm(apart, axis=1) - 1.0).max() < 0.03
+    frames = np.reshape(row["axes"], (-1, 3, 3))
+    out = np.reshape(row["origins"], (-1, 3)) - (5.0, -3.0, 2.0)
+    assert np.einsum("ni,ni->n", out, frames[:, 2]) == pytest.approx(1.0, abs=0.02)
 
 
 def test_surfaces_are_the_same_with_one_worker_as_with_two(surfaces, tmp_path):
