@@ -33,7 +33,7 @@ def unit_of(scene, size):
     if settings.system == "NONE":
         return "", 1.0
     name, meters = settings.length_unit, size * settings.scale_length * (1.0 + 1e-6)
-    if name == "ADAPTIVE" or not 1e-2 <= meters / METERS[name][1] <= 1e4:
+    if name == "ADAPTIVE" or not 1e-1 <= meters / METERS[name][1] <= 1e4:
         names = ADAPTIVE[settings.system]
         name = next((n for n in names if METERS[n][1] <= meters), names[-1])
     symbol, meters = METERS[name]

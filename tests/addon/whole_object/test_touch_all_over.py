@@ -50,7 +50,7 @@ def test_colors_show_what_is_chosen(empty, ball):
         ({"tolerance": -1.0}, "The tolerance is a length of 0 or more, got"),
         (
             {"tolerance": 0.01, "noise": 0.02},
-            "The tolerance 0.01 m is below the noise",
+            "The tolerance 1 cm is below the noise",
         ),
         ({"edge": float("nan")}, "The edge is a length of 0 or more, got"),
     ],
