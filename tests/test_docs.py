@@ -66,9 +66,9 @@ def test_the_readme_is_short_and_its_picture_small():
 
 
 def test_the_figures_of_the_readme_are_those_of_the_docs():
-    readme, speed, stability = (
+    readme, speed = (
         " ".join((ROOT / name).read_text(encoding="utf-8").split())
-        for name in ("README.md", "docs/speed_and_accuracy.md", "docs/stability.md")
+        for name in ("README.md", "docs/speed_and_accuracy.md")
     )
     process, cubic = re.search(
         r"is (\S+) of a Gaussian process's and (\S+) of a cubic spline's", readme
@@ -76,9 +76,9 @@ def test_the_figures_of_the_readme_are_those_of_the_docs():
     assert f"the mean error is {process} of the Gaussian process's, {cubic} of the cubic spline's" in speed
     low, high = re.search(r"the 90 % intervals hold (\d+) to (\d+) % of the surface", readme).groups()
     assert f"Its intervals hold {low} to {high} % here" in speed
-    rows = re.findall(r"\| \w+, 1/(?:8|32) \| (\d+) \| \d+ \| \d+ \| (\d+) \|", stability)
-    assert f"{sum(int(patches) for patches, _ in rows)} patches on scans" in readme
-    assert {silent for _, silent in rows} == {"0"}
+    sure, doubt, refused, _, off = re.search(r"\| all " + 5 * r"\| (\d+) ", speed).groups()
+    assert f"{int(sure) + int(doubt) + int(refused)} automatic touches on scans: {sure} are sure" in readme
+    assert f"and {off} of these are off by more than 2 %" in readme
     (update,) = re.findall(r"\| 1000000 \| 454 \|(?: \S+ \|){4} (\S+) \|", speed)
     assert f"in {float(update):.0f} ms" in readme
 
