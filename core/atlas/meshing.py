@@ -61,7 +61,7 @@ def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
     size = CELL * edge
     cells = _cells(charts, size)
     lattice, tetrahedra = _tetrahedra(cells)
-    points = 0.5 * size * lattice
+    points = 0.5 * size * lattice.astype(np.float64)
     values, known = np.zeros(len(points)), np.zeros(len(points), dtype=bool)
     for start in range(0, len(points), AT_ONCE):
         some = slice(start, start + AT_ONCE)

@@ -56,8 +56,8 @@ def scattered(
 
     Raises ValueError for a mesh without area.
     """
-    corner, *others = (points[triangles[:, i]] for i in range(3))
-    sides = [other - corner for other in others]
+    corner, second, third = (points[triangles[:, i]] for i in range(3))
+    sides = second - corner, third - corner
     normals = np.cross(*sides)
     areas = np.linalg.norm(normals, axis=1)
     if not areas.sum() > 0.0:
