@@ -51,12 +51,16 @@ class DataSet:
         """
         try:
             self.parts.mkdir(parents=True, exist_ok=True)
-            for left in self.parts.glob(".*.parquet"):
-                left.unlink(missing_ok=True)
+            self._tidy()
         except OSError as error:
             raise OSError(
                 f'cannot write to the folder "{self.folder}" ({error.strerror}): choose another'
             ) from error
+
+    def _tidy(self) -> None:
+        """Takes away what was left aside by whoever was interrupted while it wrote."""
+        for left in self.parts.glob(".*.parquet"):
+            left.unlink(missing_ok=True)
 
     def block_path(self, key: str, block: int) -> Path:
         """Of the file of a block."""
@@ -81,7 +85,8 @@ class DataSet:
         write_block(path.with_name(path.stem + ERROR), rows, facts, 0.0, {"error": len(rows)})
 
     def write_objects(self, rows: Sequence[dict[str, Any]]) -> None:
-        """The file of objects."""
+        """The file of objects, which is the last that is written."""
+        self._tidy()
         _write(self.objects, table(list(rows), SCHEMAS[self.parts.name][1]))
 
 
