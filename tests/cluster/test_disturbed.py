@@ -227,7 +227,7 @@ def test_a_process_that_takes_too_long_is_ended(objects, plain, tmp_path):
     with pytest.raises(LostError) as busy:  # some thousand touches, in half a second
         hand.ask(0.5, "touch", facts, asked, 0, str(tmp_path / "block.parquet"))
     assert str(busy.value).startswith("It took longer than the limit of 0.5 s\n")
-    assert "most recent call first" in str(busy.value)  # where it was, as far as that can be told from outside
+    assert "most recent call first" in str(busy.value)  # where it was, if that can be told
     assert hand.is_worn and not list(tmp_path.iterdir())
     hand = HandProcess()
     hand.ask(100.0, *survey)
