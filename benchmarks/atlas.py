@@ -130,7 +130,7 @@ def _cloud(points, normals):
 
 
 def _matrices(meshes):
-    """Of the mesh, before its set is gone."""
+    """Arrays of the mesh, taken before its set is gone."""
     mesh = meshes.current_mesh()
     return mesh.vertex_matrix(), mesh.face_matrix()
 

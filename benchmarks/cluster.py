@@ -217,7 +217,7 @@ def on_paper(seconds, worker, center):
 
 
 def _share(each, worker, center, count, block):
-    """Of time that goes into touches; the scheduler hands out one block after the other."""
+    """Share of the time that goes into touches; the scheduler hands out one block after the other."""
     return block * each / max(block * each + worker, count * center)
 
 

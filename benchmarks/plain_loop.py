@@ -18,7 +18,7 @@ from tools import blender
 
 
 def touch_all(files, options):
-    """The same touches as in a data set, in batches as well, judged and compared with the mesh; kept."""
+    """Makes and keeps the touches of a data set, in batches as there, judged and compared with the mesh."""
     kept = []
     for name, path in files:
         target = touchable(path, name)

@@ -44,7 +44,7 @@ class Solid:
         return np.array([self.distance(*p) for p in np.asarray(points).tolist()])
 
     def placed(self, scale=1.0, shift=(0.0, 0.0, 0.0)):
-        """The same elsewhere, in another unit."""
+        """This solid elsewhere, in another unit."""
         u, v, w = shift
         return Solid(
             lambda x, y, z: scale * self.distance((x - u) / scale, (y - v) / scale, (z - w) / scale),
@@ -87,7 +87,7 @@ def egg(across=0.6, along=1.0):
 
 @dataclass(frozen=True)
 class Topology:
-    """Of triangles: edges with one triangle, edges with more than two, Euler's number, and the pieces."""
+    """What triangles are: edges with one triangle, edges with more than two, Euler's number, and the pieces."""
 
     open: int
     tangled: int

@@ -63,7 +63,7 @@ class DataSet:
             left.unlink(missing_ok=True)
 
     def block_path(self, key: str, block: int) -> Path:
-        """Of the file of a block."""
+        """Where the file of a block is."""
         return self.parts / f"{key}-{block:05d}.parquet"
 
     def done(self) -> set[str]:

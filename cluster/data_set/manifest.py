@@ -15,7 +15,7 @@ PACKAGES = ("bpy", "numpy", "scipy")
 
 
 def versions() -> dict[str, str]:
-    """Of all that rows depend on."""
+    """Versions of all that rows depend on."""
     found = {"format": str(FORMAT), "tactile_patch": extension.version()}
     return found | {name: version_of(name) for name in PACKAGES}
 

@@ -20,7 +20,7 @@ class Length:
 
     @classmethod
     def of(cls, text: str) -> "Length":
-        """Of words such as 0.002 or 1.5%. Raises ValueError for others."""
+        """Reads words such as 0.002 or 1.5%. Raises ValueError for others."""
         number = text.strip().removesuffix("%")
         try:
             value = float(number)

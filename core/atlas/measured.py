@@ -69,7 +69,7 @@ def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -
 
 
 def _normals(points: Array, up: Array) -> Array:
-    """Of the planes nearest to the neighbors of each contact, on the side of `up`, (n, 3)."""
+    """Normals (n, 3) of the planes nearest to the neighbors of each contact, on the side of `up`."""
     from scipy.spatial import cKDTree
 
     near = cKDTree(points).query(points, min(NEIGHBORS, len(points)))[1]

@@ -21,7 +21,7 @@ def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
 
 
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
-    """The same, with their mean_height_std known: what status and message ask for first."""
+    """Reconstructions whose mean_height_std is known: what status and message ask for first."""
     stds = mean_height_stds(results)
     # With a residual they know it already, and more than the mean.
     pairs = zip(results, stds, strict=True)

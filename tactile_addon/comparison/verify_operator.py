@@ -45,7 +45,7 @@ class Verification:
         self._surface = MeshSurface(target, depsgraph, sound=self._surface is not None)
 
     def ray_cast(self, *ray):
-        """Of the target, as MeshSurface has it."""
+        """Casts a ray at the target, as MeshSurface does."""
         return self._surface.ray_cast(*ray)
 
     def steps(self):

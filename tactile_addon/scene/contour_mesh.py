@@ -95,7 +95,7 @@ def _tubes(paths, across, sizes, form):
 
 @lru_cache(maxsize=8)
 def _form(lengths, strokes):
-    """Of contours of these numbers of contacts, and a rim, the last; and of so many strokes."""
+    """Form of the mesh of contours with so many contacts each, a rim, which is the last, and strokes."""
     paths = [slice(end - n, end) for n, end in zip(lengths, np.cumsum(lengths), strict=True)]
     at, felt = np.arange(sum(lengths)), lengths[:-1]
     before, after, quads = at - 1, at + 1, []

@@ -115,7 +115,7 @@ class FitSettings:
 
 
 class TouchSettings(FitSettings):
-    """The same; lengths in units of the world, angles in radians."""
+    """FitSettings with the planes, lengths and noise of a touch: in units of the world, and in radians."""
 
     plane_count: IntProperty(
         name="Planes",

@@ -52,7 +52,7 @@ def report_of(what, *args):
 
 
 def check_files(first):
-    """The same point of the same surface, from a file of each kind."""
+    """Touches one point of one surface, from a file of each kind."""
     # Extent and step too: where none is given they follow the object's bounding box, which files may turn.
     same = ["--location", *first["frame"]["origin"], "--extent", first["extent"], "--step", first["step"]]
     for background in ([], ["-b"]):

@@ -86,7 +86,7 @@ def test_a_target_that_is_no_mesh_and_a_scale_that_is_none_are_messages(empty, b
 
 
 def state_but_status(patch):
-    """The same without what a failed touch says of the patch of the one before."""
+    """State without what a failed touch says of the patch of the one before."""
     report, *meshes = state(patch)
     for key in ("status", "message"):
         del report[key]

@@ -34,7 +34,7 @@ def touched(surface, noise=0.0, seed=0):
 
 
 def measured(contours, std, seed=0):
-    """The same with their normals measured: turned by normal deviations about two axes across them."""
+    """Contours with measured normals: turned by normal deviations about two axes across them."""
     rng = np.random.default_rng(seed)
     found = []
     for c in contours:
@@ -190,7 +190,7 @@ def test_without_slopes_both_likelihoods_are_one():
 
 
 def tilted(surface, contours, degrees):
-    """The same with all normals turned about one axis, across the normal at the point."""
+    """Contours with all normals turned about one axis, across the normal at the point."""
     axis = np.cross(surface.normal, [0.48, -0.6, 0.64])
     turn = Rotation.from_rotvec(np.radians(degrees) * axis / np.linalg.norm(axis)).as_matrix()
     return [replace(c, normals=c.normals @ turn.T) for c in contours]

@@ -379,7 +379,7 @@ def test_deviations_of_curvatures_are_those_of_surfaces_drawn_from_the_posterior
 
 
 def prior_mean(k1, k2):
-    """Of one surface."""
+    """Prior means of one surface."""
     return linear_system.prior_mean(np.array([k1]), np.array([k2]))[0]
 
 

@@ -400,7 +400,7 @@ def test_where_arbitrary_curves_meet(curves):
 @given(st.integers(0, 8), st.integers(0, 3), st.data())
 @in_time
 def test_arbitrary_measured_normals(shape, planes, data):
-    """And what becomes of the reconstruction as plain values."""
+    """Normals are fitted or refused, and the reconstruction survives as plain values."""
     point, outward, curves = tracked(shape, planes, 0.0)
     contours = []
     for curve in curves:
