@@ -87,7 +87,7 @@ def egg(across=0.6, along=1.0):
 
 @dataclass(frozen=True)
 class Topology:
-    """What triangles are: edges with one triangle, edges with more than two, Euler's number, and the pieces."""
+    """Edges with one triangle, edges with more than two, Euler's number, and the pieces."""
 
     open: int
     tangled: int
