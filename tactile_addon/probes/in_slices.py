@@ -9,6 +9,7 @@ from .operators import report_error
 
 AT_ONCE = 0.2  # seconds of work before a window is told that there is more
 SLICE = 0.05  # seconds of work between two events
+SAY = 1.0  # seconds between two lines of progress where there is no window
 NEXT = 0.01  # seconds from one slice to the next
 
 
@@ -21,6 +22,7 @@ class InSlices:
     """
 
     _timer = None  # while it is running in a window
+    _in_window = False  # whether a dialog has been agreed to, after which it goes on in slices
     stop = "Stop"  # what Esc does
     meanwhile = {"RUNNING_MODAL"}  # what becomes of all other events
 
@@ -36,9 +38,14 @@ class InSlices:
     def execute(self, context):
         try:
             self._begin(context)
+            if self._in_window:
+                return self._go_on(context)
             self._check(context)
+            said = perf_counter()
             for _ in self._steps:
-                pass
+                if getattr(self, "progress", False) and perf_counter() > said + SAY:
+                    said = perf_counter()
+                    print(self._done()[0], file=sys.stderr, flush=True)
             return self._finish(context)
         except ValueError as error:
             return report_error(self, error)

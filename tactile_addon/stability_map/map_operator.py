@@ -2,9 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stability Map: touches all over an object; in slices in a window, at once from a script."""
 
-import sys
-from time import perf_counter
-
 import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
@@ -18,7 +15,6 @@ from . import map_object
 from .map_report import map_summary
 from .stability import StabilityMap, expected_count
 
-SAY = 1.0  # seconds between two lines of progress
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
 
@@ -69,19 +65,6 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
             return report_error(self, error)
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
-    def execute(self, context):
-        try:
-            self._begin(context)
-        except ValueError as error:
-            return report_error(self, error)
-        if getattr(self, "_in_window", False):
-            return self._go_on(context)
-        self._run()
-        try:
-            return self._finish(context)
-        except ValueError as error:
-            return report_error(self, error)
-
     def _begin(self, context):
         target = target_object(context, self.target)
         # No reference to the target: whatever happens to the scene, the touches go on in a snapshot of it.
@@ -90,14 +73,6 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
             target, context.evaluated_depsgraph_get(), spacing=self.spacing, **touch_arguments(self)
         )
         self._steps = self._map.steps()
-
-    def _run(self):
-        """All steps at once; says now and then how far they are, where that is wanted."""
-        said = perf_counter()
-        for _ in self._steps:
-            if self.progress and perf_counter() > said + SAY:
-                said = perf_counter()
-                print(f"{self._map.done} of {len(self._map.chosen)} points", file=sys.stderr, flush=True)
 
     def _stopped(self, context):
         """Esc ends it with what there is so far."""

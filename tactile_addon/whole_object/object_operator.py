@@ -2,9 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touch All Over: touches that grow over an object by themselves; in slices in a window."""
 
-import sys
-from time import perf_counter
-
 import bpy
 from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
@@ -17,7 +14,6 @@ from . import whole_mesh
 from .object_report import object_summary
 from .object_touches import ObjectTouches
 
-SAY = 1.0  # seconds between two lines of progress
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
 
@@ -92,15 +88,9 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
             return report_error(self, error)
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
-    def execute(self, context):
-        if not getattr(self, "_in_window", False):
-            return super().execute(context)
-        try:
-            self._begin(context)
-        except ValueError as error:
-            return report_error(self, error)
+    def _go_on(self, context):
         self._growing = whole_mesh.GrowingPatches(context.scene, self._name, self._touches.surface.origin)
-        return self._go_on(context)
+        return super()._go_on(context)
 
     def _begin(self, context):
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
@@ -118,14 +108,11 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         self._steps = self._shown()
 
     def _shown(self):
-        """The steps; the patches appear between them, or progress is printed."""
-        shown, said = 0, perf_counter()
+        """The steps; in a window the patches appear between them."""
+        shown = 0
         for _ in self._touches.steps():
             if self._growing is not None:
                 self._growing.add(self._touches.found[shown:])
-            elif self.progress and perf_counter() > said + SAY:
-                said = perf_counter()
-                print(self._touches.words, file=sys.stderr, flush=True)
             shown = len(self._touches.found)
             yield
 
