@@ -230,6 +230,7 @@ def draw(numbers):
     axes[0].legend(frameon=False)
     for axis in axes:
         axis.grid(alpha=0.3, which="both")
+    figure.suptitle("Whole objects: how near, by touches and by time", weight="bold")
     folder = ROOT / "build" / "charts"
     folder.mkdir(parents=True, exist_ok=True)
     figure.savefig(folder / "atlas.png", dpi=110)

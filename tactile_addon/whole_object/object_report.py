@@ -9,8 +9,8 @@ from ..touch.wording import table
 
 
 def unit_of(record):
-    """The unit for what there is to say, which is about as large as the tolerance."""
-    return units.unit_of(bpy.context.scene, record["tolerance"])
+    """The unit for what there is to say: lengths from below the tolerance to far above."""
+    return units.unit_of(bpy.context.scene, 10.0 * record["tolerance"])
 
 
 def object_readable(record):
