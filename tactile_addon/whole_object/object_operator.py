@@ -89,7 +89,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
     def _go_on(self, context):
-        self._growing = whole_mesh.GrowingPatches(context.scene, self._name, self._touches.surface.origin)
+        self._growing = whole_mesh.GrowingPatches(context.scene, self._touches.surface)
         return super()._go_on(context)
 
     def _begin(self, context):
@@ -97,8 +97,6 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         location = list(self.location) if self.properties.is_property_set("location") else None
         if location is None and found is not None and found.tactile_probe.target == target:
             location = list(found.matrix_world.translation)
-        # No reference to the target: whatever happens to the scene, the touches go on in a snapshot of it.
-        self._name = target.name
         self._touches = ObjectTouches(
             target,
             context.evaluated_depsgraph_get(),
@@ -120,8 +118,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         return self._touches.words, self._touches.share
 
     def _check(self, context):
-        if context.mode != "OBJECT":
-            raise ValueError("The touching was stopped, for Object Mode was left: start it again")
+        self._touches.surface.require_source(context)
 
     def _stopped(self, context):
         """Esc joins what there is so far; once more, and nothing is kept."""
@@ -139,7 +136,8 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
             self._growing = None
 
     def _finish(self, context):
-        made = whole_mesh.insert(context, self._name, self._touches)
+        target = self._touches.surface.require_same(context)
+        made = whole_mesh.insert(context.scene, target.name, self._touches)
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
         self.report({"INFO"} if record["is_closed"] else {"WARNING"}, object_summary(record))
