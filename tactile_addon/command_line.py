@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c tactile reconstruct|fit|object|map|table FILE`: patches, objects and maps from the shell."""
+"""`blender -c tactile reconstruct|fit|object|join|map|table FILE`: patches and more from the shell."""
 
 import argparse
 import sys
@@ -22,6 +22,7 @@ NOT_OF_ALL = (
     "azimuths",
     "tilts",
 )
+SURFACE = "save the scene with the surface, .blend; the surface alone as .ply"
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
 
@@ -50,6 +51,7 @@ def _parser():
         ("reconstruct", _add_reconstruct, "touch a mesh and rebuild the patch around a point"),
         ("fit", _add_fit, "rebuild the patch that measured contacts show"),
         ("object", _add_object, "touch a whole object and join the patches to one surface"),
+        ("join", _add_join, "join the patches that measured contacts of an object show to one surface"),
         ("map", _add_map, "touch a mesh all over and paint a copy by how well it goes"),
         ("table", _add_table, "write what the patches of a scene have found, a row each"),
     ):
@@ -71,20 +73,32 @@ def _add_reconstruct(command):
 
 def _add_fit(command):
     add = command.add_argument
-    add("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply, curves of one patch")
-    add("--unit", choices=list(contact_file.UNIT_METERS), help="of the numbers (what the file says)")
+    _add_contacts(add, ".csv or .ply, curves of one patch")
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
     help = "a place among strokes, which all curves are then (default, of strokes alone: their mean)"
     add("--location", **VECTOR, help=help)
     add("--radius", type=float, help="of strokes alone: how far from that place contacts count (all)")
-    add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
-    add("--flip", action="store_true", default=None, help="the other side is the outer one")
-    add("--noise", type=float, help="standard deviation of a contact, at least")
     add("--normal-std", type=float, metavar="DEGREES", help="of measured normals, to fit them too")
     help = "put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts"
     add("--onto", type=Path, metavar="MESH", help=help)
     _add_method(add)
     _add_verify(add)
+
+
+def _add_contacts(add, help):
+    """What was measured, and on which side."""
+    add("files", nargs="+", type=Path, metavar="FILE", help=help)
+    add("--unit", choices=list(contact_file.UNIT_METERS), help="of the numbers (what the file says)")
+    add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
+    add("--flip", action="store_true", default=None, help="the other side is the outer one")
+    add("--noise", type=float, help="standard deviation of a contact, at least")
+
+
+def _add_join(command):
+    add = command.add_argument
+    _add_contacts(add, ".csv or .ply, curves all over an object")
+    add("--tolerance", type=float, help="how well heights are to be known (1.2 %% of each patch)")
+    _add_output(add, SURFACE)
 
 
 def _add_map(command):
@@ -102,7 +116,7 @@ def _add_object(command):
     add("--edge", type=float, help="length of the triangles' edges (what the curvature asks)")
     add("--most", type=int, help="touches, at most (1000)")
     _add_sensor(add)
-    _add_output(add, "save the scene with the surface, .blend; the surface alone as .ply")
+    _add_output(add, SURFACE)
 
 
 def _add_table(command):
