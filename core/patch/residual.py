@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a real surface is beside a polynomial: a Gaussian process over the tangent plane.
 
-Beside the paper. The heights are phi' b + g, phi the terms of degree 1 to 6 under the prior of bayes.py
+Beside the paper. The heights are phi' b + g, phi the terms of degree 1 to 6 under the prior of joint_fit.py
 and g of zero mean and of the covariance
 
     sum_i v_i M(|p - q| / l_i),  M(d) = (1 + a) exp(-a),  a = sqrt(3) d,
