@@ -192,9 +192,13 @@ def is_enough(r: Reconstruction) -> bool:
     if r.mean_height_std <= MISFIT * r.radius:
         return True
     (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
-    some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)]
+    if r.residual is None:
+        which = np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)
+        some = contacts[which] / r.radius
+    else:
+        some = r.residual.places
     over, m = points / r.radius, len(some)
-    shared, seen = r.uncertainty.height_covariances(some / r.radius, over)
+    shared, seen = r.uncertainty.height_covariances(some, over)
     # A patch by another method departs from the posterior's mean, of which no contact takes anything off.
     own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
     variance = own**2
