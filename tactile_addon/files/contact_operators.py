@@ -17,7 +17,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..probes.operators import is_in_object_mode, make_active, report_error, waiting
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_solver
+from ..touch.settings import FitSettings, draw_solver, length_property
 from ..touch.units import length
 from ..touch.wording import fit_summary
 from ..whole_object import whole_mesh
@@ -71,10 +71,9 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         description="All curves run beside the reference point, which is only a place among them",
         options={"SKIP_PRESET"},
     )
-    radius: FloatProperty(
-        name="Radius",
-        subtype="DISTANCE",
-        description="How far from a place among strokes they count, in units of the scene; 0: all do",
+    radius: length_property(
+        "Radius",
+        "How far from a place among strokes they count, in units of the scene; 0: all do",
         min=0.0,
         precision=4,
     )
@@ -85,10 +84,9 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
     )
     flip: BoolProperty(name="Flip", description="The other side is the outer one")
-    noise: FloatProperty(
-        name="Noise",
-        subtype="DISTANCE",
-        description="Standard deviation of a contact, in units of the scene; 0 where it is not known",
+    noise: length_property(
+        "Noise",
+        "Standard deviation of a contact, in units of the scene; 0 where it is not known",
         min=0.0,
         precision=4,
     )
@@ -102,7 +100,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
 
     @classmethod
     def poll(cls, context):
-        return is_in_object_mode(cls, context, "Contacts are imported")
+        return context.area is None or is_in_object_mode(cls, context, "Contacts are imported")
 
     def invoke(self, context, event):
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.

@@ -3,19 +3,24 @@
 """Stability Map: touches all over an object; in slices in a window, at once from a script."""
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import has_target, make_active, report_error, target_object
+from ..probes.operators import has_target, is_in_object_mode, make_active, report_error, target_object
 from ..scene import patch_record
-from ..touch.settings import NAMES, TouchSettings, draw_all, draw_chosen, touch_arguments
+from ..touch.settings import (
+    NAMES,
+    TARGET,
+    TouchSettings,
+    draw_all,
+    draw_chosen,
+    length_property,
+    touch_arguments,
+)
 from ..touch.wording import sentence
 from . import map_object
 from .map_report import map_summary
 from .stability import StabilityMap, expected_count
-
-UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
 
 class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
@@ -25,21 +30,9 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     bl_label = "Stability Map"
     bl_options = {"UNDO", "PRESET"}
 
-    target: StringProperty(
-        name="Target",
-        description="Name of the mesh object to touch; empty for the active object",
-        options=UNSAVED,
-    )
-    spacing: FloatProperty(
-        name="Spacing",
-        description="Distance between the points that are touched; 0 for a quarter of the extent",
-        subtype="DISTANCE",
-        soft_min=0.0,
-    )
-    progress: BoolProperty(
-        name="Progress",
-        description="Print progress to stderr, where there is no window to show it",
-        options={"HIDDEN", *UNSAVED},
+    target: TARGET
+    spacing: length_property(
+        "Spacing", "Distance between the points that are touched; 0 for a quarter of the extent"
     )
 
     stop = "Stop and Keep"
@@ -47,10 +40,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Maps are made in Object Mode: leave this mode first")
-            return False
-        return has_target(cls, context)
+        return is_in_object_mode(cls, context, "Maps are made") and has_target(cls, context)
 
     def invoke(self, context, event):
         if bpy.app.background:

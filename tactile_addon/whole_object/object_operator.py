@@ -3,18 +3,16 @@
 """Touch All Over: touches that grow over an object by themselves; in slices in a window."""
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import FloatVectorProperty, IntProperty
 
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import make_active, report_error, target_object
+from ..probes.operators import is_in_object_mode, make_active, report_error, target_object
 from ..scene import patch_record
-from ..touch.settings import draw_chosen
+from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
 from . import whole_mesh
 from .object_report import object_summary
 from .object_touches import ObjectTouches
-
-UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
 
 class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
@@ -24,29 +22,17 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     bl_label = "Touch All Over"
     bl_options = {"UNDO", "PRESET"}
 
-    target: StringProperty(
-        name="Target",
-        description="Name of the mesh object to touch; empty for the active object",
-        options=UNSAVED,
-    )
+    target: TARGET
     location: FloatVectorProperty(
         name="Location",
         subtype="TRANSLATION",
         description="Where to begin; the probe's point, or any place that works, where it is not set",
         options=UNSAVED,
     )
-    tolerance: FloatProperty(
-        name="Tolerance",
-        description="How well the height of each patch is to be known; 0 for 1/500 of the object's size",
-        subtype="DISTANCE",
-        soft_min=0.0,
+    tolerance: length_property(
+        "Tolerance", "How well the height of each patch is to be known; 0 for 1/500 of the object's size"
     )
-    noise: FloatProperty(
-        name="Noise",
-        description="Standard deviation of the simulated sensor",
-        subtype="DISTANCE",
-        soft_min=0.0,
-    )
+    noise: NOISE
     seed: IntProperty(name="Seed", description="Of the noise and of the place to begin", default=0, min=0)
     most: IntProperty(
         name="Most Touches",
@@ -55,17 +41,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         min=1,
         soft_max=10_000,
     )
-    edge: FloatProperty(
-        name="Edge Length",
-        description="Of the surface's triangles; 0 for what its curvature asks",
-        subtype="DISTANCE",
-        soft_min=0.0,
-    )
-    progress: BoolProperty(
-        name="Progress",
-        description="Print progress to stderr where there is no window to show it",
-        options={"HIDDEN", *UNSAVED},
-    )
+    edge: length_property("Edge Length", "Of the surface's triangles; 0 for what its curvature asks")
 
     stop = "Stop Touching and Keep"
     meanwhile = {"PASS_THROUGH"}  # the touches are in a snapshot
@@ -73,10 +49,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Objects are touched in Object Mode: leave this mode first")
-            return False
-        return True
+        return is_in_object_mode(cls, context, "Objects are touched")
 
     def invoke(self, context, event):
         if bpy.app.background:
