@@ -7,7 +7,7 @@ by surface fitting: fit, go on where the fit explains the contacts, fit again (g
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from typing import Any
 
@@ -30,6 +30,8 @@ MOST_EVEN = 24  # At most so many planes are laid out evenly.
 COARSE_STEPS = 8  # Contacts of a half curve that only tell whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
 BISECTIONS = 6  # They leave a factor of two no more than a 64th.
+
+Found = Generator[None, None, list[Exploration | ValueError]]
 
 
 def explore(
@@ -131,11 +133,7 @@ def explore_many(
 
     In the place of a touch that there cannot be stands its error. Raises ValueError for bad arguments.
     """
-    p = finite_array("points", points, (None, 3), LARGEST)
-    up = finite_array("outward", outward, (len(p), 3))
-    up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
-    length, generator = _given("extent", extent), generator_of(rng)
-    noise = number("noise", noise, least=0.0)
+    length = _given("extent", extent)
     wanted: dict[str, Any] = {
         "planes": _planes(planes),
         "extent": length,
@@ -146,6 +144,54 @@ def explore_many(
         "most_planes": number("most_planes", most_planes, least=3.0),
         "is_grown": method == "bayes",
     }
+    fit = options_of(method, degree, None, weight, solver)
+    found: list[Exploration | ValueError] = result_of(
+        _touching(surface, points, outward, wanted, noise, rng, tangent, fit)
+    )
+    return found
+
+
+def exploring(
+    surface: Surface,
+    points: ArrayLike,
+    outward: ArrayLike,
+    *,
+    farthest: float,
+    largest_std: float,
+    noise: float,
+    rng: np.random.Generator,
+) -> Found:
+    """What `explore_many` gives by its defaults, in steps: yields a few times for each touch."""
+    wanted: dict[str, Any] = {
+        "planes": _planes(3),
+        "extent": None,
+        "step": None,
+        "farthest": farthest,
+        "largest_std": largest_std,
+        "tolerance": None,
+        "most_planes": 6,
+        "is_grown": True,
+    }
+    return _touching(
+        surface, points, outward, wanted, noise, rng, None, options_of("bayes", "auto", None, None, "fast")
+    )
+
+
+def _touching(
+    surface: Surface,
+    points: ArrayLike,
+    outward: ArrayLike,
+    wanted: dict[str, Any],
+    noise: float,
+    rng: np.random.Generator | int | None,
+    tangent: ArrayLike | None,
+    fit: Options,
+) -> Found:
+    """Touches at (m, 3), side by side; `wanted` is what Touch takes, but for where."""
+    p = finite_array("points", points, (None, 3), LARGEST)
+    up = finite_array("outward", outward, (len(p), 3))
+    up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
+    noise, generator = number("noise", noise, least=0.0), generator_of(rng)
 
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
@@ -155,8 +201,16 @@ def explore_many(
         follow = partial(following, *place, noise=noise, rng=generator, tangent=tangent)
         return (yield from Touch(follow, point, reference, **wanted | {"farthest": farthest}).steps())
 
-    fit = options_of(method, degree, None, weight, solver)
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, fit)
+
+
+def result_of(steps: Generator[Any, Any, Any]) -> Any:
+    """What steps return once they are done."""
+    try:
+        while True:
+            next(steps)
+    except StopIteration as end:
+        return end.value
 
 
 def _planes(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
@@ -204,10 +258,11 @@ def _given(name: str, length: float | str) -> float | None:
     return None if automatic else number(name, length, above=0.0)  # type: ignore[arg-type]
 
 
-def _side_by_side(
-    steps: Sequence[Steps], points: Array, outward: Array, fit: Options
-) -> list[Exploration | ValueError]:
-    """What each of b touches comes to, at (b, 3) and (b, 3); the fits that they ask for in stacks."""
+def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Options) -> Found:
+    """What each of b touches comes to, at (b, 3) and (b, 3); the fits that they ask for in stacks.
+
+    Yields after each contour and each stack.
+    """
     found: dict[int, Exploration | ValueError] = {}
     answers: dict[int, Answer | None] = dict.fromkeys(range(len(steps)))
     while answers:
@@ -219,6 +274,7 @@ def _side_by_side(
                 found[i] = end.value
             except ValueError as error:
                 found[i] = error
+            yield
         answers = {}
         for growing in (True, False):
             which = [i for i, ask in asked.items() if ask.growing is growing]
@@ -227,6 +283,7 @@ def _side_by_side(
             if which:
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, _with_stds(results), strict=True))
+                yield
     return [found[i] for i in range(len(steps))]
 
 

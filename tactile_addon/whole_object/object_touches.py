@@ -19,7 +19,8 @@ class ObjectTouches:
     """Touches of an evaluated mesh that begin at one place; all is in the directions of the world.
 
     surface : the mesh as it was, from its object's origin
-    found : core.Reconstructions of the touches so far; uncovered : places known to be uncovered
+    found : core.Reconstructions of the touches so far
+    done, uncovered : how many touches that took, some of which gave no patch; places known to be uncovered
     words, share : what is going on, and the share of it that is done, None where nobody knows
     whole : the WholeSurface, once the steps are done
     """
@@ -43,7 +44,7 @@ class ObjectTouches:
                 f"The tolerance {length(tolerance)} is below the noise {length(noise)}: take a larger one"
             )
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
-        self.found, self.uncovered = [], 0
+        self.found, self.done, self.uncovered = [], 0, 0
         self.words, self.share = "Looking for a place to begin", None
         self.is_stopped = False
         self._location = location
@@ -91,10 +92,10 @@ class ObjectTouches:
 
     def _note(self, state):
         self.found += [exploration.result for exploration in state.found]
-        self.uncovered = state.uncovered
+        self.done, self.uncovered = state.done, state.uncovered
         self.words = f"{state.done} touches, {state.uncovered} places to go on from"
         if state.joining is not None:
-            self.words, self.share = f"Joining {state.done} patches", 0.5 * state.joining
+            self.words, self.share = f"Joining {len(self.found)} patches", 0.5 * state.joining
 
     def _shown(self):
         self.words = "Meshing"
@@ -119,7 +120,7 @@ class ObjectTouches:
         """What there is to say, a dict of plain values."""
         off = np.abs(self.whole.deviation)
         return {
-            "touches": len(self.found),
+            "touches": self.done,
             "uncovered": len(self.whole.atlas.uncovered),
             **self.whole.report(),
             "deviation_mean": float(off.mean()),

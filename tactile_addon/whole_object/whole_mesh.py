@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What touches all over an object leave in the scene: their patches while they grow, then one surface."""
 
-import json
-
 import bpy
 import numpy as np
 from mathutils import Matrix
@@ -88,7 +86,7 @@ def insert(scene, name, whole, report):
     fill(mesh, found.vertices, found.triangles, attributes)
     mesh.shade_smooth()
     obj[patch_record.ATLAS_RECORD] = report | {"source": name, "object": obj.name}
-    obj[patch_record.GRAPH] = json.dumps(whole.graph(), allow_nan=False)
+    obj[patch_record.GRAPH] = whole.graph
     patch_object.recolor(obj)
     show_colors()
     return obj

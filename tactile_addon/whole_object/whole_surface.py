@@ -2,7 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The surface of an atlas, step by step, whether it was touched or measured; nothing in the scene changes."""
 
+import json
+
 import numpy as np
+
+AT_ONCE = 3000  # vertices that are given their curvatures in a step
 
 
 class WholeSurface:
@@ -11,11 +15,14 @@ class WholeSurface:
     atlas, mesh : core.Atlas and core.Mesh; curvatures : as of Atlas.curvatures
     deviation : signed distances (n,) of the mesh's vertices to what was touched; 0 where that was no mesh
 
-    Mesh, curvatures and the atlas's edges are there once the steps are done.
+    graph : as JSON
+
+    All but the atlas are there once the steps are done.
     """
 
     def __init__(self, atlas, origin):
         self.atlas, self.origin = atlas, np.array(origin, dtype=float)
+        self._in_doubt = 0
 
     def steps(self, edge):
         """Does all of it; `edge` is a length, or 0. A generator, which yields the share that is done."""
@@ -26,12 +33,21 @@ class WholeSurface:
             except StopIteration as end:
                 self.mesh = end.value
                 break
-        self.deviation = np.zeros(len(self.mesh.vertices))
-        self.curvatures = self.atlas.curvatures(self.mesh)
+        points, normals = self.mesh.vertices, self.mesh.normals
+        self.deviation, parts = np.zeros(len(points)), []
+        for start in range(0, len(points), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            parts.append(self.atlas.curvatures_at(points[some], normals[some]))
+            yield 0.8
+        self.curvatures = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         for share in self.atlas.bounding():
-            yield 0.8 + 0.2 * share
+            yield 0.8 + 0.1 * share
+        for r in self.atlas.patches:
+            self._in_doubt += r.status != "ok"  # which takes a while, once
+            yield 0.9
+        self.graph = json.dumps(self._graph(), allow_nan=False)
 
-    def graph(self):
+    def _graph(self):
         """The graph of patches as Atlas.to_dict has it, in the world."""
         found = self.atlas.to_dict()
         frames, touch = [node["frame"] for node in found["nodes"]], found["next_touch"]
@@ -50,7 +66,7 @@ class WholeSurface:
             "status": atlas.status,
             "message": atlas.message,
             "patches": len(atlas.patches),
-            "in_doubt": sum(r.status != "ok" for r in atlas.patches),
+            "in_doubt": self._in_doubt,
             "edges": len(atlas.edges),
             "is_closed": mesh.is_closed,
             "vertices": len(mesh.vertices),
