@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number
-from ..exploration.touches import result_of
+from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, edges_of, node_dict

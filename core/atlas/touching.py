@@ -12,7 +12,8 @@ from ..arguments import LARGEST, finite_array, number, unit_vector
 from ..contours.finger import Surface
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
-from ..exploration.touches import explore, exploring
+from ..exploration.side_by_side import exploring
+from ..exploration.touches import explore
 from .frontier import Frontier, Next, side_of
 from .join import joined
 from .object_atlas import Atlas
