@@ -72,16 +72,16 @@ class Atlas:
     def _verdict(self) -> tuple[str, str]:
         if self.uncovered:
             return "uncertain", (
-                f"The patches end at {len(self.uncovered)} places where the object goes on: allow more "
-                "touches, or a larger tolerance."
+                f"The patches end at {len(self.uncovered)} places where the object goes on: allow "
+                "more touches or a larger tolerance."
             )
         rough = len(self._uncertain)
         if rough:
             return "uncertain", (
-                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch there "
-                "once more, or take a larger one."
+                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch "
+                "there again or use a larger tolerance."
             )
-        return "ok", "The object was felt wherever a finger could go on."
+        return "ok", "The object was felt everywhere a finger could reach."
 
     @cached_property
     def _uncertain(self) -> list[Reconstruction]:

@@ -82,9 +82,11 @@ def track(
     step = number("step", step, above=0.0)
     extent = number("extent", extent, above=0.0)
     if extent < step:
-        raise ValueError(f"step: wanted no more than the extent {extent:g}, got {step:g}")
+        raise ValueError(f"step: expected no more than the extent {extent:g}, got {step:g}")
     if extent / step > MOST_CONTACTS:
-        raise ValueError(f"step: wanted at least a {MOST_CONTACTS}th of the extent {extent:g}, got {step:g}")
+        raise ValueError(
+            f"step: expected at least a {MOST_CONTACTS}th of the extent {extent:g}, got {step:g}"
+        )
     noise, generator = number("noise", noise, least=0.0), generator_of(rng)
     count = math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
     e1 = tangent_of(n, tangent)
@@ -111,7 +113,7 @@ def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
         return np.random.default_rng(rng)
     except (TypeError, ValueError):
         raise ValueError(
-            f"rng: wanted a Generator or a whole number of 0 or more, got {shown(rng)}"
+            f"rng: expected a Generator or a whole number of 0 or more, got {shown(rng)}"
         ) from None
 
 
@@ -135,7 +137,7 @@ def _first_contact(
             side = math.copysign(1.0, dot(up, n))
             return found, scaled(up, side), side
     raise ValueError(
-        f"point: wanted one on the surface, got one with no surface within {reach:g} along the normal"
+        f"point: expected one on the surface, got one with no surface within {reach:g} along the normal"
     )
 
 
@@ -163,7 +165,7 @@ def _section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float
         except (TypeError, ValueError, OverflowError):
             sound = False
         if not sound:
-            raise ValueError(f"surface: wanted a point and its unit normal of ray_cast, got {shown(hit)}")
+            raise ValueError(f"surface: expected a point and its unit normal from ray_cast, got {shown(hit)}")
         nx, ny, nz = side * nx, side * ny, side * nz
         dx, dy, dz = x - x0, y - y0, z - z0
         at = complex(dx * tx + dy * ty + dz * tz, dx * ux + dy * uy + dz * uz)
@@ -223,7 +225,7 @@ def _next_contact(cast: _Cast, at: complex, ahead: complex, up: complex, step: f
         chord = abs(contact[0] - at)
         if not 0.5 * step < chord < 2.0 * step:
             raise ValueError(
-                f"surface: wanted hits on the rays, some {step:g} apart, got one {chord:g} from the last"
+                f"surface: expected hits on the rays, about {step:g} apart, got one {chord:g} from the last"
             )
         if abs(chord - step) <= 1e-3 * step:
             break

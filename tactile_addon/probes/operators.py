@@ -29,19 +29,20 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     location: FloatVectorProperty(
         name="Location",
         subtype="TRANSLATION",
-        description="Where to touch; the 3D cursor where it is not set",
+        description="Where to touch; if not set, the 3D cursor",
         options={"SKIP_PRESET"},
     )
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="The outward direction there; the surface's own where it is not set",
+        description="The outward direction there; if not set, the surface's own",
         options={"SKIP_PRESET"},
     )
 
     tolerance: FloatProperty(
         name="Tolerance",
-        description="Add planes until the height is good to this, where it is set, or no plane would help",
+        description="Add planes until the height is accurate to this or no plane would help; if not "
+        "set, add none",
         subtype="DISTANCE",
         soft_min=0.0,
         options={"SKIP_PRESET"},

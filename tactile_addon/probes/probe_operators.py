@@ -27,7 +27,7 @@ class _ProbeOperator:
             cls.poll_message_set("Select a probe, or pick a reference point first")
             return False
         if context.mode != "OBJECT":
-            cls.poll_message_set("Leave this mode: probes are changed in Object Mode")
+            cls.poll_message_set("Probes are changed in Object Mode: leave this mode first")
             return False
         return is_unlocked(cls, context)
 
@@ -40,7 +40,7 @@ class _PlaneOperator(_ProbeOperator):
         if not super().poll(context):
             return False
         if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == MOST_PLANES:
-            cls.poll_message_set("Six planes are the most: remove one first")
+            cls.poll_message_set("A patch has six planes at most: remove one first")
             return False
         return True
 
@@ -67,7 +67,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
 
     tolerance: FloatProperty(
         name="Tolerance",
-        description="Standard deviation of the height that is good enough; 0 to go on while a plane helps",
+        description="Standard deviation of the height to reach; 0 goes on as long as a plane helps",
         subtype="DISTANCE",
         soft_min=0.0,
     )
@@ -106,7 +106,7 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
     bl_idname = "tactile.remove_plane"
     bl_label = "Remove Plane"
 
-    plane: IntProperty(name="Plane", description="Which one, from 0", min=0, max=MOST_PLANES - 1)
+    plane: IntProperty(name="Plane", description="Index of the plane, from 0", min=0, max=MOST_PLANES - 1)
 
     @classmethod
     def poll(cls, context):
@@ -123,7 +123,7 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
         count = settings.plane_count
         if self.plane >= count:
             return report_error(
-                self, ValueError(f"There are {count} planes, 0 to {count - 1}: take one of them")
+                self, ValueError(f"There are {count} planes, 0 to {count - 1}: choose one of them")
             )
         for name in ("azimuths", "tilts"):
             values = list(getattr(settings, name))

@@ -32,13 +32,13 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     )
     spacing: FloatProperty(
         name="Spacing",
-        description="Distance between the points that are touched; 0 for a quarter of the extent",
+        description="Distance between the points that are touched; 0 uses a quarter of the extent",
         subtype="DISTANCE",
         soft_min=0.0,
     )
     progress: BoolProperty(
         name="Progress",
-        description="Print progress to stderr, where there is no window to show it",
+        description="Print progress to stderr where there is no window to show it",
         options={"HIDDEN", *UNSAVED},
     )
 
@@ -93,9 +93,9 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         """The target, if it is still what it was when it was first touched; raises ValueError if not."""
         found = next((o for o in context.view_layer.objects if o.session_uid == self._uid), None)
         if found is None:
-            raise ValueError(f'"{self._name}" is gone: the map of it was stopped')
+            raise ValueError(f'"{self._name}" was deleted while it was touched, so its map was stopped')
         if context.mode != "OBJECT" or found.mode != "OBJECT":
-            raise ValueError("The map was stopped, for Object Mode was left: start it again")
+            raise ValueError("The map was stopped because Object Mode was left: start it again")
         if found.matrix_world != self._map.surface.matrix:
             raise ValueError(f'"{self._name}" was moved while it was touched: start again')
         return found

@@ -32,12 +32,13 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     location: FloatVectorProperty(
         name="Location",
         subtype="TRANSLATION",
-        description="Where to begin; the probe's point, or any place that works, where it is not set",
+        description="Where to begin; if not set, the probe's point or any place that works",
         options=UNSAVED,
     )
     tolerance: FloatProperty(
         name="Tolerance",
-        description="How well the height of each patch is to be known; 0 for 1/500 of the object's size",
+        description="Standard deviation to reach for the height of each patch; 0 uses 1/500 of the "
+        "object's size",
         subtype="DISTANCE",
         soft_min=0.0,
     )
@@ -47,17 +48,19 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         subtype="DISTANCE",
         soft_min=0.0,
     )
-    seed: IntProperty(name="Seed", description="Of the noise and of the place to begin", default=0, min=0)
+    seed: IntProperty(
+        name="Seed", description="Seed of the noise and of the place to begin", default=0, min=0
+    )
     most: IntProperty(
         name="Most Touches",
-        description="When to end at the latest",
+        description="Number of touches after which to stop",
         default=1000,
         min=1,
         soft_max=10_000,
     )
     edge: FloatProperty(
         name="Edge Length",
-        description="Of the surface's triangles; 0 for what its curvature asks",
+        description="Length of the edges of the surface's triangles; 0 chooses it by the curvature",
         subtype="DISTANCE",
         soft_min=0.0,
     )
@@ -121,7 +124,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     def _check(self, context):
         if context.mode != "OBJECT":
-            raise ValueError("The touching was stopped, for Object Mode was left: start it again")
+            raise ValueError("Touching was stopped because Object Mode was left: start it again")
 
     def _stopped(self, context):
         """Esc joins what there is so far; once more, and nothing is kept."""

@@ -171,7 +171,7 @@ def undo():
 
 
 SAID = {
-    delete_target: "is gone: the map of it was stopped",
+    delete_target: "was deleted while it was touched, so its map was stopped",
     enter_edit_mode: "The map was stopped, for Object Mode was left",
     move_target: "was moved while it was touched: start again",
     change_mesh: "was changed while it was touched: start again",
