@@ -75,7 +75,7 @@ class Search:
             raise ValueError(f'There are {len(self.poses)} poses on "{self.target}": choose one of them')
         chosen, matrix, patch = self.poses[pose - 1], np.eye(4), bpy.data.objects.get(self.patch)
         if patch is None:
-            raise ValueError(f'"{self.patch}" was deleted while its place was looked for')
+            raise ValueError(f'"{self.patch}" was deleted while its place was searched for')
         matrix[:3, :3], matrix[:3, 3] = chosen.rotation, chosen.translation
         patch.matrix_world = Matrix(matrix.tolist()) @ self._matrix
         patch[patch_record.RECORD]["registration"] = {

@@ -181,5 +181,5 @@ def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
         registration.register_patch(patch, suzanne, depsgraph)
     monkeypatch.undo()
     empty.data.objects.remove(patch)
-    with pytest.raises(ValueError, match="was deleted while its place was looked for"):
+    with pytest.raises(ValueError, match="was deleted while its place was searched for"):
         search.put(1)

@@ -180,10 +180,10 @@ def test_a_curve_shorter_than_a_quarter_of_the_radius_leaves_doubt():
         r = s.fit(cut_short(contours, s.point))
         assert r.status == "uncertain"  # whichever doubt comes first
         if (
-            f"Curvatures are accurate to only {r.posterior.curvature_std() / r.radius:.2g} in the direction"
+            f"Curvatures are accurate to only {r.posterior.curvature_std() / r.radius:.2g} in the least"
             in r.message
         ):
-            assert "least known: use a longer extent or add sampling planes" in r.message
+            assert "known direction: use a longer extent or add sampling planes" in r.message
             open_curvature += 1
     assert open_curvature > 2
 
