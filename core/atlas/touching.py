@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, finite_array, number, unit_vector
-from ..contours.tracking import Surface, generator_of
+from ..contours.finger import Surface
+from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.touches import explore, explore_many
 from .frontier import Frontier, Next, side_of

@@ -36,7 +36,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     Where curves meet twice, as sections of a body do, it is the better meeting.
 
     Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
-    that do not come near each other, or that run in one direction where they do.
+    that do not come near each other, or that run in the same direction where they do.
     """
     found = list_of("contours", contours, Contour)
     if len(found) < 2:

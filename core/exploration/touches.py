@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vector
 from ..contours.contour import EXTENT, Contour, SamplingPlane
-from ..contours.tracking import Surface, generator_of, track
+from ..contours.finger import Surface
+from ..contours.tracking import following, generator_of, track
 from ..reconstruction.deviations import with_height_stds
 from ..reconstruction.from_contours import fitted, options_of
 from ..reconstruction.result import Reconstruction
@@ -149,10 +150,10 @@ def explore_many(
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
         reference = SamplingPlane(0.0).axes(direction, tangent)
-        feel = partial(track, surface, point, direction, tangent=tangent)
-        farthest = wanted["farthest"] or _farthest(partial(feel, wanted["planes"]))
-        noisy = partial(feel, noise=noise, rng=generator)
-        return (yield from Touch(noisy, point, reference, **wanted | {"farthest": farthest}).steps())
+        place = surface, point, direction
+        farthest = wanted["farthest"] or _farthest(partial(track, *place, wanted["planes"], tangent=tangent))
+        follow = partial(following, *place, noise=noise, rng=generator, tangent=tangent)
+        return (yield from Touch(follow, point, reference, **wanted | {"farthest": farthest}).steps())
 
     fit = options_of(method, degree, None, weight, solver)
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, fit)

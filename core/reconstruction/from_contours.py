@@ -53,7 +53,7 @@ def reconstruct(
         point is only a place: the origin is its foot on the polynomial, L is that of the farthest contact and
         the domain is the hull of the contacts
     radius : from strokes alone, of the contacts around the point that are used; None for all
-    method : "bayes" (bayes.py), or one of the paper's: "tagc" (9), "quadratic-variation",
+    method : "bayes" (bayes/joint_fit.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)
     degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
     noise : accuracy of a contact; noise is taken for no less. None: the contours' own

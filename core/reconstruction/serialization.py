@@ -43,27 +43,28 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "geometry": {
             "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
             "radius": r.radius,
-            "polynomial": _polynomial_dict(r.geometry.polynomial),
+            "polynomial": polynomial_dict(r.geometry.polynomial),
             "residual": None if residual is None else _residual_dict(residual),
             "domain": r.domain.ends.tolist(),
             "brinks": None if r.domain.brinks is None else r.domain.brinks.tolist(),
         },
-        "patch": _polynomial_dict(r.patch),
-        "contours": [_plain(vars(contour)) for contour in r.contours],
+        "patch": polynomial_dict(r.patch),
+        "contours": [plain(vars(contour)) for contour in r.contours],
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
-        "posterior": None if posterior is None else _plain(posterior._asdict()),
+        "posterior": None if posterior is None else plain(posterior._asdict()),
     }
 
 
-def _polynomial_dict(patch: MongePatch) -> dict[str, Any]:
+def polynomial_dict(patch: MongePatch) -> dict[str, Any]:
+    """The polynomial (1) as plain values."""
     return {"k1": patch.k1, "k2": patch.k2, "coefficients": patch.coefficients.tolist()}
 
 
 def _residual_dict(residual: Residual) -> dict[str, Any]:
-    return _plain({field.name: getattr(residual, field.name) for field in fields(residual)})
+    return plain({field.name: getattr(residual, field.name) for field in fields(residual)})
 
 
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+def plain(values: Mapping[str, Any]) -> dict[str, Any]:
     """Arrays as lists."""
     return {
         key: value.tolist() if isinstance(value, np.ndarray | np.generic) else value

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..arguments import Array
 from ..bayes.posterior import Posterior
-from ..patch.monge import MongePatch
 from ..patch.residual import Residual
 
 # Chosen with benchmarks.stability, but for what benchmarks.real says of rough surfaces.
@@ -29,29 +28,48 @@ class _Judged(Protocol):
     """What a status follows from; see Reconstruction."""
 
     @property
-    def method(self) -> str: ...
+    def method(self) -> str:
+        """The method of the fit."""
+
     @property
-    def converged(self) -> bool: ...
+    def converged(self) -> bool:
+        """Whether the solver of the fit converged."""
+
     @property
-    def radius(self) -> float: ...
+    def radius(self) -> float:
+        """The radius L."""
+
     @property
-    def accuracy(self) -> float: ...
+    def accuracy(self) -> float:
+        """The least standard deviation of a contact, in units of L."""
+
     @property
-    def misses(self) -> Array: ...
+    def misses(self) -> Array:
+        """The distances at which the curves pass the point, and their deviations, (c, 2)."""
+
     @property
-    def patch(self) -> MongePatch: ...
+    def residual(self) -> Residual | None:
+        """What the surface is beside its polynomial, if anything."""
+
     @property
-    def residual(self) -> Residual | None: ...
+    def posterior(self) -> Posterior:
+        """What the contacts leave open."""
+
     @property
-    def posterior(self) -> Posterior: ...
+    def condition_number(self) -> float:
+        """The condition number of the least-squares system."""
+
     @property
-    def condition_number(self) -> float: ...
+    def mean_height_std(self) -> float:
+        """The mean deviation of the height over the domain."""
+
     @property
-    def mean_height_std(self) -> float: ...
+    def typical_miss(self) -> float:
+        """The median of |dz| over the contacts."""
+
     @property
-    def typical_miss(self) -> float: ...
-    @property
-    def contradiction(self) -> tuple[float, float]: ...
+    def contradiction(self) -> tuple[float, float]:
+        """By how many deviations, and by what angle, normals contradict contacts."""
 
 
 def doubt(r: _Judged) -> tuple[str, str] | None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..contours.tracking import Surface
+from ..contours.finger import Surface
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.refusals counts the patches that are off and say nothing.

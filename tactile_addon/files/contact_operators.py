@@ -17,7 +17,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..probes.operators import is_in_object_mode, make_active, report_error
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_solver
+from ..touch.settings import FitSettings, draw_solver, length_property
 from ..touch.units import length
 from ..touch.wording import fit_summary
 from . import contact_file, measured
@@ -56,11 +56,9 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         description="No curve passes through the reference point, which is only a place among them",
         options={"SKIP_PRESET"},
     )
-    radius: FloatProperty(
-        name="Radius",
-        subtype="DISTANCE",
-        description="Use strokes up to this distance from the reference point, in units of the "
-        "scene; 0 uses all",
+    radius: length_property(
+        "Radius",
+        "Use strokes up to this distance from the reference point, in units of the scene; 0 uses all",
         min=0.0,
         precision=4,
     )
@@ -71,10 +69,9 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
     )
     flip: BoolProperty(name="Flip", description="Use the other side of the surface as its outer side")
-    noise: FloatProperty(
-        name="Noise",
-        subtype="DISTANCE",
-        description="Standard deviation of a contact, in units of the scene; 0 if it is not known",
+    noise: length_property(
+        "Noise",
+        "Standard deviation of a contact, in units of the scene; 0 if it is not known",
         min=0.0,
         precision=4,
     )
@@ -88,7 +85,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
 
     @classmethod
     def poll(cls, context):
-        return is_in_object_mode(cls, context, "Contacts are imported")
+        return context.area is None or is_in_object_mode(cls, context, "Contacts are imported")
 
     def invoke(self, context, event):
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.

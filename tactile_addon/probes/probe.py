@@ -5,7 +5,7 @@
 The patch is a child of its probe, so a copy of a probe has none and makes its own, and where a probe is
 deleted its patch stays as an ordinary object. Each probe keeps the digest of the inputs it was last
 touched with, and so do the datablocks made from them: undo takes back every datablock by itself, and
-where they differ afterwards the handler of live.py touches again.
+where they differ afterwards change_handlers.py touches again.
 """
 
 import bpy

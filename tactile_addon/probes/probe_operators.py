@@ -5,15 +5,15 @@
 import math
 
 import bpy
-from bpy.props import FloatProperty, IntProperty
+from bpy.props import IntProperty
 
 from ..scene import color_range, patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
-from ..touch.settings import MOST_PLANES
+from ..touch.settings import MOST_PLANES, length_property
 from ..touch.wording import added_planes
 from . import probe, touch_again
-from .operators import is_unlocked, report_error, waiting
+from .operators import is_in_object_mode, is_unlocked, report_error, waiting
 
 
 class _ProbeOperator:
@@ -26,10 +26,7 @@ class _ProbeOperator:
         if probe.probe_of(context.view_layer.objects.active) is None:
             cls.poll_message_set("Select a probe, or pick a reference point first")
             return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Probes are changed in Object Mode: leave this mode first")
-            return False
-        return is_unlocked(cls, context)
+        return is_in_object_mode(cls, context, "Probes are changed") and is_unlocked(cls, context)
 
 
 class _PlaneOperator(_ProbeOperator):
@@ -65,11 +62,8 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
     bl_idname = "tactile.add_planes"
     bl_label = "Add Planes While They Help"
 
-    tolerance: FloatProperty(
-        name="Tolerance",
-        description="Standard deviation of the height to reach; 0 goes on as long as a plane helps",
-        subtype="DISTANCE",
-        soft_min=0.0,
+    tolerance: length_property(
+        "Tolerance", "Standard deviation of the height to reach; 0 goes on as long as a plane helps"
     )
 
     def execute(self, context):

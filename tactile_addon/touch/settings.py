@@ -6,7 +6,7 @@ import math
 from contextlib import contextmanager
 
 from bpy.app.translations import pgettext_iface as iface
-from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 from bpy.types import Object
 
 from ... import core
@@ -76,6 +76,29 @@ def changed(settings, context):
         context.view_layer.update()
 
 
+KEPT = {"update": changed, "override": OVERRIDABLE}  # what a probe's properties have beside an operator's
+UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
+TARGET = StringProperty(
+    name="Target",
+    description="Name of the mesh object to touch; empty for the active object",
+    options=UNSAVED,
+)
+LOCATION = FloatVectorProperty(
+    name="Location",
+    subtype="TRANSLATION",
+    description="Where to touch; if not set, the 3D cursor",
+    options=UNSAVED,
+)
+
+
+def length_property(name, description, **more):
+    """A length of 0 or more, in units of the scene."""
+    return FloatProperty(name=name, description=description, subtype="DISTANCE", soft_min=0.0, **more)
+
+
+NOISE = length_property("Noise", "Standard deviation of the simulated sensor", precision=4, **KEPT)
+
+
 class FitSettings:
     """Mixed into operators and property groups."""
 
@@ -83,8 +106,7 @@ class FitSettings:
         name="Method",
         description="How to fit the patch",
         items=METHODS,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     degree: IntProperty(
         name="Degree",
@@ -93,8 +115,7 @@ class FitSettings:
         default=0,
         min=0,
         max=6,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     weight: FloatProperty(
         name="Weight",
@@ -103,15 +124,13 @@ class FitSettings:
         default=0.0,
         soft_min=0.0,
         soft_max=1e5,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     solver: EnumProperty(
         name="Solver",
         description="How to minimize the curvature",
         items=SOLVERS,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
 
 
@@ -124,8 +143,7 @@ class TouchSettings(FitSettings):
         default=3,
         min=3,
         max=MOST_PLANES,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     azimuths: FloatVectorProperty(
         name="Azimuths",
@@ -133,8 +151,7 @@ class TouchSettings(FitSettings):
         size=MOST_PLANES,
         unit="ROTATION",
         default=[math.radians(a) for a in (0, 60, 120, 30, 90, 150)],
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     tilts: FloatVectorProperty(
         name="Tilts",
@@ -143,41 +160,23 @@ class TouchSettings(FitSettings):
         unit="ROTATION",
         soft_min=-STEEPEST,
         soft_max=STEEPEST,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
-    extent: FloatProperty(
-        name="Extent",
-        description="Distance to feel on either side of the point; 0 goes as far as a patch can be "
-        "trusted, in a map an eighth of the object's size",
-        subtype="DISTANCE",
-        soft_min=0.0,
-        update=changed,
-        override=OVERRIDABLE,
+    extent: length_property(
+        "Extent",
+        "Distance to feel on either side of the point; 0 goes as far as a patch can be trusted, in "
+        "a map an eighth of the object's size",
+        **KEPT,
     )
-    step: FloatProperty(
-        name="Step",
-        description="Distance between contacts; 0 chooses it so that more contacts would add little",
-        subtype="DISTANCE",
-        soft_min=0.0,
-        update=changed,
-        override=OVERRIDABLE,
+    step: length_property(
+        "Step", "Distance between contacts; 0 chooses it so that more contacts would add little", **KEPT
     )
-    noise: FloatProperty(
-        name="Noise",
-        description="Standard deviation of the simulated sensor",
-        subtype="DISTANCE",
-        soft_min=0.0,
-        precision=4,
-        update=changed,
-        override=OVERRIDABLE,
-    )
+    noise: NOISE
     seed: IntProperty(
         name="Seed",
         description="Seed of the noise: the same seed gives the same contacts",
         min=0,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
 
 
