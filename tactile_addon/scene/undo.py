@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What handlers and timers add to the scene after an undo step was stored, and that is in no step.
 
-Undo keeps each datablock that two steps have in common in memory, with its pointers, and frees what is not in
-the step that it goes to. A collection that holds a patch made by a handler would then point to freed memory. So
-all of that is unlinked before undo, and linked again afterward if it is still there.
+Undo keeps in memory each datablock that two steps have in common, with its pointers, and frees what is
+not in the step that it goes to. A collection that holds a patch made by a handler would then point to
+freed memory. So all of that is unlinked before undo, and linked again afterward if it is still there.
 """
 
 from contextlib import contextmanager
