@@ -142,7 +142,8 @@ def assert_printed(shown, out):
     """Each line is printed with the same words and about the same numbers: other versions round otherwise."""
     printed = {NUMBER.sub("#", line): line for line in out.splitlines()}
     for line in shown.splitlines():
-        assert (words := NUMBER.sub("#", line)) in printed, f"{line}\n{out}"
+        words = NUMBER.sub("#", line)
+        assert words in printed, f"{line}\n{out}"
         numbers = [[float(n) for n in NUMBER.findall(each)] for each in (line, printed[words])]
         assert numbers[0] == pytest.approx(numbers[1], rel=0.2), f"{line}\n{printed[words]}"
 
