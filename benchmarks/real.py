@@ -43,7 +43,7 @@ from .peers import Fit, quadric_process, radial_basis
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
 HOLD_OUT, LEAST = 90, 20  # points of the mesh above a domain
 LAYERS = 4
-NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 4, 0.3, 0.2  # toward a surface: a step in radii, and of its height
+NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 8, 0.3, 0.2  # toward a surface: a step in radii, and of its height
 WIDE, OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 0.02, 3.0, 5.0, 10.0, 0.05
 DENSE = 150  # points for the true frame
 
@@ -193,11 +193,13 @@ def met(fit, touch, radius):
     """
     at, normal = touch.hold_out @ fit.axes, fit.axes.T @ touch.axes[:, 2]
     off, change, small = np.zeros(len(at)), np.ones(len(at)), 1e-4 * radius
-    for _ in range(NEWTON_STEPS if normal[2] < 1.0 - 1e-12 else 1):
+    # Along the heights themselves one step is exact, however long.
+    steps, farthest = (NEWTON_STEPS, FARTHEST * radius) if normal[2] < 1.0 - 1e-12 else (1, np.inf)
+    for _ in range(steps):
         above = fit.height(*at[:, :2].T) - at[:, 2]
         ahead = at + small * normal
         change = np.maximum((above - fit.height(*ahead[:, :2].T) + ahead[:, 2]) / small, LEAST_CHANGE)
-        step = np.clip(above / change, -FARTHEST * radius, FARTHEST * radius)
+        step = np.clip(above / change, -farthest, farthest)
         at, off = at + step[:, None] * normal, off + step
     return at, off, change
 

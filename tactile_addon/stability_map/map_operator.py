@@ -32,7 +32,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     target: TARGET
     spacing: length_property(
-        "Spacing", "Distance between the points that are touched; 0 for a quarter of the extent"
+        "Spacing", "Distance between the points that are touched; 0 uses a quarter of the extent"
     )
 
     stop = "Stop and Keep"
@@ -56,11 +56,11 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
     def _begin(self, context):
-        target = target_object(context, self.target)
-        # No reference to the target: whatever happens to the scene, the touches go on in a snapshot of it.
-        self._name, self._uid = target.name, target.session_uid
         self._map = StabilityMap(
-            target, context.evaluated_depsgraph_get(), spacing=self.spacing, **touch_arguments(self)
+            target_object(context, self.target),
+            context.evaluated_depsgraph_get(),
+            spacing=self.spacing,
+            **touch_arguments(self),
         )
         self._steps = self._map.steps()
 
@@ -77,22 +77,10 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         return f"Stability Map: {done} of {count} points", done / max(count, 1)
 
     def _check(self, context):
-        self._target(context)
-
-    def _target(self, context):
-        """The target, if it is still what it was when it was first touched; raises ValueError if not."""
-        found = next((o for o in context.view_layer.objects if o.session_uid == self._uid), None)
-        if found is None:
-            raise ValueError(f'"{self._name}" is gone: the map of it was stopped')
-        if context.mode != "OBJECT" or found.mode != "OBJECT":
-            raise ValueError("The map was stopped, for Object Mode was left: start it again")
-        if found.matrix_world != self._map.surface.matrix:
-            raise ValueError(f'"{self._name}" was moved while it was touched: start again')
-        return found
+        self._map.surface.require_source(context)
 
     def _finish(self, context):
-        target = self._target(context)
-        self._map.require_same(target, context.evaluated_depsgraph_get())
+        target = self._map.surface.require_same(context)
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
         record = painted[patch_record.MAP_RECORD].to_dict()
