@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The loop over touches that one would write without a cluster; benchmarks.cluster starts it.
 
-`python -m benchmarks.plain_loop FILES OPTIONS`, both JSON: it touches each once, for workers are warm too, says
-that it is ready, waits for a line, and prints the seconds that it took and the processor's.
+`python -m benchmarks.plain_loop FILES OPTIONS`, both JSON: it touches each file once, because workers are
+warm too, says that it is ready, waits for a line, and prints the seconds that it took and the processor's.
 """
 
 import json
