@@ -20,15 +20,15 @@ FEW_CONTACTS = 12  # of those that are tried first
 def suggest_plane(
     r: Reconstruction, outward: ArrayLike | None = None, tangent: ArrayLike | None = None
 ) -> tuple[SamplingPlane, float]:
-    """The plane that would lower the mean variance of the height over the domain most.
+    """The plane that would lower the mean variance of the height over the domain most, see SamplingPlane.
 
     outward, tangent : what the contours were tracked with, and the plane is measured by, see `track`;
         d3 and d1 of the frame without
 
     Also the mean height_std that is expected after it, in the caller's unit.
 
-    The contour is taken to reach as far and to have as many contacts as those before, with their
-    noise. What it will show follows from where it runs, not from the heights found there.
+    The contour is assumed to have the length, number of contacts and noise of those before. Its
+    effect depends on where it runs, not on the heights found there.
     """
     points, weights = r.domain.nodes
     over = points / r.radius
