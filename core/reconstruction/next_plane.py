@@ -20,7 +20,7 @@ FEW_CONTACTS = 12  # of those that are tried first
 def suggest_plane(
     r: Reconstruction, outward: ArrayLike | None = None, tangent: ArrayLike | None = None
 ) -> tuple[SamplingPlane, float]:
-    """The plane that would lower the mean variance of the height over the domain most, see SamplingPlane.
+    """The plane that would lower the mean variance of the height over the domain most.
 
     outward, tangent : what the contours were tracked with, and the plane is measured by, see `track`;
         d3 and d1 of the frame without
