@@ -50,7 +50,7 @@ class Mesh(NamedTuple):
 
     @property
     def is_closed(self) -> bool:
-        """Whether each edge of a triangle is one of another too."""
+        """Whether each edge of a triangle belongs to another triangle too."""
         edges = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         counts = np.unique(edges, axis=0, return_counts=True)[1]
         return bool((counts == 2).all())
