@@ -61,7 +61,7 @@ MESSAGES = sorted(set(messages()))
 
 
 def is_about_an_argument(text):
-    return re.match(r"(\w+|…): wanted ", text) and "single precision" not in text
+    return re.match(r"(\w+|…): expected ", text) and "single precision" not in text
 
 
 @pytest.mark.parametrize("message", [m for m in MESSAGES if not is_about_an_argument(m)])
@@ -72,7 +72,7 @@ def test_every_message_is_in_the_table(message):
 @pytest.mark.parametrize("row", ROWS)
 def test_every_row_is_a_message_and_in_a_test(row):
     fixed = [re.findall(r"\w+", part) for part in row.split("…")]
-    if row.startswith(("…: wanted", "The patch describes")):
+    if row.startswith(("…: expected", "The patch describes")):
         return
     assert row in MESSAGES
     tests = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("*.py"))

@@ -76,7 +76,7 @@ def compose(extension, patch, unit):
     if report["vertices"]:
         off, std = (100.0 * report[key] / radius for key in ("vertex_distance_mean", "height_std"))
         sentence = (
-            f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius in the mean, "
+            f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius on average, "
             f"standard deviation {std:.1f} %"
         )
         put.text(sentence, -3.3, -2.48, 0.14)

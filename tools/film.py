@@ -55,7 +55,7 @@ def main():
     size = OUTPUT.stat().st_size
     print(f"saved {OUTPUT}: {len(pictures)} pictures, {size} bytes, {sum(times) / 1e3:.1f} s")
     if size > LARGEST:
-        sys.exit(f"film: wanted at most {LARGEST} bytes: lower QUALITY or the number of pictures")
+        sys.exit(f"film: expected at most {LARGEST} bytes: lower QUALITY or the number of pictures")
 
 
 class Film:

@@ -59,7 +59,7 @@ def disagreements(root: Path) -> Iterator[str]:
     """A sentence for each thing that does not agree with the manifest's version."""
     version = manifest_version(root)
     if not VERSION.fullmatch(version):
-        yield f'blender_manifest.toml has the version "{version}": wanted three numbers, as in 1.0.0'
+        yield f'blender_manifest.toml has the version "{version}": expected three numbers, as in 1.0.0'
     date, text = section(root, version)
     if date is None:
         yield f"CHANGELOG.md does not begin with a section [{version}], the manifest's version: write it"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
-from ..contours.tracking import Surface
+from ..contours.finger import Surface
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, DISK, Charts, disk_around
 from .join import charts_of

@@ -107,7 +107,7 @@ def _cells(charts: Charts, size: float) -> Indices:
         count = 2 * int(np.ceil(2.0 * half * charts.radii[node] / size)) + 1  # odd: the origin is one
         if count**2 > MOST_CELLS:
             raise ValueError(
-                f"edge: wanted a patch to have some thousands of them at most, got {size / CELL:g}"
+                f"edge: expected a few thousand edges at most across a patch, got {size / CELL:g}"
             )
         line = np.linspace(-half, half, count)
         x, y = (axis.ravel() for axis in np.meshgrid(line, line))

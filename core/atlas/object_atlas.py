@@ -12,12 +12,14 @@ from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number
 from ..reconstruction.result import Reconstruction
-from .boundaries import Edge, edges_of
+from ..reconstruction.serialization import plain
+from .boundaries import Edge, edges_of, node_dict
 from .charts import Charts
 from .field import AGREE, DIFFER, LAYER, blended, node_weights
 from .frontier import FACING, INSIDE, Place
 from .meshing import SMALLEST, Mesh, meshed
 
+VERSION = 1  # of the graph as data
 TURNS, OUTWARD = 16, 6  # samples of each patch, from which what is far away is measured
 
 
@@ -56,7 +58,13 @@ class Atlas:
     @cached_property
     def edges(self) -> list[Edge]:
         """Pairs of patches that share a boundary, with it."""
-        return edges_of(self.charts)
+        edges: list[Edge] = result_of(edges_of(self.charts))
+        return edges
+
+    def bounding(self) -> Generator[float, None, None]:
+        """What `edges` does, in steps: yields the share that is done, after which `edges` are known."""
+        if "edges" not in vars(self):
+            vars(self)["edges"] = yield from edges_of(self.charts)  # where cached_property looks
 
     @property
     def status(self) -> str:
@@ -72,16 +80,16 @@ class Atlas:
     def _verdict(self) -> tuple[str, str]:
         if self.uncovered:
             return "uncertain", (
-                f"The patches end at {len(self.uncovered)} places where the object goes on: allow more "
-                "touches, or a larger tolerance."
+                f"The patches end at {len(self.uncovered)} places where the object goes on: allow "
+                "more touches or a larger tolerance."
             )
         rough = len(self._uncertain)
         if rough:
             return "uncertain", (
-                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch there "
-                "once more, or take a larger one."
+                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch "
+                "there again or use a larger tolerance."
             )
-        return "ok", "The object was felt wherever a finger could go on."
+        return "ok", "The object was felt everywhere a finger could reach."
 
     @cached_property
     def _uncertain(self) -> list[Reconstruction]:
@@ -147,13 +155,8 @@ class Atlas:
 
         Watertight where the object was felt all round, open where it was not.
         """
-        steps = self.meshing(edge)
-        try:
-            while True:
-                next(steps)
-        except StopIteration as end:
-            mesh: Mesh = end.value
-            return mesh
+        mesh: Mesh = result_of(self.meshing(edge))
+        return mesh
 
     def suggested_edge(self) -> float:
         """An edge at which triangles are off the surface by half its deviation, in the median of the patches.
@@ -184,6 +187,34 @@ class Atlas:
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """What `mesh` does, in steps: yields the share that is done, and returns the mesh."""
         return meshed(self.charts, number("edge", edge, above=0.0))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The graph as a dict of numbers, words, lists and dicts, as JSON has them, in the caller's unit.
+
+        nodes : frame, radius, polynomial (1), ends of the domain, deviation and status of each patch
+        edges : indices of two nodes, their boundary curve, and the angle of their normals along it
+        uncovered, next_touch : where the object goes on, and where a touch would bring most, or None
+
+        All of a patch is in the `to_dict` of it, which is thirty times as much.
+        """
+        touch = self.next_touch()
+        return {
+            "version": VERSION,
+            **{name: getattr(self, name) for name in ("status", "message", "tolerance")},
+            "nodes": [node_dict(r) for r in self.patches],
+            "edges": [edge.to_dict() for edge in self.edges],
+            "uncovered": [{"point": list(p.point), "outward": list(p.normal)} for p in self.uncovered],
+            "next_touch": None if touch is None else plain(touch._asdict()),
+        }
+
+
+def result_of(steps: Generator[Any, None, Any]) -> Any:
+    """What steps return once they are done."""
+    try:
+        while True:
+            next(steps)
+    except StopIteration as end:
+        return end.value
 
 
 def _blended_curvatures(atlas: Atlas, mesh: Mesh) -> tuple[Array, Array]:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, finite_array, number, unit_vector
-from ..contours.tracking import Surface, generator_of
+from ..contours.finger import Surface
+from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.touches import explore, explore_many
 from .frontier import Frontier, Next, side_of
@@ -18,7 +19,7 @@ from .object_atlas import Atlas
 
 MOST = 1000
 FIRST = 300.0  # times the tolerance, that half curves of the first touch may become
-SIZE = 1.5  # times the tolerance, that a patch may be uncertain in the mean before its neighbors are known
+SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
 LEAST = 5.0  # times it, that a patch is wide at least
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
 LARGER = 2.0  # times the patch where it begins, that a touch may become
@@ -58,7 +59,7 @@ def touch_all_over(
     tolerance, noise = number("tolerance", tolerance, above=0.0), number("noise", noise, least=0.0)
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
     if tolerance < noise:
-        raise ValueError(f"tolerance: wanted the noise {noise:g} or more, got {tolerance:g}")
+        raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     wanted = {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance}
     found = [explore(surface, p, up, farthest=FIRST * tolerance, **wanted)]  # type: ignore[arg-type]
     frontier = Frontier(surface, side_of(surface, p, up, found[0].step))

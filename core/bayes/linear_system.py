@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The linear system of the fit in bayes.py: contacts and measured slopes against terms under their prior."""
+"""The linear system of joint_fit.py: contacts and measured slopes against terms under their prior."""
 
 from typing import NamedTuple
 

@@ -49,7 +49,7 @@ class SamplingPlane:
         """`axes` of the unit n and of azimuth 0, across it."""
         azimuth, tilt = number("azimuth", self.azimuth), number("tilt", self.tilt)
         if abs(tilt) >= math.pi / 2:
-            raise ValueError(f"tilt: wanted less than 90 degrees, got {math.degrees(tilt):g}")
+            raise ValueError(f"tilt: expected less than 90 degrees, got {math.degrees(tilt):g}")
         t = along(scaled(e1, math.cos(azimuth)), cross(n, e1), math.sin(azimuth))
         u = along(scaled(n, math.cos(tilt)), cross(n, t), math.sin(tilt))
         return t, u, cross(t, u)
@@ -86,7 +86,7 @@ class Contour:
             if spacing > MOST_ROUNDING * np.ptp(points, axis=0).max() > 0.0:
                 raise ValueError(
                     f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
-                    "of this size: wanted coordinates relative to a point near by, or double precision"
+                    "of this size: expected coordinates relative to a nearby point, or double precision"
                 )
         object.__setattr__(self, "points", points)
         if self.plane_normal is not None:
@@ -99,13 +99,13 @@ class Contour:
         if self.stops is not None:
             object.__setattr__(self, "stops", tuple(list_of("stops", self.stops, str)))
             if len(self.stops) != 2:
-                raise ValueError(f"stops: wanted two words, got {shown(self.stops)}")
+                raise ValueError(f"stops: expected two words, got {shown(self.stops)}")
         if self.normal_std is not None:
             object.__setattr__(self, "normal_std", number("normal_std", self.normal_std, least=0.0))
             if self.normals is None:
-                raise ValueError("normal_std: wanted measured normals that it is of, got none")
+                raise ValueError("normal_std: expected the measured normals that it belongs to, got none")
             if not np.abs(self.normals).max(axis=1, initial=0.0).all():
-                raise ValueError("normals: wanted directions where normal_std is given, got (0, 0, 0)")
+                raise ValueError("normals: expected directions where normal_std is given, got (0, 0, 0)")
 
     def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
         """Some of its contacts, as they are: they are in order."""
@@ -136,7 +136,7 @@ def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:
     e1 = along(given, n, -dot(given, n))
     length = math.hypot(*e1)
     if length < 1e-6:
-        raise ValueError("tangent: wanted a direction across the normal, got one along it")
+        raise ValueError("tangent: expected a direction across the normal, got one along it")
     return scaled(e1, 1.0 / length)
 
 

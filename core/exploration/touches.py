@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vector
 from ..contours.contour import EXTENT, Contour, SamplingPlane
-from ..contours.tracking import Surface, generator_of, track
+from ..contours.finger import Surface
+from ..contours.tracking import following, generator_of, track
 from ..reconstruction.deviations import with_height_stds
 from ..reconstruction.from_contours import fitted, options_of
 from ..reconstruction.result import Reconstruction
@@ -149,10 +150,10 @@ def explore_many(
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
         reference = SamplingPlane(0.0).axes(direction, tangent)
-        feel = partial(track, surface, point, direction, tangent=tangent)
-        farthest = wanted["farthest"] or _farthest(partial(feel, wanted["planes"]))
-        noisy = partial(feel, noise=noise, rng=generator)
-        return (yield from Touch(noisy, point, reference, **wanted | {"farthest": farthest}).steps())
+        place = surface, point, direction
+        farthest = wanted["farthest"] or _farthest(partial(track, *place, wanted["planes"], tangent=tangent))
+        follow = partial(following, *place, noise=noise, rng=generator, tangent=tangent)
+        return (yield from Touch(follow, point, reference, **wanted | {"farthest": farthest}).steps())
 
     fit = options_of(method, degree, None, weight, solver)
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, fit)
@@ -162,7 +163,7 @@ def _planes(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
     if not isinstance(planes, int | np.integer):
         return tuple(list_of("planes", planes, SamplingPlane))
     if not 3 <= planes <= MOST_EVEN:
-        raise ValueError(f"planes: wanted 3 to {MOST_EVEN}, or sampling planes, got {planes}")
+        raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got {planes}")
     return tuple(SamplingPlane(math.pi * i / planes) for i in range(planes))
 
 
@@ -190,7 +191,7 @@ def _farthest(feel: Callable[..., list[Contour]]) -> float:
     while not ended(most):
         least, most = most, 2.0 * most
         if most > LONGEST:
-            raise ValueError("The curves do not end by themselves: say how far to feel at most, by farthest")
+            raise ValueError("The curves do not end by themselves: set farthest, the greatest length to feel")
     for _ in range(BISECTIONS):
         middle = 0.5 * (least + most)
         least, most = (least, middle) if ended(middle) else (middle, most)

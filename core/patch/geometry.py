@@ -93,7 +93,7 @@ def similarity(matrix: ArrayLike) -> tuple[float, Array, Array]:
     u, stretches, v = np.linalg.svd(m[:3, :3])
     even = scale > 0.0 and np.abs(stretches / scale - 1.0).max() <= EVEN
     if not even or np.abs(m[3] - (0.0, 0.0, 0.0, 1.0)).max() > 0.0:
-        raise ValueError("matrix: wanted a rotation, one scale above 0 and a shift, got another matrix")
+        raise ValueError("matrix: expected a rotation, one scale above 0 and a shift, got another matrix")
     return scale, u @ v, m[:3, 3]
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a real surface is beside a polynomial: a Gaussian process over the tangent plane.
 
-Beside the paper. The heights are phi' b + g, phi the terms of degree 1 to 6 under the prior of bayes.py
+Beside the paper. The heights are phi' b + g, phi the terms of degree 1 to 6 under the prior of joint_fit.py
 and g of zero mean and of the covariance
 
     sum_i v_i M(|p - q| / l_i),  M(d) = (1 + a) exp(-a),  a = sqrt(3) d,
@@ -83,6 +83,10 @@ class Residual:
 
     def height_covariances(self, p: Array, q: Array) -> tuple[Array, Array]:
         """Covariances of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
+        if p is self.places:  # at which the places tell all of k
+            terms = monomials(p[:, 0], p[:, 1], TERMS).T
+            left = solved(self.factor, np.vstack([terms, self.places_factor.T]))
+            return left.T @ self.whitened(q)[1], left.T @ left
         at_p = self.signed(p)
         return self._covariance(p, at_p, q, self.signed(q)), self._covariance(p, at_p, p, at_p)
 

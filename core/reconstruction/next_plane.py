@@ -14,6 +14,7 @@ from .result import Reconstruction
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))  # 1.5 degrees off, a plane ends a 38th of the radius aside.
 COARSE_STRIDE = 4  # So many azimuths lie between those that are tried first.
 MOST_CONTACTS = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
+FEW_CONTACTS = 12  # of those that are tried first
 
 
 def suggest_plane(
@@ -31,29 +32,28 @@ def suggest_plane(
     """
     points, weights = r.domain.nodes
     over = points / r.radius
-    tried = np.arange(0, len(AZIMUTHS), COARSE_STRIDE)
-    lost = _lost(r, over, AZIMUTHS[tried])
-    # Beside the best of them.
-    near = tried[np.argmax(lost @ weights)] + np.arange(1 - COARSE_STRIDE, COARSE_STRIDE)
-    near = near[near % COARSE_STRIDE > 0] % len(AZIMUTHS)
-    tried, lost = np.concatenate([tried, near]), np.vstack([lost, _lost(r, over, AZIMUTHS[near])])
+    first = int(np.argmax(_lost(r, over, AZIMUTHS[::COARSE_STRIDE], FEW_CONTACTS) @ weights))
+    # The best of them, and those beside it.
+    near = (COARSE_STRIDE * first + np.arange(1 - COARSE_STRIDE, COARSE_STRIDE)) % len(AZIMUTHS)
+    lost = _lost(r, over, AZIMUTHS[near], MOST_CONTACTS)
     best = int(np.argmax(lost @ weights))
-    variance = np.maximum((r.height_std(*points.T) / r.radius) ** 2 - lost[best], 0.0)
-    plane = SamplingPlane(float(AZIMUTHS[tried[best]]))
+    variance = np.maximum((r.node_stds / r.radius) ** 2 - lost[best], 0.0)
+    plane = SamplingPlane(float(AZIMUTHS[near[best]]))
     if outward is not None:
         d1, _, n = r.frame.axes.T
         plane = SamplingPlane(azimuth_of(plane.axes(n, d1)[:, 0], outward, tangent))
     return plane, r.radius * float(weights @ np.sqrt(variance))
 
 
-def _lost(r: Reconstruction, over: Array, azimuths: Array) -> Array:
-    """What contours at azimuths (k,) take off the variances at points (n, 2), (k, n); in unit radius.
+def _lost(r: Reconstruction, over: Array, azimuths: Array, most: int) -> Array:
+    """What contours at azimuths (k,) of at most so many contacts take off the variances at points (n, 2).
 
+    (k, n), in unit radius.
     A contour's heights have the covariance `seen`, and `shared` with those at the points, off whose variance
     it takes the diagonal of shared' seen^-1 shared.
     """
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
-    count, surface = min(wanted, MOST_CONTACTS), r.uncertainty
+    count, surface = min(wanted, most), r.uncertainty
     directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
     contours = np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None]
     shared, seen = surface.height_covariances(contours, over)

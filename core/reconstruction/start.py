@@ -97,15 +97,10 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         return None, touches, errors
     curves = curves.at(good)
     axes, k1, k2, radii = darboux_frames(curves, normals[good])
-    local = curves.points @ axes[:, None] / radii[:, None, None, None]
     strokes, stds, told = [], [], []
     for row, i in enumerate(good):
-        beside, size = given[i].strokes, 1
-        if len(beside):
-            beside = (beside - points[i]) @ axes[row] / radii[row]
-            turned = replace(curves.at(row), points=local[row], tangents=curves.tangents[row] @ axes[row])
-            along = unit_in(axes[row], curves.tangents[row, 0])
-            beside, size = means(beside[_over(turned, touches[i], beside)], along)
+        relative = given[i].strokes - points[i]
+        beside, size = _beside(curves.at(row), touches[i], axes[row], radii[row], relative)
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
@@ -120,6 +115,17 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
 def _std(noise: float | None, size: int, known: list[float]) -> float:
     """The least deviation of contacts, the means of `size` others of that noise; or what is known of them."""
     return max(known) if noise is None else noise / math.sqrt(size)
+
+
+def _beside(
+    curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, strokes: Array
+) -> tuple[Array, int]:
+    """Strokes (n, 3) over the domain of curves as means, in the axes and in unit radius, and of how many."""
+    if not len(strokes):
+        return strokes, 1
+    local = strokes @ axes / radius
+    turned = replace(curves, points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
+    return means(local[_over(turned, contours, local)], unit_in(axes, curves.tangents[0]))
 
 
 def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArray[np.bool_]:
@@ -191,6 +197,7 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
 
 def _coarse(gap: float, size: float) -> DegenerateCurvesError:
     return DegenerateCurvesError(
-        f"the coordinates at the point are {gap:.2g} apart in double precision, too coarse for curves of "
+        f"neighboring coordinates at the point are {gap:.2g} apart in double precision, too coarse "
+        "for curves of "
         f"{size:.2g}: move the origin nearer to the point"
     )

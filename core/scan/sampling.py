@@ -61,7 +61,7 @@ def scattered(
     normals = np.cross(*sides)
     areas = np.linalg.norm(normals, axis=1)
     if not areas.sum() > 0.0:
-        raise ValueError("triangles: wanted some with an area, got none")
+        raise ValueError("triangles: expected some with an area, got none")
     chosen = rng.choice(len(areas), count, p=areas / areas.sum())
     shares = rng.random((count, 2))
     shares = np.where(shares.sum(axis=1, keepdims=True) > 1.0, 1.0 - shares, shares)

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, finite_array
 from ..contours.contour import SamplingPlane, Vector
-from ..contours.tracking import Surface, track
+from ..contours.finger import Surface
+from ..contours.tracking import track
 from ..patch.domain import GRID, Domain
 from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction

@@ -13,6 +13,7 @@ from time import perf_counter
 import bpy
 from bpy.app.handlers import persistent
 
+from ..scene import undo
 from ..scene.family import remembered
 from . import anchor, deleted
 from .probe import forget_targets, is_free, is_probe, probe_of, record_of, targets
@@ -51,7 +52,7 @@ def _bring_up_to_date(depsgraph, dearest):
     if not targets():
         _unsure = False
         return
-    with remembered():
+    with remembered(), undo.after_step():
         concerned, unsure = _concerned(depsgraph)
         if not concerned:
             return
@@ -169,7 +170,7 @@ def _settle():
         return SETTLE
     end = perf_counter() + SLICE
     for window in windows:
-        with bpy.context.temp_override(window=window), remembered():
+        with bpy.context.temp_override(window=window), remembered(), undo.after_step():
             depsgraph = bpy.context.evaluated_depsgraph_get()
             if _unsure:
                 on_depsgraph_update(window.scene, depsgraph)
@@ -186,13 +187,28 @@ def _settle():
     return None
 
 
+@persistent
+def before_undo(*_):
+    """Has undo free what is in no step of it, and nothing point there."""
+    undo.take_out()
+
+
+@persistent
+def after_undo(*_):
+    """Puts back what is there all the same, and has all probes looked at."""
+    undo.put_back()
+    on_other_data()
+
+
 HANDLERS = {
     "depsgraph_update_post": on_depsgraph_update,
     "frame_change_post": on_frame_change,
     "blend_import_post": on_blend_import,
     "load_post": on_other_data,
-    "undo_post": on_other_data,
-    "redo_post": on_other_data,
+    "undo_pre": before_undo,
+    "redo_pre": before_undo,
+    "undo_post": after_undo,
+    "redo_post": after_undo,
 }
 
 

@@ -5,6 +5,9 @@
 import sys
 from time import perf_counter
 
+from bpy.props import BoolProperty
+
+from ..touch.settings import UNSAVED
 from .operators import report_error
 
 AT_ONCE = 0.2  # seconds of work before a window is told that there is more
@@ -20,6 +23,12 @@ class InSlices:
     may have changed; `_done()`, words and the share that is done, or None; and `_finish(context)`. All but
     `_done` may raise ValueError, with a sentence for the user.
     """
+
+    progress: BoolProperty(
+        name="Progress",
+        description="Print progress to stderr where there is no window to show it",
+        options={"HIDDEN", *UNSAVED},
+    )
 
     _timer = None  # while it is running in a window
     _in_window = False  # whether a dialog has been agreed to, after which it goes on in slices
@@ -43,7 +52,7 @@ class InSlices:
             self._check(context)
             said = perf_counter()
             for _ in self._steps:
-                if getattr(self, "progress", False) and perf_counter() > said + SAY:
+                if self.progress and perf_counter() > said + SAY:
                     said = perf_counter()
                     print(self._done()[0], file=sys.stderr, flush=True)
             return self._finish(context)

@@ -28,6 +28,7 @@ from .patch_record import (
     matrix_of,
     place,
 )
+from .undo import note_added
 from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
@@ -57,6 +58,7 @@ def _new(scene, name, material):
     obj.show_in_front = True  # it lies in the surface it describes
     collection(scene).objects.link(obj)
     obj.data.materials.append(material)
+    note_added(obj)
     return obj
 
 
@@ -130,6 +132,7 @@ def collection(scene):
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
         scene.collection.children.link(found)
+        note_added(found)
     return found
 
 

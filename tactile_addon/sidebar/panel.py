@@ -30,7 +30,7 @@ from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
-HELP = "Click a mesh: a probe feels it there, and keeps a patch of its surface with its curvatures"
+HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
 
 

@@ -196,7 +196,7 @@ def test_broken_and_empty_files_and_one_that_blender_dies_of_are_error_rows(comm
         assert (row["touches"], row["error"], row["hash"]) == (3, 3, None)
         assert row["message"] in output
     assert found["crash.ply"]["message"] == "Blender ended by SIGABRT"
-    assert found["half.ply"]["message"] == 'no mesh could be read from "half.ply": is the file whole?'
+    assert found["half.ply"]["message"] == 'no mesh could be read from "half.ply": is the file complete?'
     rows = [row for path in blocks_of(tmp_path / "set") for row in pq.read_table(path).to_pylist()]
     assert len(rows) == 27
     assert {row["touch"] for row in rows if row["object"] == "crash"} == {0, 1, 2}

@@ -262,10 +262,10 @@ def test_faces_of_no_area_are_nothing_to_feel(empty):
         ({"extent": 0.1, "step": 0.2}, "The step 0.2 m is longer"),
         ({"extent": 0.1, "step": 0.09}, "of the 3 contacts it needs"),
         ({"noise": -1.0}, "lengths of 0 or more"),
-        ({"azimuths": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "run in one direction"),
-        ({"tilts": (1.6, 0.0, 0.0, 0.0, 0.0, 0.0)}, "Tilt: wanted less than 90 degrees"),
-        ({"degree": 1}, "Degree: wanted"),
-        ({"weight": -1.0}, "Weight: wanted"),
+        ({"azimuths": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "run in the same direction"),
+        ({"tilts": (1.6, 0.0, 0.0, 0.0, 0.0, 0.0)}, "Tilt: expected less than 90 degrees"),
+        ({"degree": 1}, "Degree: expected"),
+        ({"weight": -1.0}, "Weight: expected"),
         ({"target": "Nobody"}, 'There is no object "Nobody"'),
     ],
 )
@@ -317,7 +317,7 @@ def make_distant(bpy, obj):
     ("spoil", "sentence"),
     [
         (make_faceless, "no faces to touch"),
-        (make_curve, '"Sphere" is no mesh: select a mesh object, or convert this one'),
+        (make_curve, '"Sphere" is not a mesh: select a mesh object, or convert this one'),
         (make_infinite, "no finite place"),
         (make_nowhere, "reaches farther than"),
         (make_flat, "scaled to nothing"),
