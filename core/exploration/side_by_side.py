@@ -97,7 +97,7 @@ def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...
     if not isinstance(planes, int | np.integer):
         return tuple(list_of("planes", planes, SamplingPlane))
     if not 3 <= planes <= MOST_EVEN:
-        raise ValueError(f"planes: wanted 3 to {MOST_EVEN}, or sampling planes, got {planes}")
+        raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got {planes}")
     return tuple(SamplingPlane(math.pi * i / planes) for i in range(planes))
 
 
@@ -125,7 +125,7 @@ def _farthest(feel: Callable[..., list[Contour]]) -> float:
     while not ended(most):
         least, most = most, 2.0 * most
         if most > LONGEST:
-            raise ValueError("The curves do not end by themselves: say how far to feel at most, by farthest")
+            raise ValueError("The curves do not end by themselves: set farthest, the greatest length to feel")
     for _ in range(BISECTIONS):
         middle = 0.5 * (least + most)
         least, most = (least, middle) if ended(middle) else (middle, most)

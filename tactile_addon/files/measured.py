@@ -42,7 +42,7 @@ def read(paths, unit, meters, whole=False):
         directions += [] if outward is None else [outward]
         found = named or found
     if not whole and any(not np.allclose(point, points[0], rtol=1e-12, atol=0.0) for point in points):
-        raise ValueError("The files name different reference points: import each of them by itself")
+        raise ValueError("The files name different reference points: import them one by one")
     if any(np.dot(direction, directions[0]) <= 0.0 for direction in directions):
         directions = []  # they are of other sides of one object
     point, outward = (given[0] if given else None for given in (points, directions))
@@ -63,8 +63,8 @@ def whole_of(contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
         outward = contacts.outward
         if outward is None:
             raise ValueError(
-                "Normals were not measured everywhere, and nothing tells the outer side: give outward, a "
-                "direction on the outer side of all contacts"
+                "Some contacts have no normals, and nothing tells their outer side: set outward, a direction "
+                "on the outer side of all contacts"
             )
     sign, origin = -1.0 if flip else 1.0, np.mean(np.vstack([c.points for c in felt]), axis=0)
     placed = [
@@ -122,7 +122,7 @@ def fit(
     try:
         return _fit(source, contacts, point, outward, flip, normal_std, options)
     except MemoryError:
-        raise ValueError("There are more contacts than fit into memory: take fewer of them") from None
+        raise ValueError("There are more contacts than fit into memory: use fewer of them") from None
 
 
 def _fit(source, contacts, point, outward, flip, normal_std, options):

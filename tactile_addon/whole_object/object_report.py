@@ -39,7 +39,7 @@ def object_summary(record):
     """What is found of a whole object, in a sentence."""
     std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
-        return f"{record['touches']} touches; {_surface(record)}; {_off(record, 'mean')} off in the mean"
+        return f"{record['touches']} touches; {_surface(record)}; {_off(record, 'mean')} off on average"
     return f"{record['patches']} patches of {record['contacts']} contacts; {_surface(record)}; ± {std}"
 
 

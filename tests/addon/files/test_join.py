@@ -98,9 +98,7 @@ def test_one_patch_of_files_with_points_of_their_own_is_still_refused(empty, thr
 
 def test_where_no_normals_were_measured_the_outer_side_is_asked_for(empty, two_halves):
     before = datablocks(empty)
-    with pytest.raises(
-        RuntimeError, match="Normals were not measured everywhere, and nothing tells the outer"
-    ):
+    with pytest.raises(RuntimeError, match="Some contacts have no normals, and nothing tells their outer"):
         joined(empty, two_halves)
     assert datablocks(empty) == before
     for outward, flip in (((0, 0, 1), False), ((0, 0, -1), True)):
@@ -115,15 +113,15 @@ def test_files_may_tell_the_outer_side_unless_they_contradict_each_other(empty, 
     up = write("up.csv", [Contour(row) for row in raster(ROWS)], outward=[0.0, 0.0, 1.0])
     assert joined(empty, [up])[1]["patches"] > 1
     down = write("down.csv", [Contour(row) for row in raster(ROWS)], outward=[0.0, 0.0, -1.0])
-    with pytest.raises(RuntimeError, match="nothing tells the outer side"):
+    with pytest.raises(RuntimeError, match="nothing tells their outer side"):
         joined(empty, [up, down])
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"tolerance": -1.0}, "Tolerance: wanted a finite number above 0, got -1"),
-        ({"outward": (0, 0, 0)}, "Outward: wanted"),
+        ({"tolerance": -1.0}, "Tolerance: expected a finite number above 0, got -1"),
+        ({"outward": (0, 0, 0)}, "Outward: expected"),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_is_left(empty, two_halves, options, message):
@@ -135,7 +133,7 @@ def test_what_cannot_be_is_refused_and_nothing_is_left(empty, two_halves, option
 
 def test_too_few_contacts_get_a_sentence(empty, write):
     few = write("few.csv", [Contour(next(raster([0.0]))[:12])])
-    with pytest.raises(RuntimeError, match="wanted 40 contacts or more, got 12"):
+    with pytest.raises(RuntimeError, match="expected 40 contacts or more, got 12"):
         joined(empty, [few], outward=(0, 0, 1))
 
 
@@ -154,4 +152,4 @@ def test_the_shell_joins_them_too(command, two_halves, tmp_path):
     assert "Deviations" not in paths[2].read_text()
     code, _, err = command("join", *two_halves)
     assert code == 1
-    assert "give outward" in err
+    assert "set outward" in err

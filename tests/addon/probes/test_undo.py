@@ -64,7 +64,9 @@ def test_a_choice_of_a_target_ends_the_memory_of_the_one_that_was_lost(empty, pr
 
 def in_panel(bpy, owner, name, value):
     """Sets a property as Blender's own panels do: its step of undo is stored before any handler sees it."""
-    by_hand(bpy, bpy.ops.wm.context_set_value, data_path=f"scene.objects[{owner!r}].{name}", value=repr(value))
+    by_hand(
+        bpy, bpy.ops.wm.context_set_value, data_path=f"scene.objects[{owner!r}].{name}", value=repr(value)
+    )
 
 
 def rest(bpy):
@@ -77,7 +79,9 @@ def pointers(bpy):
     data = bpy.data
     there = {b.as_pointer() for kind in (data.objects, data.meshes, data.collections) for b in kind}
     to = [block for obj in data.objects for block in (obj.data, obj.parent)]
-    to += [obj for c in (*data.collections, bpy.context.scene.collection) for obj in (*c.objects, *c.children)]
+    to += [
+        obj for c in (*data.collections, bpy.context.scene.collection) for obj in (*c.objects, *c.children)
+    ]
     return all(block.as_pointer() in there for block in to if block is not None)
 
 
@@ -92,7 +96,7 @@ def test_undo_leaves_no_pointer_to_a_patch_that_a_handler_has_made_after_the_ste
     assert "Sphere Patch" not in empty.data.objects
     step(empty, "redo")
     assert pointers(empty)
-    assert [obj.name for obj in empty.data.collections["Tactile Patches"].objects][0] == probe
+    assert next(iter(empty.data.collections["Tactile Patches"].objects)).name == probe
 
 
 def test_undo_leaves_a_patch_where_it_was_that_a_handler_had_made_before_the_step(empty, probe):
