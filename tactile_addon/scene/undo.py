@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What handlers and timers add to the scene after a step of undo was stored: it is in none.
 
-Undo leaves each datablock in memory that two steps have alike, with its pointers, and frees what is not in the
-step that it goes to: the collection of a patch that a handler has added would point to freed memory. So before
-undo all of that is taken out of what it is linked to, and put back after it where it is still there.
+Undo leaves each datablock in memory that two steps have alike, with its pointers, and frees what is not in
+the step that it goes to: the collection of a patch that a handler has added would point to freed memory. So
+all of that is taken out of what it is linked to before undo, and put back after it where it is still there.
 """
 
 from contextlib import contextmanager
