@@ -50,7 +50,7 @@ class Mesh(NamedTuple):
 
     @property
     def is_closed(self) -> bool:
-        """Whether each edge of a triangle is one of another too."""
+        """Whether each edge of a triangle belongs to another triangle too."""
         edges = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         counts = np.unique(edges, axis=0, return_counts=True)[1]
         return bool((counts == 2).all())
@@ -107,7 +107,7 @@ def _cells(charts: Charts, size: float) -> Indices:
         count = 2 * int(np.ceil(2.0 * half * charts.radii[node] / size)) + 1  # odd: the origin is one
         if count**2 > MOST_CELLS:
             raise ValueError(
-                f"edge: wanted a patch to have some thousands of them at most, got {size / CELL:g}"
+                f"edge: expected a few thousand edges at most across a patch, got {size / CELL:g}"
             )
         line = np.linspace(-half, half, count)
         x, y = (axis.ravel() for axis in np.meshgrid(line, line))

@@ -24,7 +24,7 @@ TURNS, OUTWARD = 16, 6  # samples of each patch, from which what is far away is 
 
 
 class NextTouch(NamedTuple):
-    """Where to touch next, (3,) each, and what it would bring: the area that is not known well enough."""
+    """Where to touch next, (3,) each, and the gain: the area that is not known well enough."""
 
     point: Array
     outward: Array
@@ -42,12 +42,12 @@ class _Samples(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Patches that overlap, nodes of a graph whose edges are the curves where one takes over from another.
+    """Overlapping patches: the nodes of a graph whose edges are the curves where one takes over from another.
 
-    patches : of n nodes
+    patches : those of the n nodes
     charts : the same as tables
-    tolerance : that they were felt to, a length; None where there was none
-    uncovered : places of rims beyond which there is something that was not felt
+    tolerance : a length that the touches were to reach; None if there was none
+    uncovered : places on rims beyond which the object goes on unfelt
     """
 
     patches: tuple[Reconstruction, ...]
@@ -57,7 +57,7 @@ class Atlas:
 
     @cached_property
     def edges(self) -> list[Edge]:
-        """Pairs of patches that share a boundary, with it."""
+        """Pairs of patches that share a boundary, with this boundary."""
         edges: list[Edge] = result_of(edges_of(self.charts))
         return edges
 
@@ -80,16 +80,16 @@ class Atlas:
     def _verdict(self) -> tuple[str, str]:
         if self.uncovered:
             return "uncertain", (
-                f"The patches end at {len(self.uncovered)} places where the object goes on: allow more "
-                "touches, or a larger tolerance."
+                f"The patches end at {len(self.uncovered)} places where the object goes on: allow "
+                "more touches or a larger tolerance."
             )
         rough = len(self._uncertain)
         if rough:
             return "uncertain", (
-                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch there "
-                "once more, or take a larger one."
+                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch "
+                "there again or use a larger tolerance."
             )
-        return "ok", "The object was felt wherever a finger could go on."
+        return "ok", "The object was felt everywhere a finger could reach."
 
     @cached_property
     def _uncertain(self) -> list[Reconstruction]:
@@ -99,7 +99,7 @@ class Atlas:
         return sorted(rough, key=lambda r: -r.mean_height_std)
 
     def next_touch(self) -> NextTouch | None:
-        """Where the next touch would bring most; None where all is covered as well as was asked for."""
+        """Where the next touch would bring most; None if all is covered to the tolerance."""
         if self.uncovered:
             place = max(self.uncovered, key=lambda place: place.radius)
             area = np.pi * place.radius**2
@@ -153,7 +153,7 @@ class Atlas:
     def mesh(self, edge: float) -> Mesh:
         """The surface as triangles whose edges are about as long as asked.
 
-        Watertight where the object was felt all round, open where it was not.
+        It is closed if the object was felt all round, and open where it was not.
         """
         mesh: Mesh = result_of(self.meshing(edge))
         return mesh
@@ -172,8 +172,8 @@ class Atlas:
     def curvatures(self, mesh: Mesh) -> dict[str, Array]:
         """Gaussian and mean curvature, shape index and curvedness (n,) at the vertices of its mesh, by name.
 
-        K and H are means of what the patches say there, each as it counts in the blended surface; the others
-        follow from these. Where no patch has a say, all are 0.
+        K and H are means over the patches there, each with its weight in the blended surface; the others
+        follow from these. Where there is no patch, all are 0.
         """
         gauss, mean = _blended_curvatures(self, mesh)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # of the difference of kappa1 and kappa2
@@ -195,7 +195,7 @@ class Atlas:
         edges : indices of two nodes, their boundary curve, and the angle of their normals along it
         uncovered, next_touch : where the object goes on, and where a touch would bring most, or None
 
-        All of a patch is in the `to_dict` of it, which is thirty times as much.
+        The `to_dict` of a patch has all of it, and is thirty times as large.
         """
         touch = self.next_touch()
         return {

@@ -19,14 +19,14 @@ from .object_atlas import Atlas
 
 MOST = 1000
 FIRST = 300.0  # times the tolerance, that half curves of the first touch may become
-SIZE = 1.5  # times the tolerance, that a patch may be uncertain in the mean before its neighbors are known
+SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
 LEAST = 5.0  # times it, that a patch is wide at least
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
 LARGER = 2.0  # times the patch where it begins, that a touch may become
 
 
 class Progress(NamedTuple):
-    """How far it is: touches done, places known to be uncovered, and the touches that came since the last.
+    """Touches done, places known to be uncovered, and the touches since the last Progress.
 
     joining : the share of the patches that are joined; None while the object is touched
     """
@@ -52,14 +52,14 @@ def touch_all_over(
 ) -> Steps:
     """What `explore_object` does, in steps: yields a Progress after each, and returns the Atlas.
 
-    Sent False, it touches no more and joins what there is. Arguments and errors are those of
+    If it is sent False, it stops touching and joins the patches so far. Arguments and errors are those of
     `explore_object`; the errors come with the first step.
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     tolerance, noise = number("tolerance", tolerance, above=0.0), number("noise", noise, least=0.0)
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
     if tolerance < noise:
-        raise ValueError(f"tolerance: wanted the noise {noise:g} or more, got {tolerance:g}")
+        raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     wanted = {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance}
     found = [explore(surface, p, up, farthest=FIRST * tolerance, **wanted)]  # type: ignore[arg-type]
     frontier = Frontier(surface, side_of(surface, p, up, found[0].step))
@@ -118,14 +118,14 @@ def explore_object(
 ) -> Atlas:
     """Touches a whole object, from one reference point on, and joins the patches to one surface.
 
-    point, outward : (3,), where to begin, and the side of the finger
-    tolerance : a length, that the mean deviation of each patch's height is to be below
+    point, outward : (3,), where to begin, and the outward direction
+    tolerance : a length; the mean deviation of each patch's height should be below it
     noise, rng : as in `explore`
     most : touches
-    progress : is called with the touches done and the places known to be uncovered; False ends it there
+    progress : called with the touches done and the places known to be uncovered; it returns False to end
 
-    Only rays are asked of the surface. Raises ValueError for bad arguments, for a tolerance below the noise
-    and where the first touch is none; whatever comes later is left uncovered, and the Atlas says so.
+    The surface only has to answer rays. Raises ValueError for bad arguments, for a tolerance below the noise,
+    and if the first touch fails. Where a later touch fails, the Atlas has an uncovered place.
     """
     steps = touch_all_over(surface, point, outward, tolerance=tolerance, noise=noise, most=most, rng=rng)
     try:

@@ -147,7 +147,7 @@ class Posterior(NamedTuple):
         return told <= ROUND
 
     def curvature_std(self) -> float:
-        """Standard deviation of the normal curvature at the origin where it is known least."""
+        """Standard deviation of the normal curvature at the origin where it is least known."""
         bent = _bent()
         variances = np.einsum("ni,ni->n", bent @ self.covariance[2:FREE, 2:FREE], bent)
         return math.sqrt(max(float(variances.max()), 0.0))

@@ -32,22 +32,22 @@ CONTACTS_AROUND = 4 * WINDOW  # contacts of a curve that are looked at around a 
 def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     """The point (3,) with the least sum of squared distances to two or more curves, and the distances (c,).
 
-    Curves measured one by one do not meet exactly: the distances say by how much each misses the point.
-    Where curves meet twice, as sections of a body do, it is the better meeting.
+    Curves measured one by one do not meet exactly: the distances tell by how much each misses the point.
+    Where curves meet twice, as sections of a body do, it is the better of the two.
 
     Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
-    that do not come near each other, or that run in one direction where they do.
+    that do not come near each other, or that run in the same direction where they do.
     """
     found = list_of("contours", contours, Contour)
     if len(found) < 2:
         raise DegenerateCurvesError(
-            f"the common point is where two or more curves meet, got {len(found)}: give more, or the point"
+            f"the common point needs two or more curves, got {len(found)}: give more curves, or the point"
         )
     for number, contour in enumerate(found, 1):
         if len(contour.points) <= LEAST_CONTACTS:
             raise DegenerateCurvesError(
-                f"curve {number} has {len(contour.points)} contacts, and {LEAST_CONTACTS + 1} are needed to "
-                "say where it runs: measure more, or give the reference point"
+                f"curve {number} has {len(contour.points)} contacts, and {LEAST_CONTACTS + 1} are "
+                "needed to tell where it runs: measure more, or give the reference point"
             )
     origin = found[0].points[0]  # far from the world's origin differences of points are exact, points are not
     contours = [Contour(contour.points - origin) for contour in found]
@@ -60,7 +60,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
 
 
 def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
-    """The contour with its contacts as they follow each other along a curve through `point`."""
+    """The contour with its contacts sorted along a curve through `point`."""
     r = contour.points - finite_array("point", point, (3,), LARGEST)
     if not len(r):
         return contour
@@ -145,6 +145,7 @@ def _require_crossing(tangents: Array) -> None:
     sines = np.linalg.norm(np.cross(tangents[:, None], tangents[None]), axis=2)
     if sines.max() < math.sin(LEAST_ANGLE):
         raise DegenerateCurvesError(
-            f"the curves run in one direction (within {math.degrees(math.asin(sines.max())):.2g} degrees), "
-            "which leaves open where on them the common point is: give the reference point"
+            "the curves run in the same direction (within "
+            f"{math.degrees(math.asin(sines.max())):.2g} degrees), "
+            "which does not determine their common point: give the reference point"
         )

@@ -43,7 +43,7 @@ def first_contact(
             side = math.copysign(1.0, dot(up, n))
             return found, scaled(up, side), side
     raise ValueError(
-        f"point: wanted one on the surface, got one with no surface within {reach:g} along the normal"
+        f"point: expected one on the surface, got one with no surface within {reach:g} along the normal"
     )
 
 
@@ -71,7 +71,7 @@ def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float)
         except (TypeError, ValueError, OverflowError):
             sound = False
         if not sound:
-            raise ValueError(f"surface: wanted a point and its unit normal of ray_cast, got {shown(hit)}")
+            raise ValueError(f"surface: expected a point and its unit normal of ray_cast, got {shown(hit)}")
         nx, ny, nz = side * nx, side * ny, side * nz
         dx, dy, dz = x - x0, y - y0, z - z0
         at = complex(dx * tx + dy * ty + dz * tz, dx * ux + dy * uy + dz * uz)
@@ -127,7 +127,7 @@ def _next_contact(cast: _Cast, at: complex, ahead: complex, up: complex, step: f
         chord = abs(contact[0] - at)
         if not 0.5 * step < chord < 2.0 * step:
             raise ValueError(
-                f"surface: wanted hits on the rays, some {step:g} apart, got one {chord:g} from the last"
+                f"surface: expected hits on the rays, some {step:g} apart, got one {chord:g} from the last"
             )
         if abs(chord - step) <= 1e-3 * step:
             break

@@ -35,7 +35,7 @@ def track(
     extent, step : lengths along the curve, of each half and between contacts
     noise : standard deviation of the sensor, in the plane along the curve's normal; drawn from `rng`
 
-    One Contour a plane, running from azimuth + 180 degrees to azimuth, the point itself in it, exact.
+    Returns one Contour per plane, from azimuth + 180 degrees to azimuth, which contains the exact point.
     Raises ValueError for bad numbers, and where there is no surface at the point.
     """
     step = number("step", step, above=0.0)
@@ -81,9 +81,11 @@ def following(
 def _count(extent: float, step: float) -> int:
     """The contacts of half a contour."""
     if extent < step:
-        raise ValueError(f"step: wanted no more than the extent {extent:g}, got {step:g}")
+        raise ValueError(f"step: expected no more than the extent {extent:g}, got {step:g}")
     if extent / step > MOST_CONTACTS:
-        raise ValueError(f"step: wanted at least a {MOST_CONTACTS}th of the extent {extent:g}, got {step:g}")
+        raise ValueError(
+            f"step: expected at least a {MOST_CONTACTS}th of the extent {extent:g}, got {step:g}"
+        )
     return math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
 
 
@@ -139,7 +141,7 @@ def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
         return np.random.default_rng(rng)
     except (TypeError, ValueError):
         raise ValueError(
-            f"rng: wanted a Generator or a whole number of 0 or more, got {shown(rng)}"
+            f"rng: expected a Generator or a whole number of 0 or more, got {shown(rng)}"
         ) from None
 
 

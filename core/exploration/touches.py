@@ -55,19 +55,19 @@ def explore(
     """Tracks `surface` from `point` and reconstructs the patch, as large and as densely felt as it needs.
 
     planes : as in `track`, or how many, k: then their azimuths are pi i / k
-    farthest : the longest that a half curve may become; None for as long as curves go on before they end
-    largest_std : mean deviation of the height until which half curves grow, and until which they count as
-        explained; None for shares of the radius
-    tolerance : mean deviation of the height that is good enough; until then the plane that tells most is
-        added, up to `most_planes`, as long as one takes a tenth off. None for the given planes only
-    extent : of each half curve, as in `track`; "auto" has each grow until the default fit no longer
-        explains its contacts by their accuracy, or the patch could be trusted no longer
-    step : as in `track`; "auto" for so many contacts that twice as many would not lower the deviation of
-        the height noticeably
-    noise, rng, tangent : as in `track`; the fit is not told of the noise otherwise
+    farthest : greatest length of a half curve; None for no limit, if curves end by themselves
+    largest_std : mean deviation of the height up to which half curves grow, and up to which they count as
+      explained; None for shares of the radius
+    tolerance : mean deviation of the height to reach: until then the plane that tells most is added, up to
+        `most_planes`, as long as one takes a tenth off. None adds no planes
+    extent : length of each half curve, as in `track`; with "auto" each grows until the default fit no
+        longer explains its contacts by their accuracy, or the patch could no longer be trusted
+    step : as in `track`; "auto" chooses the number of contacts such that twice as many would not lower the
+        deviation of the height noticeably
+    noise, rng, tangent : as in `track`; the contours tell the fit of the noise
     method, degree, weight, solver : as in `reconstruct`
 
-    Where a contour was not followed any farther, its `stops` say UNEXPLAINED. Raises what `track` and
+    If a contour was not followed any farther, its `stops` are UNEXPLAINED. Raises what `track` and
     `reconstruct` raise, and ValueError where curves do not end and `farthest` is None.
 
     >>> class Ball:
@@ -129,7 +129,7 @@ def explore_many(
 
     points, outward : (m, 3); all else as in `explore`, of all of them
 
-    In the place of a touch that there cannot be stands its error. Raises ValueError for bad arguments.
+    A touch that is not possible is returned as its error. Raises ValueError for bad arguments.
     """
     p = finite_array("points", points, (None, 3), LARGEST)
     up = finite_array("outward", outward, (len(p), 3))
@@ -163,7 +163,7 @@ def _planes(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
     if not isinstance(planes, int | np.integer):
         return tuple(list_of("planes", planes, SamplingPlane))
     if not 3 <= planes <= MOST_EVEN:
-        raise ValueError(f"planes: wanted 3 to {MOST_EVEN}, or sampling planes, got {planes}")
+        raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got {planes}")
     return tuple(SamplingPlane(math.pi * i / planes) for i in range(planes))
 
 
@@ -191,7 +191,7 @@ def _farthest(feel: Callable[..., list[Contour]]) -> float:
     while not ended(most):
         least, most = most, 2.0 * most
         if most > LONGEST:
-            raise ValueError("The curves do not end by themselves: say how far to feel at most, by farthest")
+            raise ValueError("The curves do not end by themselves: set farthest, the greatest length to feel")
     for _ in range(BISECTIONS):
         middle = 0.5 * (least + most)
         least, most = (least, middle) if ended(middle) else (middle, most)

@@ -29,14 +29,14 @@ class Domain:
     """The part of the tangent plane a patch is meant for; star-shaped about the origin.
 
     ends : (m, 2), m >= 3, the projected ends of the contours, by azimuth
-    brinks : (m,), which of them are where the surface ends, by a crease or its border; None for none
+    brinks : (m,), whether the surface ends there, at a crease or its border; None for nowhere
     """
 
     ends: Array
     brinks: NDArray[np.bool_] | None = None
 
     def scaled(self, factor: float) -> "Domain":
-        """The domain with its lengths that many times as long."""
+        """The domain with every length multiplied by factor."""
         return Domain(factor * self.ends, self.brinks)
 
     @cached_property
@@ -192,7 +192,7 @@ def closed_spline_domain(ends: ArrayLike, radius: float, brinks: ArrayLike | Non
     apart = (x - x[before]) ** 2 + (y - y[before]) ** 2 > (APART * radius) ** 2
     count = np.count_nonzero(apart)
     if count < 3:
-        raise ValueError(f"ends: wanted three or more apart from each other, got {count}")
+        raise ValueError(f"ends: expected three or more apart from each other, got {count}")
     return Domain(np.array([x[apart], y[apart]]).T, is_brink[apart] if is_brink.any() else None)
 
 
@@ -205,6 +205,6 @@ def hull_domain(points: ArrayLike, radius: float) -> Domain:
     rays = np.array([np.cos(turns), np.sin(turns)])
     ahead = hull[:, :2] @ rays
     if hull[:, 2].max() > -INSIDE * radius:
-        raise ValueError("points: wanted the origin among them, got it beside them or at their rim")
+        raise ValueError("points: expected the origin among them, got it beside them or at their rim")
     reach = np.where(ahead > 0.0, -hull[:, 2:] / np.maximum(ahead, 1e-300), np.inf).min(axis=0)
     return closed_spline_domain((reach * rays).T, radius)

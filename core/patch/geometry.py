@@ -26,7 +26,7 @@ class Geometry(HeightField):
     radius : L, the largest distance of a contact from the point in the tangent plane
     polynomial : equation (1)
     domain : the part of the tangent plane that the surface is meant for
-    residual : what the surface is beside the polynomial, in unit radius; None for nothing
+    residual : difference of the surface from the polynomial, in unit radius, or None
     """
 
     frame: Frame
@@ -67,7 +67,7 @@ class Geometry(HeightField):
     def mesh(self, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
-        As fine as it takes to be off the surface by no more than the tolerance.
+        It is off the surface by no more than the tolerance.
         """
         return patch_mesh(self, self.domain, tolerance)
 
@@ -93,7 +93,7 @@ def similarity(matrix: ArrayLike) -> tuple[float, Array, Array]:
     u, stretches, v = np.linalg.svd(m[:3, :3])
     even = scale > 0.0 and np.abs(stretches / scale - 1.0).max() <= EVEN
     if not even or np.abs(m[3] - (0.0, 0.0, 0.0, 1.0)).max() > 0.0:
-        raise ValueError("matrix: wanted a rotation, one scale above 0 and a shift, got another matrix")
+        raise ValueError("matrix: expected a rotation, one scale above 0 and a shift, got another matrix")
     return scale, u @ v, m[:3, 3]
 
 

@@ -197,6 +197,7 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
 
 def _coarse(gap: float, size: float) -> DegenerateCurvesError:
     return DegenerateCurvesError(
-        f"the coordinates at the point are {gap:.2g} apart in double precision, too coarse for curves of "
+        f"neighboring coordinates at the point are {gap:.2g} apart in double precision, too coarse "
+        "for curves of "
         f"{size:.2g}: move the origin nearer to the point"
     )

@@ -22,11 +22,11 @@ from ..patch.monge import exponents, monomials
 
 # Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot).
 STRIPS, LEAST_STRIPS = 10, 6
-ROWS = 4  # that a mean takes in at least, in the mean
+ROWS = 4  # that a mean takes in at least, on average
 CELL = 0.02  # of the radius: contacts in one such square tell of one place
 SOME = 2000  # contacts that the quartic is fitted to
 NEAR = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
-DETERMINED = 0.02  # the least singular value of a quadric's terms in the mean over contacts, in unit radius
+DETERMINED = 0.02  # the least singular value of a quadric's terms on average over contacts, in unit radius
 QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 OPEN = 1e-3  # share of the largest singular value: contacts on a few lines leave such terms of a quartic open
 STRAY = 2.0  # times as far as all others: contacts that are none of the surface there,
@@ -145,8 +145,8 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
             break
     else:
         return DegenerateCurvesError(
-            "the strokes run along a line, two lines or a ring, which leaves open what is beside them: add "
-            "strokes across and between"
+            "the strokes run along a line, two lines or a ring, which leaves the surface beside "
+            "them open: add strokes across and between them"
         )
     axes, k1, k2, _ = turned(plane, quadric[1:], tangent)
     local = r @ axes
@@ -175,8 +175,8 @@ def unit_in(axes: Array, direction: Array) -> Array:
 
 def _too_few(count: int) -> DegenerateCurvesError:
     return DegenerateCurvesError(
-        f"the strokes have {count} contacts around the point, and {len(QUADRIC)} are needed: measure more, "
-        "or take a larger radius"
+        f"the strokes have {count} contacts around the point, and {len(QUADRIC)} are needed: "
+        "measure more, or use a larger radius"
     )
 
 

@@ -31,15 +31,15 @@ def height_error(r: Reconstruction, surface: Surface) -> float | None:
 def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
     """Status and message: the fit's own, unless it has no doubt and the mesh contradicts it.
 
-    mean : distance of the mesh from the patch, in the mean
+    mean : distance of the mesh from the patch, on average
     """
     std, percent = r.mean_height_std, 100.0 / r.radius
     if r.status != "ok" or mean <= BEYOND * std:
         return r.status, r.message
     return "uncertain", (
-        f"The mesh is {percent * mean:.3g} % of the radius off the patch in the mean, which "
-        f"expects {percent * std:.3g} %, for between the curves there is what they do not show: take a "
-        "shorter extent, or add sampling planes."
+        f"The mesh is {percent * mean:.3g} % of the radius off the patch on average, which expects "
+        f"{percent * std:.3g} %, so the curves miss something between them: use a shorter extent or "
+        "add sampling planes."
     )
 
 

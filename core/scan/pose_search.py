@@ -57,7 +57,7 @@ class Pose:
 
 
 def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: int = 5) -> list[Pose]:
-    """The poses that bring a touch's contacts nearest to a mesh, the best first; `best` of them at most.
+    """The poses that bring a touch's contacts nearest to a mesh, the best first, at most `best` of them.
 
     vertices : (n, 3), in the contacts' unit; faces : (m, 3), indices, counterclockwise from outside
 
@@ -67,7 +67,7 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     >>> there = r.contours[0].points @ pose.rotation.T + pose.translation  # doctest: +SKIP
     """
     if not isinstance(best, int | np.integer) or best < 1:
-        raise ValueError(f"best: wanted a whole number of 1 or more, got {shown(best)}")
+        raise ValueError(f"best: expected a whole number of 1 or more, got {shown(best)}")
     co = finite_array("vertices", vertices, (None, 3), LARGEST)
     corners = corners_of(faces, len(co))
     felt = np.array([r.contacts / r.radius, r.geometry.normal(*r.contacts[:, :2].T)])

@@ -130,7 +130,7 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if probe.patch_near(context.view_layer.objects.active) is None:
-            cls.poll_message_set("Select a patch; after the mesh to compare with, if that is another one")
+            cls.poll_message_set("Select a patch; to compare it with another mesh, select that first")
             return False
         return is_in_object_mode(cls, context, "Patches are verified") and is_unlocked(cls, context)
 
@@ -172,12 +172,13 @@ def chosen_mesh(context, patch):
     names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]
     if len(names) > 1:
         raise ValueError(
-            f"{len(names)} meshes are selected: select one besides the patch, or none for the one touched"
+            f"{len(names)} meshes are selected: select one besides the patch, or none to compare "
+            "with the one that was touched"
         )
     name = names[0] if names else patch.tactile_target
     source = probe.record_of(patch)
     if not name and source is not None and source["source"] not in bpy.data.objects:
         raise ValueError(
-            f'"{patch.name}" was touched on no mesh of this file: select the mesh, then the patch'
+            f'"{patch.name}" was not touched on a mesh of this file: select the mesh, then the patch'
         )
     return name

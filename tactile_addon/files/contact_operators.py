@@ -26,9 +26,9 @@ UNITS = [
     (
         "FILE",
         "From File",
-        "The unit that the columns name; where they name none, numbers are taken as they are",
+        "Use the unit that the columns name; without one, use the numbers as they are",
     ),
-    ("NONE", "As They Are", "Numbers are lengths of the scene, whatever the file says"),
+    ("NONE", "As They Are", "Use the numbers as lengths of the scene, whatever the file says"),
     *((unit, unit, f"Numbers are lengths in {unit}") for unit in contact_file.UNIT_METERS),
 ]
 
@@ -43,42 +43,42 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.ply", options={"HIDDEN"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
-    unit: EnumProperty(name="Unit", description="What the numbers of the file measure", items=UNITS)
+    unit: EnumProperty(name="Unit", description="Unit of the numbers in the file", items=UNITS)
     point: FloatVectorProperty(
         name="Reference Point",
         subtype="TRANSLATION",
-        description="Where the curves meet, exact, or a place among strokes; until it is set "
-        "that of the file, or the point nearest to all curves",
+        description="The point where the curves meet, or a place among strokes; if not set, the "
+        "file's, or the point nearest to all curves",
         options={"SKIP_SAVE", "SKIP_PRESET"},
     )
     strokes: BoolProperty(
         name="Strokes",
-        description="All curves run beside the reference point, which is only a place among them",
+        description="No curve passes through the reference point, which is only a place among them",
         options={"SKIP_PRESET"},
     )
     radius: length_property(
         "Radius",
-        "How far from a place among strokes they count, in units of the scene; 0: all do",
+        "Use strokes up to this distance from the reference point, in units of the scene; 0 uses all",
         min=0.0,
         precision=4,
     )
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="A direction on the outer side of the surface, for scripts; Flip chooses the other side",
+        description="A direction that points to the outer side of the surface; for scripts",
         options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
     )
-    flip: BoolProperty(name="Flip", description="The other side is the outer one")
+    flip: BoolProperty(name="Flip", description="Use the other side of the surface as its outer side")
     noise: length_property(
         "Noise",
-        "Standard deviation of a contact, in units of the scene; 0 where it is not known",
+        "Standard deviation of a contact, in units of the scene; 0 if it is not known",
         min=0.0,
         precision=4,
     )
     normal_std: FloatProperty(
         name="Normal Deviation",
         subtype="ANGLE",
-        description="Standard deviation of measured normals, which are then fitted; 0 to leave them out",
+        description="Standard deviation of the measured normals, to fit them too; 0 leaves them out",
         min=0.0,
         soft_max=0.5,
     )

@@ -40,7 +40,7 @@ def read(paths, unit, meters):
         directions += [] if outward is None else [outward]
         found = named or found
     if any(not np.allclose(point, points[0], rtol=1e-12, atol=0.0) for point in points):
-        raise ValueError("The files name different reference points: import each of them by itself")
+        raise ValueError("The files name different reference points: import them one by one")
     point, outward = (given[0] if given else None for given in (points, directions))
     return contact_file.Contacts(contours, found, point, outward, tuple(strokes))
 
@@ -83,7 +83,7 @@ def fit(
     try:
         return _fit(source, contacts, point, outward, flip, normal_std, options)
     except MemoryError:
-        raise ValueError("There are more contacts than fit into memory: take fewer of them") from None
+        raise ValueError("There are more contacts than fit into memory: use fewer of them") from None
 
 
 def _fit(source, contacts, point, outward, flip, normal_std, options):

@@ -36,12 +36,12 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="The outward direction there; the surface's own where it is not set",
+        description="The outward direction there; if not set, the surface's own",
         options=UNSAVED,
     )
     tolerance: length_property(
         "Tolerance",
-        "Add planes until the height is good to this, where it is set, or no plane would help",
+        "Add planes until the height is accurate to this or no plane would help; if not set, add none",
         options=UNSAVED,
     )
 

@@ -46,21 +46,21 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     )
     live: BoolProperty(
         name="Live",
-        description="Touch again whenever the probe, its target or a number changes. Off, the patch is "
-        "frozen: it stays as it is until Touch Again, the button beside this",
+        description="Touch again whenever the probe, its target or a number changes. When off, the "
+        "patch stays as it is until you press Touch Again beside this",
         default=True,
         update=changed,
         override=OVERRIDABLE,
     )
     show_handles: BoolProperty(
         name="Handles",
-        description="Show what is dragged: the point, the sampling planes and the extent",
+        description="Show the handles of the point, the sampling planes and the extent",
         default=True,
         override=OVERRIDABLE,
     )
     active_plane: IntProperty(
         name="Active Plane",
-        description="The one with a handle to tilt it",
+        description="The plane that has a handle to tilt it",
         min=0,
         options={"HIDDEN"},
         override=OVERRIDABLE,
@@ -69,9 +69,7 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     digest: StringProperty(options={"HIDDEN"})
     shape: StringProperty(options={"HIDDEN"})
     seat: FloatVectorProperty(size=anchor.SEAT, options={"HIDDEN"})
-    lost: StringProperty(
-        description="What there was to know of a target that was deleted", options={"HIDDEN"}
-    )
+    lost: StringProperty(description="Data of a target that was deleted", options={"HIDDEN"})
 
 
 _targets = None  # session_uids of what there are probes on, 0 for none; None where it is to be looked up

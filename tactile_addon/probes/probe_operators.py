@@ -38,7 +38,7 @@ class _PlaneOperator(_ProbeOperator):
         if not super().poll(context):
             return False
         if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == MOST_PLANES:
-            cls.poll_message_set("Six planes are the most: remove one first")
+            cls.poll_message_set("A patch has six planes at most: remove one first")
             return False
         return True
 
@@ -65,7 +65,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
     bl_label = "Add Planes While They Help"
 
     tolerance: length_property(
-        "Tolerance", "Standard deviation of the height that is good enough; 0 to go on while a plane helps"
+        "Tolerance", "Standard deviation of the height to reach; 0 goes on as long as a plane helps"
     )
 
     def execute(self, context):
@@ -106,7 +106,7 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
     bl_idname = "tactile.remove_plane"
     bl_label = "Remove Plane"
 
-    plane: IntProperty(name="Plane", description="Which one, from 0", min=0, max=MOST_PLANES - 1)
+    plane: IntProperty(name="Plane", description="Index of the plane, from 0", min=0, max=MOST_PLANES - 1)
 
     @classmethod
     def poll(cls, context):
@@ -123,7 +123,7 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
         count = settings.plane_count
         if self.plane >= count:
             return report_error(
-                self, ValueError(f"There are {count} planes, 0 to {count - 1}: take one of them")
+                self, ValueError(f"There are {count} planes, 0 to {count - 1}: choose one of them")
             )
         for name in ("azimuths", "tilts"):
             values = list(getattr(settings, name))

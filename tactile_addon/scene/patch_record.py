@@ -28,7 +28,7 @@ QUANTITIES = [
         "1 on caps, 0.5 on ridges, 0 on saddles, -0.5 in ruts, -1 in cups",
         0,
     ),
-    ("curvedness", "Curvedness", "How strongly it bends, whatever the shape", -1),
+    ("curvedness", "Curvedness", "How strongly the surface bends, whatever its shape", -1),
     ("deviation", "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
 ]
@@ -64,7 +64,7 @@ def extent_of(patch):
 def require_whole(patch):
     """Raises ValueError where the patch object has been edited into what is none."""
     if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
-        raise ValueError(f'"{patch.name}" was edited, and is no whole patch any more: touch again')
+        raise ValueError(f'"{patch.name}" was edited and is no longer a complete patch: touch again')
 
 
 def is_colored(obj):
@@ -89,7 +89,7 @@ def _is_whole(mesh):
 
 def mark_failed(patch, why):
     """The patch is that of an earlier touch, for the last one failed."""
-    _outdate(patch, {"message": f"This is the patch of an earlier touch, for the last one failed. {why}"})
+    _outdate(patch, {"message": f"This patch is from an earlier touch, because the last one failed. {why}"})
 
 
 def mark_stale(patch):
@@ -97,8 +97,8 @@ def mark_stale(patch):
     _outdate(
         patch,
         {
-            "message": "This is the patch of an earlier touch, for the probe or its target has changed "
-            "since: touch again."
+            "message": "This patch is from an earlier touch, and the probe or its target has "
+            "changed since: touch again."
         },
     )
 
@@ -131,7 +131,7 @@ def reconstruction_of(patch):
     try:
         r = core.from_dict(json.loads(patch[RECONSTRUCTION]))
     except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f'"{patch.name}" cannot be read any more: touch again ({error})') from error
+        raise ValueError(f'"{patch.name}" can no longer be read: touch again ({error})') from error
     if is_at(patch, r.frame.axes, r.frame.origin):  # where it is, that is in double precision
         return r
     placed = np.array(patch.matrix_world, dtype=float)
@@ -139,7 +139,8 @@ def reconstruction_of(patch):
         return r.moved(placed @ np.linalg.inv(matrix_of(r.frame.axes, r.frame.origin)))
     except ValueError as error:
         raise ValueError(
-            f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
+            f'"{patch.name}" is stretched, mirrored or has a scale of 0: give it one positive scale '
+            "for all axes"
         ) from error
 
 

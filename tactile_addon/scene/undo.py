@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What handlers and timers add to the scene after a step of undo was stored: it is in none.
+"""What handlers and timers add to the scene after an undo step was stored, and that is in no step.
 
-Undo leaves each datablock in memory that two steps have alike, with its pointers, and frees what is not in
-the step that it goes to: the collection of a patch that a handler has added would point to freed memory. So
-all of that is taken out of what it is linked to before undo, and put back after it where it is still there.
+Undo keeps in memory each datablock that two steps have in common, with its pointers, and frees what is
+not in the step that it goes to. A collection that holds a patch made by a handler would then point to
+freed memory. So all of that is unlinked before undo, and linked again afterward if it is still there.
 """
 
 from contextlib import contextmanager

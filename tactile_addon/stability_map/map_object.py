@@ -19,15 +19,15 @@ SHADES = 256
 ABOVE = 5e-3  # of the object's size; 20000 clip starts away, as a scan in mm is, less flickers
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
 SHOWN = [
-    ("error", "Error", "How far patch and mesh are apart, in height", 1),
+    ("error", "Error", "Mean distance in height between patch and mesh", 1),
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
     (
         "condition_number",
         "Condition Number",
-        "How many times larger noise comes out of plain least squares",
+        "Factor by which plain least squares amplifies noise",
         0,
     ),
-    ("blind_share", "Blind Share", "The share of the coefficients that the planes say nothing of", 0),
+    ("blind_share", "Blind Share", "Share of the coefficients that are invisible to the planes", 0),
     ("reason", "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # on a scale from 1

@@ -41,7 +41,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     target: TARGET
     spacing: length_property(
-        "Spacing", "Distance between the points that are touched; 0 for a quarter of the extent"
+        "Spacing", "Distance between the points that are touched; 0 uses a quarter of the extent"
     )
 
     stop = "Stop and Keep"

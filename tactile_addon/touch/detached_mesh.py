@@ -50,9 +50,9 @@ class DetachedMesh(PlacedMesh):
         """The object that was taken, where it was. Raises ValueError, with a sentence, where it is not."""
         found = next((o for o in context.view_layer.objects if o.session_uid == self._uid), None)
         if found is None:
-            raise ValueError(f'"{self.name}" is gone: the touching was stopped')
+            raise ValueError(f'"{self.name}" is gone, so touching was stopped')
         if context.mode != "OBJECT" or found.mode != "OBJECT":
-            raise ValueError("The touching was stopped, for Object Mode was left: start it again")
+            raise ValueError("Touching was stopped because Object Mode was left: start it again")
         if found.matrix_world != self.matrix:
             raise ValueError(f'"{self.name}" was moved while it was touched: start again')
         return found

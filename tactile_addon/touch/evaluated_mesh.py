@@ -44,7 +44,7 @@ def evaluated_object(obj, depsgraph):
     Raises ValueError, with a sentence, where it cannot be touched; but for disabled objects.
     """
     if obj.type != "MESH":
-        raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
+        raise ValueError(f'"{obj.name}" is not a mesh: select a mesh object, or convert this one')
     if is_disabled(obj):
         raise disabled(obj)
     evaluated = obj.evaluated_get(depsgraph)
@@ -55,7 +55,7 @@ def evaluated_object(obj, depsgraph):
     matrix = np.array(evaluated.matrix_world, dtype=float)
     require_invertible(obj.name, matrix[:3, :3])
     if not len(evaluated.data.polygons):
-        raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
+        raise ValueError(f'"{obj.name}" has no faces to touch: add some')
     return evaluated, matrix[:3, :3], matrix[:3, 3]
 
 
@@ -67,7 +67,9 @@ def coordinates(name, evaluated):
     co, matrix = _coordinates(evaluated.data), np.array(evaluated.matrix_world, dtype=float)
     largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
     if not math.isfinite(largest):
-        raise ValueError(f'"{name}" has vertices at no finite place: delete them, or mend its modifiers')
+        raise ValueError(
+            f'"{name}" has vertices whose coordinates are not finite: delete them, or correct its modifiers'
+        )
     reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
     if not reach <= FARTHEST_VERTEX:  # NaN is nowhere
         raise ValueError(f'"{name}" reaches farther than {FARTHEST_VERTEX:g} from the origin: scale it down')
@@ -95,7 +97,7 @@ def require_invertible(name, linear):
     """Raises ValueError, with a sentence, where the linear part (3, 3) of a transform has no inverse."""
     lengths = np.linalg.norm(linear, axis=0)
     if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
-        raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')
+        raise ValueError(f'"{name}" has a scale of 0 in some direction: give it another scale')
 
 
 class PlacedMesh:

@@ -15,27 +15,28 @@ METHODS = [
     (
         "bayes",
         "Bayesian",
-        "All coefficients and the frame at once, with what the contacts leave open: the most accurate",
+        "Fit all coefficients and the frame together, and say what the contacts leave open; the "
+        "most accurate",
     ),
     (
         "tagc",
         "Total Curvature",
-        "The paper's fit: close to the contacts, with as little folding as possible",
+        "The paper's fit: stay close to the contacts and fold as little as possible",
     ),
     (
         "quadratic-variation",
         "Quadratic Variation",
-        "Close to the contacts, with as little bending as possible",
+        "Stay close to the contacts and bend as little as possible",
     ),
     (
         "least-squares",
         "Least Squares",
-        "Closest to the contacts, whatever the surface does between the curves",
+        "Stay closest to the contacts, whatever the surface does between the curves",
     ),
 ]
 SOLVERS = [
     ("fast", "Fast", "Newton's method"),
-    ("descent", "Steepest Descent", "The paper's minimization, slower, to compare with"),
+    ("descent", "Steepest Descent", "The paper's minimization: slower, for comparison"),
 ]
 AUTO = {  # literals, to be translated
     "extent": "Extent (Auto)",
@@ -85,7 +86,7 @@ TARGET = StringProperty(
 LOCATION = FloatVectorProperty(
     name="Location",
     subtype="TRANSLATION",
-    description="Where to touch; the 3D cursor where it is not set",
+    description="Where to touch; if not set, the 3D cursor",
     options=UNSAVED,
 )
 
@@ -109,8 +110,8 @@ class FitSettings:
     )
     degree: IntProperty(
         name="Degree",
-        description="Of the polynomial that describes the patch, 2 to 6; 0 for the least that says what "
-        "the contacts show",
+        description="Degree of the polynomial, 2 to 6; 0 chooses the lowest that describes what the "
+        "contacts show",
         default=0,
         min=0,
         max=6,
@@ -118,8 +119,8 @@ class FitSettings:
     )
     weight: FloatProperty(
         name="Weight",
-        description="Of the contacts against the smoothness, in the two fits by curvature; 0 for what suits "
-        "each of them",
+        description="Weight of the contacts against smoothness in the two fits by curvature; 0 "
+        "chooses one for the method",
         default=0.0,
         soft_min=0.0,
         soft_max=1e5,
@@ -138,7 +139,7 @@ class TouchSettings(FitSettings):
 
     plane_count: IntProperty(
         name="Planes",
-        description="How many sampling planes to feel along",
+        description="Number of sampling planes to feel along",
         default=3,
         min=3,
         max=MOST_PLANES,
@@ -146,7 +147,7 @@ class TouchSettings(FitSettings):
     )
     azimuths: FloatVectorProperty(
         name="Azimuths",
-        description="Directions of the planes about the normal",
+        description="Directions of the sampling planes, as angles about the normal",
         size=MOST_PLANES,
         unit="ROTATION",
         default=[math.radians(a) for a in (0, 60, 120, 30, 90, 150)],
@@ -154,7 +155,7 @@ class TouchSettings(FitSettings):
     )
     tilts: FloatVectorProperty(
         name="Tilts",
-        description="How far the planes lean from upright",
+        description="Angles by which the sampling planes lean away from the normal",
         size=MOST_PLANES,
         unit="ROTATION",
         soft_min=-STEEPEST,
@@ -163,17 +164,17 @@ class TouchSettings(FitSettings):
     )
     extent: length_property(
         "Extent",
-        "How far to feel to either side of the point; 0 for as far as a patch can be trusted. In a map 0 is "
-        "an eighth of the object's size",
+        "Distance to feel on either side of the point; 0 goes as far as a patch can be trusted, in "
+        "a map an eighth of the object's size",
         **KEPT,
     )
     step: length_property(
-        "Step", "Distance between contacts; 0 for so many that more would tell little", **KEPT
+        "Step", "Distance between contacts; 0 chooses it so that more contacts would add little", **KEPT
     )
     noise: NOISE
     seed: IntProperty(
         name="Seed",
-        description="Of the noise: the same seed gives the same contacts",
+        description="Seed of the noise: the same seed gives the same contacts",
         min=0,
         **KEPT,
     )

@@ -9,7 +9,7 @@ from ... import core
 
 CURVATURES = ("k1", "k2", "gaussian_curvature", "mean_curvature")
 ENDS = {
-    core.UNEXPLAINED: "where the patch could not be trusted any more",
+    core.UNEXPLAINED: "where the patch could no longer be trusted",
     core.EXTENT: "at the greatest extent allowed",
     core.NO_CONTACT: "at an edge",
     core.CREASE: "at a crease",
@@ -23,7 +23,7 @@ def ends(contours):
     counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
     if len(counts) == 1:
         return f" All half curves end {ENDS[counts[0][0]]}."
-    return f" Of {2 * len(contours)} half curves {_counted(counts)}."
+    return f" {_counted(counts, 2 * len(contours))}."
 
 
 def early_ends(contours):
@@ -32,12 +32,14 @@ def early_ends(contours):
     del counts[core.EXTENT]
     if not counts:
         return ""
-    return f" Of {2 * len(contours)} half curves {_counted(counts.most_common())}, before the extent."
+    return f" {_counted(counts.most_common(), 2 * len(contours))}, before the extent."
 
 
-def _counted(counts):
+def _counted(counts, total):
     (most, first), *others = [(count, ENDS[stop]) for stop, count in counts]
-    return ", ".join([f"{most} end {first}", *(f"{count} {end}" for count, end in others)])
+    return ", ".join(
+        [f"{most} of {total} half curves end {first}", *(f"{count} {end}" for count, end in others)]
+    )
 
 
 def judgment(result, mean, ended, vertices=FEW_VERTICES):
@@ -50,8 +52,8 @@ def judgment(result, mean, ended, vertices=FEW_VERTICES):
     if vertices >= FEW_VERTICES:
         return found
     return found | {
-        "message": f"The patch lies on facets (vertices of the mesh over it: {vertices}): add a Subdivision "
-        f"modifier, if the mesh stands for a smooth shape. {found['message']}"
+        "message": f"The patch lies on coarse facets (mesh vertices over it: {vertices}): add a "
+        f"Subdivision modifier if the mesh stands for a smooth shape. {found['message']}"
     }
 
 

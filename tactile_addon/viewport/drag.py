@@ -41,7 +41,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         items=[
             (DRAG_TURN, "Turn", "Turn a sampling plane about the normal"),
             (DRAG_TILT, "Tilt", "Lean a sampling plane to the side"),
-            (DRAG_EXTENT, "Extent", "Feel farther or less far"),
+            (DRAG_EXTENT, "Extent", "Change how far to feel"),
             (POINT, "Point", "Slide over the surface"),
         ],
     )

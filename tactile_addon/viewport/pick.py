@@ -41,12 +41,12 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="To the side to touch from; the surface's own normal where it is not set",
+        description="The direction to touch from; if not set, the surface's own normal",
         options=UNSAVED,
     )
     new: BoolProperty(
         name="New Probe",
-        description="Make another probe instead of moving the active one",
+        description="Make a new probe instead of moving the active one",
         options=UNSAVED,
     )
     at_once: BoolProperty(
@@ -56,7 +56,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     )
     parent: BoolProperty(
         name="Move With Target",
-        description="Make a new probe a child of the object touched, so that it goes where that goes",
+        description="Make a new probe a child of the touched object, so that it moves with the object",
         default=True,
     )
 
@@ -66,7 +66,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
 
     def invoke(self, context, event):
         if context.area is None or context.area.type != "VIEW_3D":
-            self.report({"ERROR"}, "Points are picked in a 3D viewport: start it there")
+            self.report({"ERROR"}, "Points are picked in a 3D viewport: start the pick there")
             return {"CANCELLED"}
         self._area, self._unread = context.area, large_meshes(context)
         for name in NAMES:  # those of the last pick are remembered, but suited another object

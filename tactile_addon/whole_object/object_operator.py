@@ -28,22 +28,27 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     location: FloatVectorProperty(
         name="Location",
         subtype="TRANSLATION",
-        description="Where to begin; the probe's point, or any place that works, where it is not set",
+        description="Where to begin; if not set, the probe's point or any place that works",
         options=UNSAVED,
     )
     tolerance: length_property(
-        "Tolerance", "How well the height of each patch is to be known; 0 for 1/500 of the object's size"
+        "Tolerance",
+        "Standard deviation to reach for the height of each patch; 0 uses 1/500 of the object's size",
     )
     noise: NOISE
-    seed: IntProperty(name="Seed", description="Of the noise and of the place to begin", default=0, min=0)
+    seed: IntProperty(
+        name="Seed", description="Seed of the noise and of the place to begin", default=0, min=0
+    )
     most: IntProperty(
         name="Most Touches",
-        description="When to end at the latest",
+        description="Number of touches after which to stop",
         default=1000,
         min=1,
         soft_max=10_000,
     )
-    edge: length_property("Edge Length", "Of the surface's triangles; 0 for what its curvature asks")
+    edge: length_property(
+        "Edge Length", "Length of the edges of the surface's triangles; 0 chooses it by the curvature"
+    )
 
     stop = "Stop Touching and Keep"
     meanwhile = {"PASS_THROUGH"}  # the touches are in a snapshot

@@ -36,7 +36,7 @@ def object_table_rows(record):
 def object_summary(record):
     """What touches all over an object have found, in a sentence."""
     unit = unit_of(record)
-    return f"{record['touches']} touches; {_surface(record)}; {_off(record, 'mean', unit)} off in the mean"
+    return f"{record['touches']} touches; {_surface(record)}; {_off(record, 'mean', unit)} off on average"
 
 
 def object_rows(record):

@@ -40,7 +40,7 @@ class ObjectTouches:
         self.tolerance = tolerance or max(TOLERANCE_SHARE * self.surface.size, noise)
         if self.tolerance < noise:
             raise ValueError(
-                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: take a larger one"
+                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: use a larger one"
             )
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
         self.found, self.uncovered = [], 0
@@ -77,7 +77,7 @@ class ObjectTouches:
                 return steps, next(steps)
             except ValueError as error:
                 why = error
-        raise ValueError(f"No touch could begin: choose another location ({why})")
+        raise ValueError(f"Touching could not begin: choose another location ({why})")
 
     def _places(self):
         """Where the touches may begin, and the normal there."""

@@ -53,11 +53,11 @@ def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
 def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     message = (
-        "Heights are good to 5.3 % of the radius in the mean: take a shorter extent, or add sampling planes."
+        "Heights are accurate to 5.3 % of the radius on average: use a shorter extent or add sampling planes."
         " 3 of 28 coefficients are invisible to these planes. All half curves end at a crease."
     )
     words = wording.verdict(record(status, message), UNIT)
-    assert words == "Doubtful: take a shorter extent, or add sampling planes"
+    assert words == "Doubtful: use a shorter extent or add sampling planes"
 
 
 def test_the_verdict_on_an_earlier_patch_is_none(wording):

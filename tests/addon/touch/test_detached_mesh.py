@@ -44,9 +44,9 @@ def edit(bpy, obj):
     ("disturb", "message"),
     [
         (move, '"Sphere" was moved while it was touched: start again'),
-        (delete, '"Sphere" is gone: the touching was stopped'),
-        (unlink, '"Sphere" is gone: the touching was stopped'),
-        (edit, "The touching was stopped, for Object Mode was left: start it again"),
+        (delete, '"Sphere" is gone, so touching was stopped'),
+        (unlink, '"Sphere" is gone, so touching was stopped'),
+        (edit, "Touching was stopped because Object Mode was left: start it again"),
     ],
 )
 def test_a_target_that_does_not_stay_is_told_at_once(empty, ball, taken, disturb, message):

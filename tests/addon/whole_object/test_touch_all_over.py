@@ -72,7 +72,7 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball):
 def test_nothing_begins_at_the_corners_of_a_sheet(empty):
     empty.ops.mesh.primitive_plane_add(size=2.0)
     before = datablocks(empty)
-    with pytest.raises(RuntimeError, match="No touch could begin: choose another location"):
+    with pytest.raises(RuntimeError, match="Touching could not begin: choose another location"):
         empty.ops.tactile.touch_all_over(tolerance=1e-3)  # it has no other vertices
     assert datablocks(empty) == before
 

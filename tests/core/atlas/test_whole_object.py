@@ -36,7 +36,7 @@ def test_a_ball_is_closed_and_as_near_as_asked(ball):
     assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
     assert np.abs(solids.ball().distances(mesh.vertices)).mean() < 1e-3
     assert ball.status == "ok"
-    assert ball.message == "The object was felt wherever a finger could go on."
+    assert ball.message == "The object was felt everywhere a finger could reach."
     assert ball.next_touch() is None
     assert len(ball.patches) < 30
 
@@ -163,9 +163,9 @@ def test_the_same_seed_makes_the_same_touches(ball):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"tolerance": 0.0}, "tolerance: wanted a finite number above 0, got 0"),
-        ({"tolerance": 1e-3, "noise": 2e-3}, "tolerance: wanted the noise 0.002 or more, got 0.001"),
-        ({"most": 0}, "most: wanted a finite number of 1 or more, got 0"),
+        ({"tolerance": 0.0}, "tolerance: expected a finite number above 0, got 0"),
+        ({"tolerance": 1e-3, "noise": 2e-3}, "tolerance: expected the noise 0.002 or more, got 0.001"),
+        ({"most": 0}, "most: expected a finite number of 1 or more, got 0"),
     ],
 )
 def test_bad_arguments_get_a_sentence(options, message):
@@ -174,7 +174,7 @@ def test_bad_arguments_get_a_sentence(options, message):
 
 
 def test_no_start_on_the_surface_gets_a_sentence():
-    with pytest.raises(ValueError, match="wanted one on the surface"):
+    with pytest.raises(ValueError, match="expected one on the surface"):
         core.explore_object(solids.ball(), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), tolerance=1e-2)
 
 

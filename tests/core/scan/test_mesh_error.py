@@ -74,5 +74,5 @@ def test_a_mesh_contradicts_a_fit_without_doubt_where_it_is_beyond_its_deviation
     status, message = core.judged_by_mesh(flat, 1.01 * BEYOND * std)
     assert (flat.status, status) == ("ok", "uncertain")
     assert message.startswith("The mesh is ") and message.endswith(
-        "take a shorter extent, or add sampling planes."
+        "use a shorter extent or add sampling planes."
     )
