@@ -198,7 +198,7 @@ def is_enough(r: Reconstruction) -> bool:
     else:
         some = r.residual.places
     over, m = points / r.radius, len(some)
-    shared, seen = r.uncertainty.height_covariances(some, over)
+    shared, seen = r.uncertainty.covariances_with(over)(some)
     # A patch by another method departs from the posterior's mean, of which no contact takes anything off.
     own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
     variance = own**2
