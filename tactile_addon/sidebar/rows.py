@@ -70,21 +70,29 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
 
 
 def draw_rows(context, layout, rows, active=True):
-    """Labels and values side by side, gray where they are not active; a heading has no value."""
+    """Labels and values side by side, gray where they are not active; a heading has no value.
+
+    A value that has no room there stands below its label.
+    """
     longest = max((len(label) for label, value in rows if value), default=0)
-    share = min(max((longest + 4) / _letters(context), 0.34), 0.66)
+    share = min(max((longest + 3) / _letters(context), 0.34), 0.66)
+    room = (1.0 - share) * _letters(context) + 1.0
     column = layout.column(align=True)
     column.active = active
     for label, value in rows:
         if not value:
             column.label(text=label)
             continue
-        split = column.split(factor=share, align=True)
-        left = split.row(align=True)
+        is_long = len(value) > room
+        line = column if is_long else column.split(factor=share, align=True)
+        left = line.row(align=True)
         left.alignment = "LEFT"
         copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
         copy.label, copy.value = label, value
-        split.label(text=value, translate=False)
+        if is_long:
+            line = column.split(factor=0.15, align=True)
+            line.label(text="")
+        line.label(text=value, translate=False)
 
 
 def draw_sentence(context, layout, sentence, icon):
