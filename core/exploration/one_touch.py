@@ -36,9 +36,9 @@ HELPS = 0.1  # Share of it that one more plane must take off.
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
-    """What was felt and found, and the length of the longest half curve and the step that it took.
+    """The contours and the reconstruction, the length of the longest half curve, and the step.
 
-    planes : those that were given, and those that were added
+    planes : the given planes and those that were added
     stds : the mean deviation of the height with the planes given, and after each that was added
     """
 

@@ -27,7 +27,7 @@ class Geometry(HeightField):
     radius : L, the largest distance of a contact from the point in the tangent plane
     polynomial : equation (1)
     domain : the part of the tangent plane that the surface is meant for
-    residual : what the surface is beside the polynomial, in unit radius; None for nothing
+    residual : difference of the surface from the polynomial, in unit radius, or None
     """
 
     frame: Frame
@@ -77,7 +77,7 @@ class Geometry(HeightField):
     def mesh(self, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
-        As fine as it takes to be off the surface by no more than the tolerance.
+        It is off the surface by no more than the tolerance.
         """
         return patch_mesh(self, self.domain, tolerance)
 

@@ -29,8 +29,8 @@ def suggest_plane(
 
     Also the mean height_std that is expected after it, in the caller's unit.
 
-    The contour is taken to reach as far and to have as many contacts as those before, with their
-    noise. What it will show follows from where it runs, not from the heights found there.
+    The contour is assumed to have the length, number of contacts and noise of those before. Its
+    effect depends on where it runs, not on the heights found there.
     """
     points, weights = r.domain.nodes
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
