@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The geometry of a patch: a surface over a part of the tangent plane, and where that is in the world."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..arguments import Array, finite_array
 from ..contours.local_geometry import Frame
 from .differential_geometry import Derivatives
 from .domain import GRID, Domain
-from .monge import TERMS, HeightField, MongePatch, monomials
+from .monge import HeightField, MongePatch
 from .residual import Residual
 from .triangulation import patch_mesh
 
@@ -53,18 +53,17 @@ class Geometry(HeightField):
         """z(x, y), local."""
         if self.residual is None:
             return self.polynomial.height(x, y)
-        u, v = self.in_unit_radius(x, y)
-        z = monomials(u, v, TERMS) @ self._terms + self.residual.beside_terms(u, v)
+        z = self._whole.height(*self.in_unit_radius(x, y))
         return self.radius * z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
 
     @cached_property
-    def _terms(self) -> Array:
-        """Coefficients (27,) of the polynomial and of the residual's, in unit radius."""
+    def _whole(self) -> Residual:
+        """The residual with the polynomial among its terms, in unit radius."""
         assert self.residual is not None
-        first, terms = self.polynomial.scaled(1.0 / self.radius), self.residual.mean[: len(TERMS)].copy()
-        terms[2:5:2] += 0.5 * first.k1, 0.5 * first.k2
-        terms[5:] += first.coefficients
-        return terms
+        mean, first = self.residual.mean.copy(), self.polynomial.scaled(1.0 / self.radius)
+        mean[2:5:2] += 0.5 * first.k1, 0.5 * first.k2
+        mean[5 : 5 + len(first.coefficients)] += first.coefficients
+        return replace(self.residual, mean=mean)
 
     def in_unit_radius(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """x and y, (n,) each, in units of L."""

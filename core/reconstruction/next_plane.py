@@ -39,7 +39,7 @@ def suggest_plane(
     def lost(azimuths: NDArray[np.intp], most: int) -> Array:
         """What a contour at each of these takes off the variances at the points, (k, n), in unit radius."""
         count = min(wanted, most)
-        noise = r.uncertainty.noise**2 * count / wanted
+        noise = float(r.uncertainty.noise**2) * count / wanted
         return _lost(covariances, AZIMUTHS[azimuths % len(AZIMUTHS)], count, noise)
 
     tried = np.arange(0, len(AZIMUTHS), COARSE_STRIDE)
