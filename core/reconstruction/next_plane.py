@@ -59,7 +59,7 @@ def _lost(r: Reconstruction, over: Array, azimuths: Array, most: int) -> Array:
     shared, seen = surface.height_covariances(contours, over)
     seen += surface.noise**2 * count / wanted * np.eye(count)
     lost: Array = np.einsum("kin,kin->kn", shared, np.linalg.solve(seen, shared))
-    return lost
+    return r.geometry.widening(*(r.radius * over).T) ** 2 * lost
 
 
 def azimuth_of(direction: ArrayLike, normal: ArrayLike, tangent: ArrayLike | None = None) -> float:
