@@ -36,6 +36,8 @@ def main(words: Sequence[str] | None = None) -> int:
         with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:
             if given.dashboard:
                 print(f"Dashboard: {client.dashboard_link}", file=sys.stderr)
+            if not client.scheduler_info(n_workers=1)["workers"]:
+                print("The scheduler has no workers yet: waiting for them", file=sys.stderr)
             run.work(Engine(client, given.limit))
         rows = summed_up(run.data_set)
     except ValueError as error:

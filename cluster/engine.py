@@ -35,7 +35,7 @@ CONNECT = 60.0  # seconds in which a scheduler that was restarted may come back
 
 
 class EngineError(Exception):
-    """There is no scheduler, or none any more; a sentence."""
+    """There is no scheduler, or none any more, or it is none for this; a sentence."""
 
 
 class Order(NamedTuple):
@@ -135,7 +135,11 @@ class Engine:
             if future.status == "error":
                 error = future.exception()
                 if not isinstance(error, KilledWorker):
-                    raise error
+                    words = " ".join(str(error).split()).partition(". ")[0]
+                    raise EngineError(
+                        f"the scheduler or a worker cannot take orders ({words}): start them in the same "
+                        "environment, with this checkout on their PYTHONPATH"
+                    ) from error
                 found[future] = FAILED, GONE, [f"{future.key[1]}: {GONE}"]
         return found
 

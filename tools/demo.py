@@ -23,7 +23,7 @@ BAR_REACH = 1.5  # patch radii from the middle of the bar to either end
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--zip", required=True, type=Path, help="the built extension")
-    parser.add_argument("--mesh", default="", help="a mesh file; Suzanne without")
+    parser.add_argument("--mesh", default="", help="a mesh file (Suzanne)")
     options = parser.parse_args()
     extension = blender.start(options.zip)
     import bpy

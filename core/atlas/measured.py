@@ -32,11 +32,11 @@ def atlas_of(
 ) -> Atlas:
     """The atlas of measured contacts: contours, with normals or without, and strokes (n, 3).
 
-    outward : (3,), on the outer side of all contacts; wanted where some have no normals that face outward
-    tolerance : mean deviation of the height until which patches grow; None for 1.2 % of their radius
+    outward : (3,), on the outer side of all contacts; required where some have no normals that face outward
+    tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
     noise : accuracy of a contact; None for the contours' own
 
-    Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, and where no
+    Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, and if no
     contacts carry a patch.
     """
     from scipy.spatial import cKDTree

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number
+from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, edges_of, node_dict
@@ -24,7 +25,7 @@ TURNS, OUTWARD = 16, 6  # samples of each patch, from which what is far away is 
 
 
 class NextTouch(NamedTuple):
-    """Where to touch next, (3,) each, and what it would bring: the area that is not known well enough."""
+    """Where to touch next, (3,) each, and the gain: the area that is not known well enough."""
 
     point: Array
     outward: Array
@@ -42,12 +43,12 @@ class _Samples(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Patches that overlap, nodes of a graph whose edges are the curves where one takes over from another.
+    """Overlapping patches: the nodes of a graph whose edges are the curves where one takes over from another.
 
-    patches : of n nodes
+    patches : those of the n nodes
     charts : the same as tables
-    tolerance : that they were felt to, a length; None where there was none
-    uncovered : places of rims beyond which there is something that was not felt
+    tolerance : a length that the touches were to reach; None if there was none
+    uncovered : places on rims beyond which the object goes on unfelt
     """
 
     patches: tuple[Reconstruction, ...]
@@ -57,7 +58,7 @@ class Atlas:
 
     @cached_property
     def edges(self) -> list[Edge]:
-        """Pairs of patches that share a boundary, with it."""
+        """Pairs of patches that share a boundary, with this boundary."""
         edges: list[Edge] = result_of(edges_of(self.charts))
         return edges
 
@@ -99,7 +100,7 @@ class Atlas:
         return sorted(rough, key=lambda r: -r.mean_height_std)
 
     def next_touch(self) -> NextTouch | None:
-        """Where the next touch would bring most; None where all is covered as well as was asked for."""
+        """Where the next touch would bring most; None if all is covered to the tolerance."""
         if self.uncovered:
             place = max(self.uncovered, key=lambda place: place.radius)
             area = np.pi * place.radius**2
@@ -153,7 +154,7 @@ class Atlas:
     def mesh(self, edge: float) -> Mesh:
         """The surface as triangles whose edges are about as long as asked.
 
-        Watertight where the object was felt all round, open where it was not.
+        It is closed if the object was felt all round, and open where it was not.
         """
         mesh: Mesh = result_of(self.meshing(edge))
         return mesh
@@ -170,12 +171,18 @@ class Atlas:
         return float(np.median(np.minimum(chords, 0.5 * radii)))
 
     def curvatures(self, mesh: Mesh) -> dict[str, Array]:
-        """Gaussian and mean curvature, shape index and curvedness (n,) at the vertices of its mesh, by name.
+        """Those of `curvatures_at` at the vertices of its mesh."""
+        return self.curvatures_at(mesh.vertices, mesh.normals)
 
-        K and H are means of what the patches say there, each as it counts in the blended surface; the others
-        follow from these. Where no patch has a say, all are 0.
+    def curvatures_at(self, points: Array, normals: Array) -> dict[str, Array]:
+        """Gaussian and mean curvature, shape index and curvedness (n,) at points of the surface, by name.
+
+        points, normals : (n, 3)
+
+        K and H are means over the patches there, each with its weight in the blended surface; the others
+        follow from these. Where there is no patch, all are 0.
         """
-        gauss, mean = _blended_curvatures(self, mesh)
+        gauss, mean = _blended_curvatures(self, points, normals)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # of the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,
@@ -195,7 +202,7 @@ class Atlas:
         edges : indices of two nodes, their boundary curve, and the angle of their normals along it
         uncovered, next_touch : where the object goes on, and where a touch would bring most, or None
 
-        All of a patch is in the `to_dict` of it, which is thirty times as much.
+        The `to_dict` of a patch has all of it, and is thirty times as large.
         """
         touch = self.next_touch()
         return {
@@ -208,29 +215,20 @@ class Atlas:
         }
 
 
-def result_of(steps: Generator[Any, None, Any]) -> Any:
-    """What steps return once they are done."""
-    try:
-        while True:
-            next(steps)
-    except StopIteration as end:
-        return end.value
-
-
-def _blended_curvatures(atlas: Atlas, mesh: Mesh) -> tuple[Array, Array]:
-    """Means of K and H (n,) at the vertices, over the patches of the vertices' own wall."""
+def _blended_curvatures(atlas: Atlas, points: Array, normals: Array) -> tuple[Array, Array]:
+    """Means of K and H (n,) at points, over the patches of their own wall."""
     charts = atlas.charts
-    pairs = charts.pairs(mesh.vertices)
-    facing = np.einsum("mi,mi->m", pairs.normal, mesh.normals[pairs.place])
+    pairs = charts.pairs(points)
+    facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
     weights = node_weights(charts, pairs) * np.clip((facing - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
     radii = charts.radii[pairs.node]
     weights *= np.abs(pairs.distance) < LAYER * radii
-    x, y = charts.local(mesh.vertices, pairs.place, pairs.node)[:, :2].T * radii
+    x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T * radii
     curvatures, order = np.zeros((2, len(x))), np.argsort(pairs.node, kind="stable")
     for at in np.split(order, np.flatnonzero(np.diff(pairs.node[order])) + 1):
         d = atlas.patches[pairs.node[at[0]]].patch.derivatives(x[at], y[at])
         curvatures[:, at] = d.gaussian_curvature, d.mean_curvature
-    count = len(mesh.vertices)
+    count = len(points)
     total = np.maximum(np.bincount(pairs.place, weights, count), SMALLEST)
     gauss, mean = (np.bincount(pairs.place, weights * each, count) / total for each in curvatures)
     return gauss, mean

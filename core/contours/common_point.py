@@ -32,8 +32,8 @@ CONTACTS_AROUND = 4 * WINDOW  # contacts of a curve that are looked at around a 
 def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     """The point (3,) with the least sum of squared distances to two or more curves, and the distances (c,).
 
-    Curves measured one by one do not meet exactly: the distances say by how much each misses the point.
-    Where curves meet twice, as sections of a body do, it is the better meeting.
+    Curves measured one by one do not meet exactly: the distances tell by how much each misses the point.
+    Where curves meet twice, as sections of a body do, it is the better of the two.
 
     Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
     that do not come near each other, or that run in the same direction where they do.
@@ -60,7 +60,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
 
 
 def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
-    """The contour with its contacts as they follow each other along a curve through `point`."""
+    """The contour with its contacts sorted along a curve through `point`."""
     r = contour.points - finite_array("point", point, (3,), LARGEST)
     if not len(r):
         return contour

@@ -60,12 +60,12 @@ class Contour:
     """A tracked contour: the contacts along one curve through the reference point.
 
     points : (n, 3), in any order, the reference point among them or not
-    plane_normal : (3,), of the sampling plane, or None for a curve of unknown plane or of none
+    plane_normal : (3,), normal of the sampling plane, or None if it is unknown or there is none
     normals : (n, 3), the surface normal at each contact, of any length, outward or inward; or None
-    noise : standard deviation of the contacts, or None where it is not known
+    noise : standard deviation of the contacts, or None if it is not known
     stops : why tracking ended at the first and at the last point, or None
-    normal_std : standard deviation of normals that were measured, in radians; the fit by "bayes" then takes
-        them for slopes. None where they are not to be fitted, as the paper's methods never do.
+    normal_std : standard deviation of measured normals, in radians; "bayes" then fits them as slopes.
+      None to leave them out. The paper's methods never use them.
 
     Raises ValueError for another shape, for numbers that are not finite, for numbers of single
     precision too far from the origin, and for measured normals without a direction.

@@ -35,7 +35,7 @@ def track(
     extent, step : lengths along the curve, of each half and between contacts
     noise : standard deviation of the sensor, in the plane along the curve's normal; drawn from `rng`
 
-    One Contour a plane, running from azimuth + 180 degrees to azimuth, the point itself in it, exact.
+    Returns one Contour per plane, from azimuth + 180 degrees to azimuth, which contains the exact point.
     Raises ValueError for bad numbers, and where there is no surface at the point.
     """
     step = number("step", step, above=0.0)

@@ -36,9 +36,9 @@ HELPS = 0.1  # Share of it that one more plane must take off.
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
-    """What was felt and found, and the length of the longest half curve and the step that it took.
+    """The contours and the reconstruction, the length of the longest half curve, and the step.
 
-    planes : those that were given, and those that were added
+    planes : the given planes and those that were added
     stds : the mean deviation of the height with the planes given, and after each that was added
     """
 
@@ -198,7 +198,7 @@ def is_enough(r: Reconstruction) -> bool:
     else:
         some = r.residual.places
     over, m = points / r.radius, len(some)
-    shared, seen = r.uncertainty.height_covariances(some, over)
+    shared, seen = r.uncertainty.covariances_with(over)(some)
     # A patch by another method departs from the posterior's mean, of which no contact takes anything off.
     own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
     variance = own**2

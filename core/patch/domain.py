@@ -29,14 +29,14 @@ class Domain:
     """The part of the tangent plane a patch is meant for; star-shaped about the origin.
 
     ends : (m, 2), m >= 3, the projected ends of the contours, by azimuth
-    brinks : (m,), which of them are where the surface ends, by a crease or its border; None for none
+    brinks : (m,), whether the surface ends there, at a crease or its border; None for nowhere
     """
 
     ends: Array
     brinks: NDArray[np.bool_] | None = None
 
     def scaled(self, factor: float) -> "Domain":
-        """The domain with its lengths that many times as long."""
+        """The domain with every length multiplied by factor."""
         return Domain(factor * self.ends, self.brinks)
 
     @cached_property

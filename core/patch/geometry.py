@@ -3,6 +3,7 @@
 """The geometry of a patch: a surface over a part of the tangent plane, and where that is in the world."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +12,7 @@ from ..arguments import Array, finite_array
 from ..contours.local_geometry import Frame
 from .differential_geometry import Derivatives
 from .domain import GRID, Domain
-from .monge import HeightField, MongePatch
+from .monge import TERMS, HeightField, MongePatch, monomials
 from .residual import Residual
 from .triangulation import patch_mesh
 
@@ -28,7 +29,7 @@ class Geometry(HeightField):
     radius : L, the largest distance of a contact from the point in the tangent plane
     polynomial : equation (1)
     domain : the part of the tangent plane that the surface is meant for
-    residual : what the surface is beside the polynomial, in unit radius; None for nothing
+    residual : difference of the surface from the polynomial, in unit radius, or None
     """
 
     frame: Frame
@@ -52,10 +53,20 @@ class Geometry(HeightField):
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """z(x, y), local."""
-        z = self.polynomial.height(x, y)
         if self.residual is None:
-            return z
-        return z + self.radius * self.residual.height(*self.in_unit_radius(x, y)).reshape(z.shape)
+            return self.polynomial.height(x, y)
+        u, v = self.in_unit_radius(x, y)
+        z = monomials(u, v, TERMS) @ self._terms + self.residual.beside_terms(u, v)
+        return self.radius * z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
+
+    @cached_property
+    def _terms(self) -> Array:
+        """Coefficients (27,) of the polynomial and of the residual's, in unit radius."""
+        assert self.residual is not None
+        first, terms = self.polynomial.scaled(1.0 / self.radius), self.residual.mean[: len(TERMS)].copy()
+        terms[2:5:2] += 0.5 * first.k1, 0.5 * first.k2
+        terms[5:] += first.coefficients
+        return terms
 
     def in_unit_radius(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """x and y, (n,) each, in units of L."""
@@ -81,7 +92,7 @@ class Geometry(HeightField):
     def mesh(self, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
-        As fine as it takes to be off the surface by no more than the tolerance.
+        It is off the surface by no more than the tolerance.
         """
         return patch_mesh(self, self.domain, tolerance)
 

@@ -49,19 +49,19 @@ def reconstruct(
 
     point : (3,), exact; outward : (3,), on the outer side of the surface
     strokes : contacts beside the point, (n, 3) each or Contours, whose normals are not fitted; only "bayes"
-        takes them. With contours those beyond the domain are ignored. From strokes alone (no contours) the
-        point is only a place: the origin is its foot on the polynomial, L is that of the farthest contact and
-        the domain is the hull of the contacts
-    radius : from strokes alone, of the contacts around the point that are used; None for all
+      fits them. With contours, those beyond the domain are ignored. Without contours the point is only a
+      place: the origin is its projection onto the polynomial, L is the distance of the farthest contact, and
+      the domain is the hull of the contacts
+    radius : without contours, use contacts up to this distance from the point; None for all
     method : "bayes" (bayes/joint_fit.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)
-    degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
-    noise : accuracy of a contact; noise is taken for no less. None: the contours' own
+    degree : d of (1), 2 to 6, or "auto", the lowest that describes what the contacts show
+    noise : least standard deviation of a contact; None for the contours' own
     weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000 and 1e5
-    solver : of "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
+    solver : for "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
-    method. A fit in doubt comes back with a status.
+    method. The status of the result tells a fit in doubt.
 
     >>> s, azimuths = np.linspace(-0.5, 0.5, 21), np.radians([0, 60, 120])  # meridians of the unit ball
     >>> meridian = lambda a: Contour(np.stack([np.sin(s) * np.cos(a), np.sin(s) * np.sin(a), np.cos(s)], 1))
@@ -91,11 +91,11 @@ def reconstruct_many(
     weight: float | None = None,
     solver: str = "fast",
 ) -> list[Reconstruction | DegenerateCurvesError]:
-    """What `reconstruct` gives for each of n touches; in stacks, which makes "bayes" some times as fast.
+    """What `reconstruct` gives for each of n touches; "bayes" is several times as fast in stacks.
 
     points : (n, 3); contours_list : n lists of contours; outward : (n, 3); strokes_list : n lists of strokes
 
-    In the place of a touch that cannot carry the method stands its DegenerateCurvesError. Raises
+    A touch that cannot carry the method is returned as its DegenerateCurvesError. Raises
     ValueError for bad arguments.
     """
     p = finite_array("points", points, (None, 3), LARGEST)

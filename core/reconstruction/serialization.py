@@ -26,7 +26,7 @@ COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Coefficien
 
 
 def to_dict(r: Reconstruction) -> dict[str, Any]:
-    """`r` as a dict of numbers, words, lists and dicts, as JSON has them; `from_dict` takes it back.
+    """`r` as a dict of numbers, words, lists and dicts, as in JSON; `from_dict` reads it.
 
     Lengths are in the caller's unit, those of the geometry in its frame; `accuracy` and `posterior` are in
     units of the radius. `status` and `message` are for readers only: they follow from the rest.
@@ -73,9 +73,9 @@ def plain(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def from_dict(d: Mapping[str, Any]) -> Reconstruction:
-    """The reconstruction that `to_dict` made this of, to the last bit.
+    """The reconstruction from which `to_dict` made this, to the last bit.
 
-    Raises ValueError for another version, and for what is missing or has no such value.
+    Raises ValueError for another version, and for missing or wrong values.
     """
     if _of(d, "version") != VERSION:
         raise ValueError(

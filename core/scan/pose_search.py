@@ -57,7 +57,7 @@ class Pose:
 
 
 def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: int = 5) -> list[Pose]:
-    """The poses that bring a touch's contacts nearest to a mesh, the best first; `best` of them at most.
+    """The poses that bring a touch's contacts nearest to a mesh, the best first, at most `best` of them.
 
     vertices : (n, 3), in the contacts' unit; faces : (m, 3), indices, counterclockwise from outside
 

@@ -17,8 +17,8 @@ CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its
 def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[int | None]:
     """Yields indices of points (n, 3) none of which are nearer to each other than `spacing`.
 
-    In random order, so that a part of them is an even cover too, up to all that have room; now and
-    then None, where there is work in between.
+    They come in random order, so that a part of them is an even cover too, until no more have room. It
+    yields None now and then during longer work.
     """
     from scipy.spatial import cKDTree
 

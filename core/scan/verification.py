@@ -39,19 +39,19 @@ def reachable(
 def verify(
     r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
 ) -> dict[str, float]:
-    """All that tells how good a patch is, as plain numbers, lengths in the caller's unit.
+    """Measures of how good a patch is, as plain numbers, with lengths in the caller's unit.
 
-    vertices : (n, 3), in the world, of the mesh, those that are `reachable`
-    extra : how many contours are tracked on the surface between those that were fitted
+    vertices : (n, 3), the `reachable` vertices of the mesh, in the world
+    extra : number of contours to track on the surface between those that were fitted
 
     contacts, contact_distance_mean, .._median, .._max, .._rms : Euclidean distances to the patch
     vertices, vertex_distance_mean, ... : the same, where there are vertices
     fit_error : (6) over the contacts
     extra_contours, extra_points, extra_fit_error : how many there are, without noise, and (6) over them;
-        the last where there are points
+        the last only if there are points
     total_absolute_curvature : (8)
-    overlap : the share of the patch's area under which there is something of the surface that a finger
-        could reach, to about 0.01; the paper has no number for it
+    overlap : the share of the patch's area that has surface below it that a finger could reach, to
+      about 0.01; the paper has no number for it
 
     Raises ValueError for bad numbers.
     """
@@ -62,7 +62,7 @@ def verify(
 def verifying(
     r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
 ) -> Iterator[dict[str, float]]:
-    """`verify` step by step, none of them long: each yields what is known so far, the last all of it."""
+    """`verify` in short steps: each yields what is known so far, and the last all of it."""
     local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
     found: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
     found |= _spread("contact", distances(r.geometry, r.contacts))

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A verification as tables and sentences for people, and as the columns of a file."""
 
+import bpy
+
 from ..touch import units
 from ..touch.wording import SPREAD
 
@@ -27,10 +29,11 @@ def verification_summary(record):
         )
     if record["status"] != "ok":
         return True, record["message"]
-    mean, most = found["vertex_distance_mean"], found["vertex_distance_max"]
+    unit = units.unit_of(bpy.context.scene, record["radius"])
+    mean, most = (_length(found, f"vertex_distance_{key}", unit) for key in ("mean", "max"))
     return False, (
-        f'{vertices} vertices of "{name}" are {units.length(mean)} off the patch on average, '
-        f"{units.length(most)} at most; the mesh covers {percent:.0f} % of it"
+        f'{vertices} vertices of "{name}" are {mean} off the patch on average, '
+        f"{most} at most; the mesh covers {percent:.0f} % of it"
     )
 
 

@@ -15,6 +15,7 @@ from bpy.app.handlers import persistent
 
 from ..scene import undo
 from ..scene.family import remembered
+from ..scene.viewports import has_gesture
 from . import anchor, deleted
 from .probe import forget_targets, is_free, is_probe, probe_of, record_of, targets
 from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
@@ -22,7 +23,6 @@ from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, 
 SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
 SLICE = 0.2  # seconds of work between two events, in a window
 CHEAP = 0.05  # seconds that a touch may take to be made in every frame of an animation
-GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
 _unsure = True  # whether any patch may be another than its inputs ask for, as after undo
 _seen = None  # the scene and view layer that were looked at last
@@ -164,12 +164,10 @@ def _settle():
     """Completes what the gesture has left, once it has ended, some at a time; a timer."""
     if not targets():
         return None
-    windows = bpy.context.window_manager.windows
-    running = [operator.bl_idname for window in windows for operator in window.modal_operators]
-    if bpy.app.is_job_running("RENDER") or any(name.startswith(GESTURES) for name in running):
+    if bpy.app.is_job_running("RENDER") or has_gesture():
         return SETTLE
     end = perf_counter() + SLICE
-    for window in windows:
+    for window in bpy.context.window_manager.windows:
         with bpy.context.temp_override(window=window), remembered(), undo.after_step():
             depsgraph = bpy.context.evaluated_depsgraph_get()
             if _unsure:

@@ -11,7 +11,7 @@ from ..touch.settings import UNSAVED
 from .operators import report_error
 
 AT_ONCE = 0.2  # seconds of work before a window is told that there is more
-SLICE = 0.05  # seconds of work between two events
+SLICE = 0.03  # seconds of work between two events
 SAY = 1.0  # seconds between two lines of progress where there is no window
 NEXT = 0.01  # seconds from one slice to the next
 

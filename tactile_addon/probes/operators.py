@@ -19,9 +19,11 @@ from ..touch.settings import (
 )
 from ..touch.touch_object import completed, touch
 from ..touch.wording import fit_summary, sentence
+from .number_fields import dragged, fields
 from .probe import lock_of, probe_of, record_of
 
 
+@dragged
 class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     """Feel the surface along curves through a point and rebuild the patch around it"""
 
@@ -78,9 +80,10 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         # Where they are not set, the cursor and the surface decide: zeros would say otherwise.
         for name in filter(self.properties.is_property_set, ("location", "outward")):
             layout.prop(self, name)
-        draw_all(layout, self)
+        shown = fields_of(context, self.target)
+        draw_all(layout, self, shown)
         given = self.properties.is_property_set("tolerance")
-        layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
+        layout.prop(self, shown["tolerance"], text="Tolerance" if given else "Tolerance (Off)")
 
 
 def report_error(operator, error):
@@ -105,6 +108,14 @@ def target_object(context, name):
             else "No object is active: select the mesh object to touch"
         )
     return obj
+
+
+def fields_of(context, name):
+    """By which of its properties an operator shows lengths, for what it touches, as number_fields.fields."""
+    try:
+        return fields(max(target_object(context, name).dimensions))
+    except ValueError:
+        return fields(1.0)
 
 
 @contextmanager

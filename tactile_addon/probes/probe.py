@@ -211,7 +211,7 @@ def _found(probe, name):
 
 
 def register():
-    TactileProbe.__annotations__.update(number_fields.annotations(_found))
+    TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
     bpy.utils.register_class(TactileProbe)
     bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
     bpy.types.Object.tactile_colors = EnumProperty(

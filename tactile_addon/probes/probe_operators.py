@@ -13,7 +13,8 @@ from ..touch import units
 from ..touch.settings import MOST_PLANES, length_property
 from ..touch.wording import added_planes
 from . import probe, touch_again
-from .operators import is_in_object_mode, is_unlocked, report_error, waiting
+from .number_fields import dragged
+from .operators import fields_of, is_in_object_mode, is_unlocked, report_error, waiting
 
 
 class _ProbeOperator:
@@ -56,6 +57,7 @@ class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+@dragged
 class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
     """Feel along more planes, each time the one that tells most, until it is enough or none would help"""
 
@@ -82,6 +84,10 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         unit = units.unit_of(context.scene, touched.result.radius)
         self.report({"INFO"}, added_planes(touched.report, unit))
         return {"FINISHED"}
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, fields_of(context, "")["tolerance"])
 
 
 def _add(settings, suggested):

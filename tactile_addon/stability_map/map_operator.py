@@ -6,7 +6,15 @@ import bpy
 
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import has_target, is_in_object_mode, make_active, report_error, target_object
+from ..probes.number_fields import dragged
+from ..probes.operators import (
+    fields_of,
+    has_target,
+    is_in_object_mode,
+    make_active,
+    report_error,
+    target_object,
+)
 from ..scene import patch_record
 from ..touch.settings import (
     NAMES,
@@ -23,6 +31,7 @@ from .map_report import map_summary
 from .stability import StabilityMap, expected_count
 
 
+@dragged
 class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     """Touch a mesh all over and paint a copy of it: where a patch can be trusted, and where there is none"""
 
@@ -102,6 +111,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")
         layout.label(text=self._about(context), translate=False)
-        draw_chosen(layout, self, "spacing")
+        fields = fields_of(context, self.target)
+        draw_chosen(layout, self, "spacing", fields=fields)
         layout.separator()
-        draw_all(layout, self)
+        draw_all(layout, self, fields)

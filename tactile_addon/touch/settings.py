@@ -228,13 +228,13 @@ def draw_solver(layout, settings, found=None, fields=None):
         layout.prop(settings, "weight")
 
 
-def draw_all(layout, settings):
-    """Everything, with nothing folded away, as Adjust Last Operation has it."""
-    draw_chosen(layout, settings, "extent")
+def draw_all(layout, settings, fields=None):
+    """Everything, with nothing folded away, as Adjust Last Operation has it; `fields` as in draw_chosen."""
+    draw_chosen(layout, settings, "extent", fields=fields)
     layout.prop(settings, "plane_count")
     for i in range(settings.plane_count):
         column = layout.column(align=True)
         column.prop(settings, "azimuths", index=i, text=f"Azimuth {i + 1}")
         column.prop(settings, "tilts", index=i, text="Tilt")
-    draw_sensor(layout, settings)
+    draw_sensor(layout, settings, fields=fields)
     draw_solver(layout, settings)

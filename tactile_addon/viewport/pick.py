@@ -6,7 +6,8 @@ import bpy
 from bpy.props import BoolProperty, FloatVectorProperty
 
 from ..probes import anchor, probe, touch_again
-from ..probes.operators import is_in_object_mode, make_active, report_error, target_object
+from ..probes.number_fields import dragged
+from ..probes.operators import fields_of, is_in_object_mode, make_active, report_error, target_object
 from ..scene import patch_record
 from ..scene.viewports import show_colors
 from ..stability_map.map_object import inputs_of
@@ -27,6 +28,7 @@ HINTS = (
 )
 
 
+@dragged
 class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     """Click on a mesh: a probe there feels the surface and keeps a patch of it up to date"""
 
@@ -173,7 +175,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         layout.prop(self, "target")
         layout.prop(self, "location")
         layout.prop(self, "parent")
-        draw_all(layout, self)
+        draw_all(layout, self, fields_of(context, self.target))
 
     def _inherit(self, context):
         """The probe that is to be moved, if any; what is not set becomes what it has, or the active map.

@@ -7,7 +7,8 @@ from bpy.props import FloatVectorProperty, IntProperty
 
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import is_in_object_mode, make_active, report_error, target_object
+from ..probes.number_fields import dragged
+from ..probes.operators import fields_of, is_in_object_mode, make_active, report_error, target_object
 from ..scene import patch_record
 from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
 from . import whole_mesh
@@ -15,6 +16,7 @@ from .object_report import object_summary
 from .object_touches import ObjectTouches
 
 
+@dragged
 class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     """Touch an object all over, from one point on, and join the patches to one surface"""
 
@@ -115,7 +117,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     def _finish(self, context):
         target = self._touches.surface.require_same(context)
-        made = whole_mesh.insert(context.scene, target.name, self._touches)
+        made = whole_mesh.insert(context.scene, target.name, self._touches.whole, self._touches.report())
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
         self.report({"INFO"} if record["is_closed"] else {"WARNING"}, object_summary(record))
@@ -125,8 +127,9 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")
-        draw_chosen(layout, self, "tolerance")
-        draw_chosen(layout, self, "edge")
+        fields = fields_of(context, self.target)
+        draw_chosen(layout, self, "tolerance", fields=fields)
+        draw_chosen(layout, self, "edge", fields=fields)
         layout.prop(self, "most")
-        layout.prop(self, "noise")
+        layout.prop(self, fields["noise"])
         layout.prop(self, "seed")

@@ -125,7 +125,7 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     assert report.registration_summary(found) == 'The contacts are 0.1 m off "A" (root mean square)'
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
-    with pytest.raises(ValueError, match=r"poses on .* take one of them"):
+    with pytest.raises(ValueError, match=r"poses on .* choose one of them"):
         registration.register_patch(patch, suzanne, depsgraph, pose=99)
 
 
@@ -177,7 +177,7 @@ def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
         raise MemoryError
 
     monkeypatch.setattr(registration.core, "register", full)
-    with pytest.raises(ValueError, match="is too large to be searched: take away what is far"):
+    with pytest.raises(ValueError, match="is too large to be searched: remove what is far"):
         registration.register_patch(patch, suzanne, depsgraph)
     monkeypatch.undo()
     empty.data.objects.remove(patch)

@@ -269,8 +269,8 @@ def with_no_faces(bpy, patch):
     ("spoil", "sentence"),
     [
         (lambda bpy, patch: {"target": "Nobody"}, 'There is no object "Nobody"'),
-        (no_source, '"Sphere Patch" was touched on no mesh of this file: select the mesh'),
-        (with_empty, '"Nothing" is no mesh'),
+        (no_source, '"Sphere Patch" was not touched on a mesh of this file: select the mesh'),
+        (with_empty, '"Nothing" is not a mesh'),
         (with_no_faces, '"Bare" has no faces'),
         (several, "2 meshes are selected: select one besides the patch"),
         (of_a_later_version, "can no longer be read: touch again .version: expected 2, got 3"),

@@ -164,7 +164,10 @@ def test_without_a_curve_column_a_file_is_one_curve(read):
         (PLAIN.replace("2,3\n", "2\n"), 'line 3, column "z": expected a number, got ""'),
         (PLAIN.replace("1,1,2,3", "1,1,5,2,5,3,5"), "line 3: expected 4 fields, got 7: decimal commas need"),
         (PLAIN.replace("1,1,2,3", ",1,2,3"), "line 3: expected a number or a name in the column"),
-        ("curve,x,y,z,nx,ny,nz\n1,0,0,0,0,0,1\n1,0,0,1,,,\n", "line 3: expected normals all along a curve"),
+        (
+            "curve,x,y,z,nx,ny,nz\n1,0,0,0,0,0,1\n1,0,0,1,,,\n",
+            "line 3: expected normals at all contacts of a curve",
+        ),
         ("curve,x,y,z,nx,ny,nz\n1,0,0,0,0,,1\n", 'line 2, column "ny": expected a number, got ""'),
         ("curve,time,x,y,z\n1,,0,0,0\n", 'column "time": expected a number, got ""'),
         (b"PK\x03\x04\x00\x00", '"contacts.csv": expected a text file, got binary data'),
@@ -303,11 +306,11 @@ def test_ply_with_normals_and_times_in_single_precision(read):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", '"contacts.ply": expected the header of a .ply file'),
-        (b"ply\nformat ascii 1.0\n", "expected the header"),
-        (b"ply\nformat morse 1.0\nend_header\n", "expected the header"),
-        (b"ply\nend_header\n", "expected the header"),
-        (PLAIN.encode(), "expected the header"),
+        (b"", '"contacts.ply": expected the complete header of a .ply file'),
+        (b"ply\nformat ascii 1.0\n", "expected the complete header"),
+        (b"ply\nformat morse 1.0\nend_header\n", "expected the complete header"),
+        (b"ply\nend_header\n", "expected the complete header"),
+        (PLAIN.encode(), "expected the complete header"),
         (ply("ascii", properties="property float x\n"), "expected vertices with the properties x, y and z"),
         (ply("ascii", properties="property list uchar int x\n"), "expected vertices with the properties"),
         (ply("ascii", 0), "expected vertices with the properties"),

@@ -169,7 +169,7 @@ def test_strokes_that_carry_no_patch_are_refused_with_a_sentence(extension, empt
     before = datablocks(empty)
     with pytest.raises(RuntimeError, match="The strokes run along a line, two lines or a ring"):
         empty.ops.tactile.import_contacts(filepath=str(path))
-    with pytest.raises(RuntimeError, match=r"expected none with .*which is a method of contours"):
+    with pytest.raises(RuntimeError, match=r"expected none with .*which fits contours only"):
         empty.ops.tactile.import_contacts(filepath=str(path), method="tagc")
     assert datablocks(empty) == before
 
@@ -241,7 +241,7 @@ def test_measured_normals_show_what_curves_hide(empty, measured):
     ("text", "options", "words"),
     [
         ("x,y,z\n0,0,a\n", {}, '"contacts.csv", line 2, column "z": expected a number'),
-        ("x,y,z\n0,0,1\n", {}, "The common point is where two or more curves meet, got 1"),
+        ("x,y,z\n0,0,1\n", {}, "The common point needs two or more curves, got 1"),
         ("x,y,z\n0,0,1\n", {"point": (0, 0, 0)}, "Curve 1 has 1 of the 3 contacts it needs"),
         ("x,y,z\n1e60,0,1\n", {}, "expected numbers up to"),
         (None, {}, "There is no file"),

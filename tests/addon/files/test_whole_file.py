@@ -143,7 +143,7 @@ def test_no_input_is_overwritten(command, files, option, kind):
     spelled = files / ".." / files.name / path.name
     code, _, err = command("reconstruct", path, *PLACE, option, spelled)
     assert code == 2
-    assert f"{option}: expected another file than one that this reads" in err
+    assert f"{option}: expected a file other than those that this command reads" in err
     assert path.read_bytes() == before
 
 
@@ -151,11 +151,11 @@ def test_no_two_outputs_are_one_file_and_measured_files_and_the_open_scene_are_i
     both = ("--json", files / "a.json", "--output", files / "a.json")
     code, _, err = command("reconstruct", files / "ball.ply", *PLACE, *both)
     assert code == 2
-    assert "--output: expected another file than one that this writes" in err
+    assert "--output: expected a file other than those that this command writes" in err
     (files / "contacts.csv").write_text("curve,x,y,z\n1,0,0,0\n")
     code, _, err = command("fit", files / "contacts.csv", "--json", files / "contacts.csv")
     assert code == 2
-    assert "--json: expected another file than one that this reads" in err
+    assert "--json: expected a file other than those that this command reads" in err
     import bpy
 
     bpy.ops.wm.open_mainfile(filepath=str(files / "ball.blend"))

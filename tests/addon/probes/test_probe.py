@@ -68,7 +68,11 @@ def test_a_target_that_is_no_mesh_and_a_scale_that_is_none_are_messages(empty, b
     probe, patch = pick(empty)
     settings = probe.tactile_probe
     for change, back, message in (
-        (lambda: setattr(settings, "target", probe), lambda: setattr(settings, "target", ball), "is no mesh"),
+        (
+            lambda: setattr(settings, "target", probe),
+            lambda: setattr(settings, "target", ball),
+            "is not a mesh",
+        ),
         (lambda: setattr(probe, "scale", (0, 1, 1)), lambda: setattr(probe, "scale", (1, 1, 1)), "scaled to"),
         (
             lambda: setattr(probe, "scale", (1, 1, 3e38)),

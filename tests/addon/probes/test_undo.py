@@ -64,9 +64,8 @@ def test_a_choice_of_a_target_ends_the_memory_of_the_one_that_was_lost(empty, pr
 
 def in_panel(bpy, owner, name, value):
     """Sets a property as Blender's own panels do: its step of undo is stored before any handler sees it."""
-    by_hand(
-        bpy, bpy.ops.wm.context_set_value, data_path=f"scene.objects[{owner!r}].{name}", value=repr(value)
-    )
+    path = f"scene.objects[{owner!r}].{name}"
+    by_hand(bpy, bpy.ops.wm.context_set_value, data_path=path, value=repr(value))
 
 
 def rest(bpy):
@@ -79,9 +78,8 @@ def pointers(bpy):
     data = bpy.data
     there = {b.as_pointer() for kind in (data.objects, data.meshes, data.collections) for b in kind}
     to = [block for obj in data.objects for block in (obj.data, obj.parent)]
-    to += [
-        obj for c in (*data.collections, bpy.context.scene.collection) for obj in (*c.objects, *c.children)
-    ]
+    collections = *data.collections, bpy.context.scene.collection
+    to += [block for collection in collections for block in (*collection.objects, *collection.children)]
     return all(block.as_pointer() in there for block in to if block is not None)
 
 
@@ -96,7 +94,7 @@ def test_undo_leaves_no_pointer_to_a_patch_that_a_handler_has_made_after_the_ste
     assert "Sphere Patch" not in empty.data.objects
     step(empty, "redo")
     assert pointers(empty)
-    assert next(iter(empty.data.collections["Tactile Patches"].objects)).name == probe
+    assert empty.data.collections["Tactile Patches"].objects[0].name == probe
 
 
 def test_undo_leaves_a_patch_where_it_was_that_a_handler_had_made_before_the_step(empty, probe):
@@ -142,3 +140,21 @@ def test_undo_takes_back_the_collection_that_a_handler_has_made_after_the_step(e
     step(empty, "undo")
     assert pointers(empty)
     assert "Tactile Patches" not in empty.data.collections
+
+
+def test_undo_of_a_deleted_target_gives_others_back_what_they_had_of_it(empty, extension, probe):
+    ball = empty.data.objects["Sphere"]
+    for name in ("Child", "Wrapped"):
+        empty.ops.mesh.primitive_cube_add()
+        empty.context.object.name = name
+    empty.data.objects["Child"].parent = ball
+    empty.data.objects["Wrapped"].modifiers.new("Wrap", "SHRINKWRAP").target = ball
+    select(empty, ball)
+    rest(empty)
+    by_hand(empty, empty.ops.object.delete)
+    extension.tactile_addon.probes.deleted.remove()
+    step(empty, "undo")
+    ball = empty.data.objects["Sphere"]
+    assert empty.data.objects["Child"].parent == ball
+    assert empty.data.objects["Wrapped"].modifiers["Wrap"].target == ball
+    assert settings_of(empty, probe).target == ball

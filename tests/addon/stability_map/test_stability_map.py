@@ -318,9 +318,9 @@ def make_distant(bpy, obj):
     [
         (make_faceless, "no faces to touch"),
         (make_curve, '"Sphere" is not a mesh: select a mesh object, or convert this one'),
-        (make_infinite, "no finite place"),
+        (make_infinite, "not finite"),
         (make_nowhere, "reaches farther than"),
-        (make_flat, "scaled to nothing"),
+        (make_flat, "a scale of 0"),
         (make_disabled, "disabled in viewports"),
         (make_disabled_with_a_probe, "disabled in viewports"),
         (make_distant, "apart in single precision"),

@@ -77,7 +77,7 @@ def test_a_patch_on_facets_names_them_and_the_modifier(empty, monkey):
 
 def test_a_touch_that_fails_on_facets_names_them_and_the_modifier(empty, monkey):
     corner = monkey.data.vertices[0].co
-    words = r"The facets there are [\d.]+ \w*m long: add a Subdivision modifier, if the mesh stands"
+    words = r"The facets there are [\d.]+ \w*m long: add a Subdivision modifier if the mesh stands"
     with pytest.raises(RuntimeError, match=words):
         empty.ops.tactile.reconstruct(target="Suzanne", location=corner)
 

@@ -471,10 +471,10 @@ def nothing(bpy):
     ("spoil", "change", "sentence"),
     [
         (nothing, {"target": "Nobody"}, 'There is no object "Nobody"'),
-        (camera, {"target": "Camera"}, '"Camera" is no mesh'),
+        (camera, {"target": "Camera"}, '"Camera" is not a mesh'),
         (no_faces, {}, '"Sphere" has no faces to touch'),
-        (bad_vertex, {}, "vertices at no finite place"),
-        (zero_scale, {}, "scaled to nothing in some direction"),
+        (bad_vertex, {}, "vertices whose coordinates are not finite"),
+        (zero_scale, {}, "a scale of 0 in some direction"),
         (huge, {}, "reaches farther than 1e+15 from the origin"),
         (one_vertex_far_away, {}, "reaches farther than 1e+15 from the origin"),
         (disabled, {}, "disabled in viewports or excluded from the view layer"),

@@ -415,7 +415,7 @@ def test_coarse_coordinates_and_bad_arguments_are_refused_with_a_sentence():
     ):
         with pytest.raises(ValueError, match=words):
             surface.fit([], strokes=strokes)
-    with pytest.raises(ValueError, match='strokes: expected none with "tagc", which is a method of contours'):
+    with pytest.raises(ValueError, match='strokes: expected none with "tagc", which fits contours only'):
         surface.fit(crossed("pear"), strokes=[points], method="tagc")
 
 
