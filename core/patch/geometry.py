@@ -77,7 +77,7 @@ class Geometry(HeightField):
         """What the residual's deviations are multiplied with at local (x, y), (n,).
 
         Where curves run together a real surface is smoother than its covariance has it, and rougher at the
-        rim. The mean over a disk is 1.
+        rim. The mean over the domain is 1.
         """
         points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
         if self.residual is None:
