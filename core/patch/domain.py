@@ -39,11 +39,10 @@ class Domain:
         """The domain with every length multiplied by factor."""
         return Domain(factor * self.ends, self.brinks)
 
-    @cached_property
-    def _straight(self) -> NDArray[np.bool_]:
-        """Which pieces of the boundary, each from one end to the next, are straight, (m,)."""
-        none = np.zeros(len(self.ends), dtype=bool)
-        return none if self.brinks is None else self.brinks | np.roll(self.brinks, -1)
+    @property
+    def _straight(self) -> NDArray[np.bool_] | None:
+        """Which pieces of the boundary, each from one end to the next, are straight, (m,); None for none."""
+        return None if self.brinks is None else self.brinks | np.roll(self.brinks, -1)
 
     @cached_property
     def _boundary(self) -> tuple[Array, Array]:
@@ -62,14 +61,17 @@ class Domain:
         system[rows, rows] = 2.0 * (lengths + before)
         system[rows, last], system[rows, following] = lengths, before
         right = 3.0 * (over * rise[last] + before[:, None] * rise)
-        beside = self._straight | self._straight[last]
-        system[beside], right[beside] = np.eye(len(rows))[beside], self.ends[beside] @ QUARTER
-        right[beside] /= np.linalg.norm(self.ends[beside], axis=1, keepdims=True)
+        straight = self._straight
+        if straight is not None:
+            beside = straight | straight[last]
+            system[beside], right[beside] = np.eye(len(rows))[beside], self.ends[beside] @ QUARTER
+            right[beside] /= np.linalg.norm(self.ends[beside], axis=1, keepdims=True)
         slopes = np.linalg.solve(system, right)
         bend = (slopes + slopes[following] - 2.0 * rise) / over
         pieces = np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
-        pieces[1, self._straight] = rise[self._straight]
-        pieces[2:, self._straight] = 0.0
+        if straight is not None:
+            pieces[1, straight] = rise[straight]
+            pieces[2:, straight] = 0.0
         return lengths, pieces
 
     @cached_property

@@ -189,9 +189,11 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     brinks = np.zeros_like(felt)
     for i, contour in enumerate(contours):
         brinks[:, i] = [stop in BRINKS for stop in contour.stops or ("", "")]
-    at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
-    ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
-    counted = felt | at_point
+    counted = felt
+    if brinks.any():
+        at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
+        ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
+        counted = felt | at_point
     return closed_spline_domain(ends[counted], 1.0, brinks[counted])
 
 
