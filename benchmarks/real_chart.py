@@ -46,7 +46,9 @@ def draw(scores, seconds, automatic):
         ax.set_xticks(counts)
     axes[1].set_ylim(0.4, 1.0)
     axes[2].set(xlabel="time, ms", xscale="log")
+    axes[2].set_xlim(1.0, 100.0)
     axes[2].xaxis.set_major_formatter("{x:g}")
+    axes[2].xaxis.set_minor_formatter("")
     for ax in axes[::2]:
         ax.set_ylim(bottom=0.0)
     handles, labels = axes[2].get_legend_handles_labels()
@@ -55,8 +57,8 @@ def draw(scores, seconds, automatic):
     figure.legend(handles, labels, loc="outside upper center", title=title, **look)
     caption = (
         f"{len(scores)} scans, half curves of 1/32, 1/16 and 1/8 of the object, without noise. On the right "
-        "medians of a fit and 300 heights with three to six planes; the star is a touch with three planes "
-        "that chooses its extent and step, ray casts and all its fits included. "
+        "medians of the processor's time for a fit and 300 heights with three to six planes; the star is a "
+        "touch with three planes that chooses its extent and step, ray casts and all its fits included. "
         f"On {machine('numpy', 'scipy')}."
     )
     rows.append(["automatic touch", 3, automatic[0], "", automatic[1]])
