@@ -84,11 +84,9 @@ class Atlas:
         return "ok", "The object was felt wherever a finger could go on."
 
     @cached_property
-    def _uncertain(self) -> list[Reconstruction]:
+    def _uncertain(self) -> list[int]:
         """Patches less certain than the tolerance, the worst first."""
-        most = np.inf if self.tolerance is None else self.tolerance
-        rough = [r for r in self.patches if r.mean_height_std > most]
-        return sorted(rough, key=lambda r: -r.mean_height_std)
+        return self.charts.less_certain_than(np.inf if self.tolerance is None else self.tolerance)
 
     def next_touch(self) -> NextTouch | None:
         """Where the next touch would bring most; None where all is covered as well as was asked for."""
@@ -98,10 +96,8 @@ class Atlas:
             return NextTouch(np.array(place.point), np.array(place.normal), area)
         if not self._uncertain:
             return None
-        r = self._uncertain[0]
-        x, y = r.domain.nodes[0][int(np.argmax(r.node_stds))]
-        point = r.frame.to_world(np.array([x, y, float(r.height(x, y))]))
-        return NextTouch(point, r.geometry.normal(x, y) @ r.frame.axes.T, r.domain.area)
+        worst = self._uncertain[0]
+        return NextTouch(*self.charts.least_certain(worst), self.patches[worst].domain.area)
 
     def distance(self, points: ArrayLike) -> tuple[Array, Array]:
         """Signed distances (n,) of points (n, 3), negative inside, and their standard deviations (n,).
@@ -161,8 +157,7 @@ class Atlas:
         A chord e of a circle of curvature k is off it by k e^2 / 8; an edge is no longer than half a radius.
         """
         bends = np.array([max(abs(r.patch.k1), abs(r.patch.k2)) for r in self.patches])
-        stds = np.array([r.mean_height_std for r in self.patches])
-        radii = np.array([r.radius for r in self.patches])
+        stds, radii = self.charts.mean_stds, self.charts.radii
         chords = np.sqrt(4.0 * stds / np.maximum(bends, stds / radii**2))
         return float(np.median(np.minimum(chords, 0.5 * radii)))
 
@@ -172,7 +167,7 @@ class Atlas:
         K and H are means of what the patches say there, each as it counts in the blended surface; the others
         follow from these. Where no patch has a say, all are 0.
         """
-        gauss, mean = _blended_curvatures(self, mesh)
+        gauss, mean = _blended_curvatures(self.charts, mesh)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # of the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,
@@ -186,19 +181,15 @@ class Atlas:
         return meshed(self.charts, number("edge", edge, above=0.0))
 
 
-def _blended_curvatures(atlas: Atlas, mesh: Mesh) -> tuple[Array, Array]:
+def _blended_curvatures(charts: Charts, mesh: Mesh) -> tuple[Array, Array]:
     """Means of K and H (n,) at the vertices, over the patches of the vertices' own wall."""
-    charts = atlas.charts
     pairs = charts.pairs(mesh.vertices)
     facing = np.einsum("mi,mi->m", pairs.normal, mesh.normals[pairs.place])
     weights = node_weights(charts, pairs) * np.clip((facing - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
     radii = charts.radii[pairs.node]
     weights *= np.abs(pairs.distance) < LAYER * radii
-    x, y = charts.local(mesh.vertices, pairs.place, pairs.node)[:, :2].T * radii
-    curvatures, order = np.zeros((2, len(x))), np.argsort(pairs.node, kind="stable")
-    for at in np.split(order, np.flatnonzero(np.diff(pairs.node[order])) + 1):
-        d = atlas.patches[pairs.node[at[0]]].patch.derivatives(x[at], y[at])
-        curvatures[:, at] = d.gaussian_curvature, d.mean_curvature
+    x, y = charts.local(mesh.vertices, pairs.place, pairs.node)[:, :2].T
+    curvatures = charts.curvatures(x, y, pairs.node)
     count = len(mesh.vertices)
     total = np.maximum(np.bincount(pairs.place, weights, count), SMALLEST)
     gauss, mean = (np.bincount(pairs.place, weights * each, count) / total for each in curvatures)

@@ -100,8 +100,7 @@ def _joined(found: list[Exploration], done: int, frontier: Frontier, tolerance: 
         try:
             yield Progress(done, len(uncovered), joining=next(steps))
         except StopIteration as end:
-            patches, charts = end.value
-            return Atlas(tuple(patches), charts, tolerance, uncovered)
+            return Atlas(tuple(e.result for e in found), end.value, tolerance, uncovered)
 
 
 def explore_object(
