@@ -154,7 +154,9 @@ class Charts:
             across = [np.einsum("mk,mk->m", taps, by_y[k]) for k in range(max(j for _, j in orders) + 1)]
             for total, (along, beside) in zip(found, orders, strict=True):
                 total += by_x[along][:, i] * across[beside]
-        return [total / pitch ** (along + beside) for total, (along, beside) in zip(found, orders, strict=True)]
+        return [
+            total / pitch ** (along + beside) for total, (along, beside) in zip(found, orders, strict=True)
+        ]
 
     def curvatures(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array]:
         """Gaussian and mean curvature (m,) of patches above local (x, y), in 1/length^2 and 1/length."""
@@ -178,7 +180,8 @@ class Charts:
     def _inside(self) -> NDArray[np.bool_]:
         """Which knots are inside the domains, (n, SIDE, SIDE)."""
         count = len(self.radii)
-        shares = self.shares(*self.knots().reshape(2, -1), np.repeat(np.arange(count), SIDE**2))
+        x, y = self.knots().reshape(2, -1)
+        shares = self.shares(x, y, np.repeat(np.arange(count), SIDE**2))
         return (shares <= 1.0).reshape(count, SIDE, SIDE)
 
     def knots(self) -> Array:
@@ -192,6 +195,10 @@ class Charts:
         x, y = self.knots()[:, node].reshape(2, -1)[:, [at]]
         points, normals = self.world(np.array([node]), x, y)
         return points[0], normals[0]
+
+    def chosen(self, which: NDArray[Any]) -> "Charts":
+        """Some of the patches."""
+        return Charts(*(getattr(self, f.name)[which] for f in fields(Charts)))
 
     def joined(self, others: "Charts") -> "Charts":
         """These patches and others."""

@@ -91,7 +91,10 @@ def _wall(
     blend = _mean(place, node, distance, normal, std, w, len(points))
     feet = points.copy()
     if len(node):
-        origins, pull = charts.origins[node[nearest]], np.minimum(1.0, WELL_INSIDE / np.maximum(out[nearest], 1e-9))
+        origins, pull = (
+            charts.origins[node[nearest]],
+            np.minimum(1.0, WELL_INSIDE / np.maximum(out[nearest], 1e-9)),
+        )
         feet -= distance[nearest, None] * normal[nearest]
         feet += (1.0 - pull)[:, None] * (origins - feet)
     taken = active.copy()

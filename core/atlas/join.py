@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches of one object as tables, and joined: each a spline through all contacts on it, whoever felt them.
+"""Patches of one object as tables, and joined: each a spline through all contacts on it, of all patches.
 
-A patch alone knows its own few curves, and the blend of such patches is farther off than a surface through all
-contacts. Where patches overlap they are made to agree.
+A patch alone knows its own few curves, and the blend of such patches is farther off than a surface through
+all contacts. Where patches overlap they are made to agree.
 """
 
 from collections.abc import Generator, Sequence
@@ -34,9 +34,16 @@ Joining = Generator[float, None, Charts]
 
 
 def joined(
-    contours: Sequence[list[Contour]], results: Sequence[Reconstruction], charts: Charts, noise: float
+    contours: Sequence[list[Contour]],
+    results: Sequence[Reconstruction],
+    charts: Charts,
+    noise: float,
+    known: dict[int, tuple[int, Table]],
 ) -> Joining:
-    """The charts of patches with all contacts, of which `charts` have but their own; yields the share done."""
+    """The charts of patches with all contacts, of which `charts` have but their own; yields the share done.
+
+    known : tables of patches that were joined before, and of how many contacts; is changed
+    """
     points, normals, owner = _contacts(contours)
     pairs = charts.pairs(points)
     each = np.argsort(pairs.node, kind="stable")
@@ -44,7 +51,10 @@ def joined(
     tables: list[Table] = []
     for i, r in enumerate(results):
         some = pairs.chosen(each[bounds[i] : bounds[i + 1]])
-        tables.append(_joined_table(r, some, points, normals, owner == i, noise))
+        if i not in known or known[i][0] != len(some.place):
+            table = _joined_table(r, some, points, normals, owner == i, noise)
+            known[i] = len(some.place), table
+        tables.append(known[i][1])
         if len(tables) % AT_ONCE == 0:
             yield len(tables) / len(results)
     return agreed(stacked(results, tables))

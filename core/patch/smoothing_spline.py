@@ -3,9 +3,9 @@
 """Heights as a smoothing spline: of least third derivatives through contacts and across their normals.
 
 Beside the paper. A cubic B-spline on SIDE x SIDE knots, whose prior is that of a surface with random third
-derivatives (Wahba 1990, in the knots of Eilers and Marx 1996), so that quadrics are free. How large these are, the noise of
-contacts and that of normals follow from their marginal likelihood; outlying ones weigh as under a Student t
-distribution. Equations are banded: thousands of contacts cost no more than hundreds. All is in unit radius.
+derivatives (Wahba 1990, in the knots of Eilers and Marx 1996), so that quadrics are free. How large these are,
+the noise of contacts and that of normals follow from their marginal likelihood; outlying ones weigh as under a
+Student t distribution. Equations are banded, for thousands of contacts as for hundreds. All is in unit radius.
 """
 
 from functools import cache
@@ -43,7 +43,7 @@ class _Equations(NamedTuple):
     band: Array
     right: Array
     square: float
-    count: float
+    size: float
 
 
 class _Solution(NamedTuple):
@@ -83,12 +83,19 @@ def _grids(noise: float) -> tuple[Any, Any, Any]:
 
 
 def _likeliest(data: list[_Equations], sizes: list[float], half: float, noise: float) -> _Solution:
-    """The likeliest solution, by one size after the other; they are changed."""
+    """The likeliest solution, by steps up or down of one size after the other; they are changed."""
+    best = _solved(data, sizes, half)
     for i, grid in enumerate(_grids(noise)):
-        tried = [_solved(data, [*sizes[:i], size, *sizes[i + 1 :]], half) for size in grid]
-        best = min(range(len(grid)), key=lambda k: tried[k].surprise)
-        sizes[i] = grid[best]
-    return tried[best]
+        start = grid.index(sizes[i])
+        for way in (grid[start + 1 :], grid[:start][::-1]):
+            for size in way:
+                tried = _solved(data, [*sizes[:i], size, *sizes[i + 1 :]], half)
+                if tried.surprise >= best.surprise:
+                    break
+                best, sizes[i] = tried, size
+            if sizes[i] != grid[start]:
+                break
+    return best
 
 
 def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solution:
@@ -101,7 +108,7 @@ def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solutio
     for some, std in zip(data, stds, strict=True):
         matrix += some.band / std**2
         right += some.right / std**2
-        surprise += some.square / std**2 + 2.0 * some.count * np.log(std)
+        surprise += some.square / std**2 + 2.0 * some.size * np.log(std)
     matrix[0] += ROUNDING * matrix[0].max()
     factor = cholesky_banded(matrix, overwrite_ab=True, lower=True, check_finite=False)
     found = cho_solve_banded((factor, True), right, check_finite=False)
@@ -164,7 +171,7 @@ def bases(x: Array, y: Array, half: float) -> list[Any]:
 
 
 def weights_at(at: Array) -> tuple[Any, Array, Array, Array]:
-    """The knot before places (m,) in steps from the middle; weights (m, 4) of four knots; their two slopes."""
+    """The knot before places (m,), in steps from the middle; weights of four knots, (m, 4), and their slopes."""
     at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - ROUNDING)
     knot = at.astype(np.intp)
     powers = np.vander(at - knot, 4, increasing=True)
