@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-# The first of these that runs and is 3.11 or 3.13: what a version manager puts on PATH may only say
-# that the version is not there.
+# Use the first of these that runs and is 3.11 or 3.13: a version manager's command on PATH may only say
+# that the version is missing.
 VERSION := import sys; print("%d.%d" % sys.version_info[:2])
 ifndef PYTHON
 PYTHON := $(shell for p in python3.13 python3.11 python3; do \
@@ -33,22 +33,22 @@ SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
 help:
 	@echo 'make demo [MESH=FILE]  rebuild a patch on a mesh and draw it'
 	@echo 'make test              check style and types, then test the extension in Blender'
-	@echo 'make test-core         the tests of core alone, without Blender'
-	@echo 'make fuzz              feed it with more than 10,000 odd inputs, in a quarter of an hour'
-	@echo 'make chart [QUICK=1]   draw speed against accuracy, beside what else one could take, in build/charts'
+	@echo 'make test-core         run the tests of core alone, without Blender'
+	@echo 'make fuzz              try more than 10,000 odd inputs, in a quarter of an hour'
+	@echo 'make chart [QUICK=1]   draw speed against accuracy beside other methods, in build/charts'
 	@echo 'make paper             repeat the experiments of the paper, beside its figures'
-	@echo 'make stability         lead everything to where it fails, and count who says so'
-	@echo 'make dataset           touch some objects with two workers, tabulate and draw what is found, in build'
-	@echo 'make test-cluster      the tests of data sets of touches, with Dask'
-	@echo 'make site              make the documentation'"'"'s site, in build/site/html'
-	@echo 'make film              draw the moving picture of the README anew'
-	@echo 'make lesson            draw the pictures of docs/lesson.md anew'
-	@echo 'make sample            make examples/sample.blend anew, in Blender 4.5'
+	@echo 'make stability         take every method to its limits, and count the warnings'
+	@echo 'make dataset           touch some objects with two workers, tabulate and draw the results, in build'
+	@echo 'make test-cluster      run the tests of data sets, with Dask'
+	@echo 'make site              build the site of the documentation, in build/site/html'
+	@echo 'make film              draw the moving picture of the README again'
+	@echo 'make lesson            draw the pictures of docs/lesson.md again'
+	@echo 'make sample            make examples/sample.blend again, in Blender 4.5'
 	@echo 'make zip               build the zip files of a release, one for each platform, in build/dist'
 	@echo 'make zip-nowheels      build the zip for a Blender whose own Python has scipy, in build/dist'
-	@echo 'make release           all files of a release, in build/release, if version, changelog and tag agree'
+	@echo 'make release           make all files of a release, in build/release, if version, changelog and tag agree'
 	@echo 'make clean             remove build; the downloaded wheels stay'
-	@echo 'All take PYTHON=...: 3.11 (tests in Blender 4.5) or 3.13 (Blender 5.2).'
+	@echo 'Each takes PYTHON=...: Python 3.11 (Blender 4.5) or 3.13 (Blender 5.2).'
 
 demo: $(ZIP)
 	$(VENV_PY) -m tools.demo --zip $(ZIP) --mesh "$(MESH)"

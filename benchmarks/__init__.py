@@ -22,7 +22,7 @@ def machine(*packages):
     """The processor, Python and these installed packages with their versions, for a caption."""
     cpu = platform.processor() or platform.machine()
     if (listing := Path("/proc/cpuinfo")).exists():
-        lines = listing.read_text().splitlines()
+        lines = listing.read_text(encoding="utf-8").splitlines()
         cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), cpu)
     versions = (f"{name} {version(name)}" for name in packages)
     return ", ".join([f"one thread, {cpu}; Python {platform.python_version()}", *versions])

@@ -105,9 +105,11 @@ def main():
     extension = blender.start(options.zip)
     import bpy
 
-    addon, touches, clock = extension.tactile_addon, extension.core.exploration.touches, Clock()
+    addon, core, clock = extension.tactile_addon, extension.core, Clock()
+    touches, tracking = core.exploration.touches, core.contours.tracking
     clock.wrap(addon.touch.surface.MeshSurface, "ray_cast", "ray casts")
-    clock.wrap(touches, "track", "tracking")
+    for name in ("first_contact", "_followed"):
+        clock.wrap(tracking, name, "tracking")
     clock.wrap(touches, "fitted", "fit")
     clock.wrap(addon.touch.touch_object, "reconstruction_report", "fit")
     clock.wrap(addon.scene.patch_object, "rewrite", "mesh write")

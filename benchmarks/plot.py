@@ -36,7 +36,7 @@ def save(figure, name, caption, header, rows):
     caption = textwrap.fill(caption, width, break_on_hyphens=False)
     figure.text(0.01, 0.0, caption, ha="left", va="top", fontsize=CAPTION_SIZE, color="#555555")
     figure.savefig(OUTPUT / f"{name}.png", bbox_inches="tight", pad_inches=0.15)
-    with open(OUTPUT / f"{name}.csv", "w", newline="") as file:
+    with open(OUTPUT / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([header, *rows])
     print(f"{OUTPUT / name}.png and .csv")
 

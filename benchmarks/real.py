@@ -33,7 +33,7 @@ import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
 from core.bayes import residual_evidence, rough_fit
-from core.patch import residual
+from core.patch import geometry, residual
 from core.patch.monge import exponents, monomials
 from tools import blender
 
@@ -43,7 +43,7 @@ from .peers import Fit, quadric_process, radial_basis
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
 HOLD_OUT, LEAST = 90, 20  # points of the mesh above a domain
 LAYERS = 4
-NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 4, 0.3, 0.2  # toward a surface: a step in radii, and of its height
+NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 8, 0.3, 0.2  # toward a surface: a step in radii, and of its height
 WIDE, OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 0.02, 3.0, 5.0, 10.0, 0.05
 DENSE = 150  # points for the true frame
 
@@ -125,7 +125,9 @@ class Score(NamedTuple):
 def constants(**values):
     """The residual's, for a while."""
     modules = [
-        m for m in (residual, residual_evidence, rough_fit) if any(hasattr(m, name) for name in values)
+        m
+        for m in (geometry, residual, residual_evidence, rough_fit)
+        if any(hasattr(m, name) for name in values)
     ]
     before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
     try:
@@ -141,9 +143,15 @@ def constants(**values):
 
 
 def ours(touch, **values):
-    with constants(**values):
-        r = reconstruct(touch.point, touch.contours, outward=touch.axes[:, 2])
-    return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
+    def within(function):
+        def called(*arguments, **options):
+            with constants(**values):
+                return function(*arguments, **options)
+
+        return called if values else function
+
+    r = within(reconstruct)(touch.point, touch.contours, outward=touch.axes[:, 2])
+    return Fit(r.frame.axes, within(r.height), (r.patch.k1, r.patch.k2), within(r.height_std))
 
 
 OURS, ALONE, PROCESS = "bayes", "without residual", "Matérn process on a quadric"
@@ -193,11 +201,13 @@ def met(fit, touch, radius):
     """
     at, normal = touch.hold_out @ fit.axes, fit.axes.T @ touch.axes[:, 2]
     off, change, small = np.zeros(len(at)), np.ones(len(at)), 1e-4 * radius
-    for _ in range(NEWTON_STEPS if normal[2] < 1.0 - 1e-12 else 1):
+    # Along the heights themselves one step is exact, however long.
+    steps, farthest = (NEWTON_STEPS, FARTHEST * radius) if normal[2] < 1.0 - 1e-12 else (1, np.inf)
+    for _ in range(steps):
         above = fit.height(*at[:, :2].T) - at[:, 2]
         ahead = at + small * normal
         change = np.maximum((above - fit.height(*ahead[:, :2].T) + ahead[:, 2]) / small, LEAST_CHANGE)
-        step = np.clip(above / change, -FARTHEST * radius, FARTHEST * radius)
+        step = np.clip(above / change, -farthest, farthest)
         at, off = at + step[:, None] * normal, off + step
     return at, off, change
 
@@ -334,12 +344,13 @@ def automatic_table(rows):
 
 
 SETTINGS = {
-    f"lengths {lengths}, amplitudes {amplitudes}": {
+    f"lengths {lengths}, tempered to {temper}, {near} near the point": {
         "LENGTHS": np.array(lengths),
-        "AMPLITUDES": np.array(amplitudes),
+        "TEMPER": temper,
+        "NEAR_POINT": near,
     }
-    for lengths in ((0.3, 1.2), (0.4, 0.8), (0.4, 1.6))
-    for amplitudes in ((0.004, 0.022, 0.12), (0.004, 0.022, 0.12, 0.4), (0.003, 0.01, 0.04, 0.14, 0.5))
+    for lengths in ((0.4, 1.6), (0.3, 1.2), (0.4, 2.4))
+    for temper, near in ((0.15, 1.0), (0.1, 0.6))
 }
 
 

@@ -29,13 +29,15 @@ def main(words: Sequence[str] | None = None) -> int:
     parser = _parser()
     given = parser.parse_args(words)
     if given.dashboard and find_spec("bokeh") is None:
-        parser.error("--dashboard: wanted bokeh beside Dask, which draws it: install it")
+        parser.error("--dashboard: expected bokeh, which draws it: install bokeh")
     try:
         options = _whole_options(given) if given.command == "whole" else _options(given)
         run = Run(DataSet(given.output, options.parts), options, files_of(given.objects))
         with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:
             if given.dashboard:
                 print(f"Dashboard: {client.dashboard_link}", file=sys.stderr)
+            if not client.scheduler_info(n_workers=1)["workers"]:
+                print("The scheduler has no workers yet: waiting for them", file=sys.stderr)
             run.work(Engine(client, given.limit))
         rows = summed_up(run.data_set)
     except ValueError as error:
@@ -45,7 +47,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"cluster: {error}", file=sys.stderr)
         return STOPPED
     except KeyboardInterrupt:
-        print("cluster: interrupted; the same command goes on from here", file=sys.stderr)
+        print("cluster: interrupted; run the same command again to continue", file=sys.stderr)
         return INTERRUPTED
     print(summary(rows, run))
     return WITH_ERRORS if any(row["error"] for row in rows) else 0
@@ -88,11 +90,13 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m cluster", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
     touch = commands.add_parser(
-        "touch", help="touch objects at random places, in parallel, into Parquet files"
+        "touch", help="touch objects at random places in parallel and write Parquet files"
     )
     _add_work(touch.add_argument)
     _add_touches(touch.add_argument)
-    whole = commands.add_parser("whole", help="touch objects all over, each as one surface and graph")
+    whole = commands.add_parser(
+        "whole", help="touch objects all over and write a surface and a graph for each"
+    )
     _add_work(whole.add_argument)
     _add_whole(whole.add_argument)
     return parser
@@ -100,13 +104,13 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_work(add: Any) -> None:
     """What to touch, and who does."""
-    help = f"{', '.join(KINDS)} files, folders with such, .txt lists of these"
+    help = f"{', '.join(KINDS)} files, folders of them, or .txt lists of these"
     add("objects", nargs="+", type=Path, metavar="OBJECT", help=help)
-    add("--output", type=Path, required=True, metavar="FOLDER", help="of the data set, begun or new")
-    add("--scheduler", metavar="ADDRESS", help="of a Dask scheduler that has workers")
-    help = "processes on this machine, without a scheduler elsewhere (%(default)s)"
+    add("--output", type=Path, required=True, metavar="FOLDER", help="folder of the data set, new or begun")
+    add("--scheduler", metavar="ADDRESS", help="address of a Dask scheduler that has workers")
+    help = "processes on this machine, if no scheduler is given (%(default)s)"
     add("--workers", type=_count, default=os.cpu_count(), metavar="COUNT", help=help)
-    help = "show Dask's dashboard there, which needs bokeh: :8787"
+    help = "address to show Dask's dashboard at, such as :8787; it needs bokeh"
     add("--dashboard", metavar="ADDRESS", help=help)
     help = "seconds that a block may take before it is ended (%(default)s)"
     add("--limit", type=_positive, default=600.0, metavar="SECONDS", help=help)
@@ -114,34 +118,40 @@ def _add_work(add: Any) -> None:
 
 def _add_touches(add: Any) -> None:
     """How to touch; all of it is in the manifest."""
-    add("--touches", type=_count, default=1000, help="of each object (%(default)s)")
-    add("--block", type=_count, default=500, help="touches of a task and a file (%(default)s)")
-    add("--seed", type=int, default=0, help="of places and noise (%(default)s)")
-    add("--planes", type=int, choices=range(3, 7), default=3, help="sampling planes, evenly apart (3)")
+    add("--touches", type=_count, default=1000, help="touches per object (%(default)s)")
+    add("--block", type=_count, default=500, help="touches per task and file (%(default)s)")
+    add("--seed", type=int, default=0, help="seed of places and noise (%(default)s)")
+    add(
+        "--planes",
+        type=int,
+        choices=range(3, 7),
+        default=3,
+        help="number of evenly spaced sampling planes (3)",
+    )
     degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
-    add("--azimuths", **degrees, help="of planes that are not")
-    add("--tilts", **degrees, help="of the planes, as many (0)")
+    add("--azimuths", **degrees, help="directions of planes that are not evenly spaced")
+    add("--tilts", **degrees, help="tilts of the planes, one each (0)")
     length = {"type": _length, "metavar": "LENGTH"}
-    help = "of each half curve, in the object's unit, or as 6%% of its size (as far as can be trusted)"
+    help = "length of each half curve, in the object's unit or as 6%% of its size (as far as can be trusted)"
     add("--extent", **length, help=help)
-    add("--step", **length, help="between contacts (so many that more would tell little)")
+    add("--step", **length, help="distance between contacts (such that more would add little)")
     add("--noise", **length, default=Length(0.0, False), help="standard deviation of the sensor (0)")
-    help = "add planes until heights are good to this (the given planes only)"
+    help = "add planes until heights are accurate to this (no planes are added)"
     add("--tolerance", **length, help=help)
     add("--method", choices=core.METHODS, default="bayes", help="how to fit (%(default)s)")
-    add("--degree", choices=["auto", *"23456"], default="auto", help="of the polynomial (%(default)s)")
-    add("--weight", type=_positive, help="lambda L^2 of tagc and quadratic-variation (1000, 1e5)")
-    add("--solver", choices=core.SOLVERS, default="fast", help="of tagc (%(default)s)")
+    add("--degree", choices=["auto", *"23456"], default="auto", help="degree of the polynomial (%(default)s)")
+    add("--weight", type=_positive, help="lambda L^2 of tagc (1000) and quadratic-variation (1e5)")
+    add("--solver", choices=core.SOLVERS, default="fast", help="solver of tagc (%(default)s)")
 
 
 def _add_whole(add: Any) -> None:
     """How to touch all over; all of it is in the manifest."""
-    add("--seed", type=int, default=0, help="of beginning and noise (%(default)s)")
+    add("--seed", type=int, default=0, help="seed of the first place and the noise (%(default)s)")
     help = "standard deviation of the sensor (0)"
     add("--noise", type=_length, metavar="LENGTH", default=Length(0.0, False), help=help)
-    help = "how well the height of each patch is to be known (0.2%% of the object's size)"
+    help = "standard deviation to reach for each patch's height (0.2%% of the object's size)"
     add("--tolerance", type=_length, metavar="LENGTH", help=help)
-    add("--most", type=_count, default=1000, metavar="COUNT", help="touches of each object (%(default)s)")
+    add("--most", type=_count, default=1000, metavar="COUNT", help="touches per object at most (%(default)s)")
 
 
 def _length(text: str) -> Length:
@@ -153,7 +163,7 @@ def _length(text: str) -> Length:
 
 def _count(text: str) -> int:
     if not text.isdecimal() or not int(text):
-        raise argparse.ArgumentTypeError(f"wanted a number of 1 or more, got {text}")
+        raise argparse.ArgumentTypeError(f"expected a number of 1 or more, got {text}")
     return int(text)
 
 
@@ -163,5 +173,5 @@ def _positive(text: str) -> float:
     except ValueError:
         value = 0.0
     if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"wanted a number above 0, got {text}")
+        raise argparse.ArgumentTypeError(f"expected a number above 0, got {text}")
     return value

@@ -29,13 +29,13 @@ CALM = {
 }
 AHEAD = 3  # orders that are out at once, for each thread of a worker
 LEAST_AHEAD = 16
-EVERY = 5.0  # seconds between looks at how many threads there are
+LOOK_EVERY = 5.0  # seconds between looks at how many threads there are
 GONE = "The worker was lost with it again and again"
 CONNECT = 60.0  # seconds in which a scheduler that was restarted may come back
 
 
 class EngineError(Exception):
-    """There is no scheduler, or none any more; a sentence."""
+    """There is no scheduler, or none any more, or it is none for this; a sentence."""
 
 
 class Order(NamedTuple):
@@ -135,13 +135,17 @@ class Engine:
             if future.status == "error":
                 error = future.exception()
                 if not isinstance(error, KilledWorker):
-                    raise error
+                    words = " ".join(str(error).split()).partition(". ")[0]
+                    raise EngineError(
+                        f"the scheduler or a worker cannot take orders ({words}): start them in the same "
+                        "environment, with this checkout on their PYTHONPATH"
+                    ) from error
                 found[future] = FAILED, GONE, [f"{future.key[1]}: {GONE}"]
         return found
 
     def _room(self) -> int:
         """How many orders may be out at once."""
-        if monotonic() - self._looked > EVERY:
+        if monotonic() - self._looked > LOOK_EVERY:
             self._looked = monotonic()
             self._require_scheduler()
             with suppress(OSError, TimeoutError):

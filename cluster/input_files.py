@@ -16,7 +16,7 @@ def files_of(words: Iterable[Path]) -> list[str]:
     """
     found = sorted({str(path.resolve()) for word in words for path in _files(word)})
     if not found:
-        raise ValueError(f"objects: wanted {', '.join(KINDS)} files, got folders or lists without any")
+        raise ValueError(f"objects: expected {', '.join(KINDS)} files, got folders or lists without any")
     return found
 
 
@@ -32,4 +32,4 @@ def _files(path: Path) -> Iterator[Path]:
     elif path.suffix.lower() in KINDS:
         yield path
     else:
-        raise ValueError(f'objects: wanted {", ".join(KINDS)} files, folders or .txt lists, got "{path}"')
+        raise ValueError(f'objects: expected {", ".join(KINDS)} files, folders or .txt lists, got "{path}"')

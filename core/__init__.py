@@ -21,8 +21,9 @@ from .contours.contour import (
     Contour,
     SamplingPlane,
 )
+from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
-from .contours.tracking import Surface, track
+from .contours.tracking import track
 from .exploration.one_touch import Exploration
 from .exploration.touches import explore, explore_many
 from .paper.by_method import SOLVERS

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of what callers pass in: a ValueError names the argument, what was wanted and what came."""
+"""Checks of what callers pass in: a ValueError names the argument, what was expected and what came."""
 
 import math
 import reprlib
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-ROUNDING = 4e-16  # Rounding of a unit vector's length.
+UNIT_ROUNDING = 4e-16  # Rounding of a unit vector's length.
 LARGEST, SMALLEST = 1e50, 1e-50  # lengths whose sixth powers are numbers
 
 
@@ -24,7 +24,7 @@ def finite_array(
     Raises ValueError where the shape differs, or a number is masked, not finite or beyond +-`largest`.
     """
     if np.ma.is_masked(value):  # type: ignore[no-untyped-call]
-        raise ValueError(f"{name}: wanted numbers, got masked ones among them: take them out")
+        raise ValueError(f"{name}: expected numbers, got masked ones among them: remove them")
     try:
         array = np.array(value)
         if array.dtype.kind not in "biufO":  # text, and complex numbers
@@ -32,19 +32,19 @@ def finite_array(
         array = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(
-            f"{name}: wanted numbers of shape {_shape_text(shape)}, got {shown(value)}"
+            f"{name}: expected numbers of shape {_shape_text(shape)}, got {shown(value)}"
         ) from None
     fits = len(shape) == array.ndim and all(
         size in (None, got) for size, got in zip(shape, array.shape, strict=True)
     )
     if not fits:
-        raise ValueError(f"{name}: wanted shape {_shape_text(shape)}, got {array.shape}")
+        raise ValueError(f"{name}: expected shape {_shape_text(shape)}, got {array.shape}")
     size = np.abs(array).max(initial=0.0)
     if not math.isfinite(size):
-        raise ValueError(f"{name}: wanted finite numbers, got NaN or infinity among them")
+        raise ValueError(f"{name}: expected finite numbers, got NaN or infinity among them")
     if size > largest:
         raise ValueError(
-            f"{name}: wanted numbers up to {largest:g}, got larger ones: take another unit of length"
+            f"{name}: expected numbers up to {largest:g}, got larger ones: use another unit of length"
         )
     return array
 
@@ -54,10 +54,10 @@ def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:
     try:
         found = list(values)
     except TypeError:
-        raise ValueError(f"{name}: wanted a list, got {shown(values)}") from None
+        raise ValueError(f"{name}: expected a list, got {shown(values)}") from None
     for value in found:
         if not isinstance(value, kind):
-            raise ValueError(f"{name}: wanted a list of {kind.__name__}, got {shown(value)} in it")
+            raise ValueError(f"{name}: expected a list of {kind.__name__}, got {shown(value)} in it")
     return found
 
 
@@ -73,11 +73,11 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 def unit_vector(name: str, value: ArrayLike) -> Array:
     """`value` (3,) scaled to length 1. Raises ValueError where it has no direction."""
     x, y, z = finite_array(name, value, (3,)).tolist()
-    if abs(math.hypot(x, y, z) - 1.0) <= ROUNDING:  # once is enough: twice would change its last bit
+    if abs(math.hypot(x, y, z) - 1.0) <= UNIT_ROUNDING:  # once is enough: twice would change its last bit
         return np.array([x, y, z])
     largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:
-        raise ValueError(f"{name}: wanted a vector with a direction, got (0, 0, 0)")
+        raise ValueError(f"{name}: expected a vector with a direction, got (0, 0, 0)")
     x, y, z = x / largest, y / largest, z / largest  # the square of a denormal or of 1e200 has no length
     length = math.hypot(x, y, z)
     return np.array([x / length, y / length, z / length])
@@ -90,12 +90,12 @@ def number(name: str, value: float, *, above: float | None = None, least: float 
             raise TypeError
         result = float(value)
     except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name}: wanted {_number_text(above, least)}, got {shown(value)}") from None
+        raise ValueError(f"{name}: expected {_number_text(above, least)}, got {shown(value)}") from None
     low = (above is not None and result <= above) or (least is not None and result < least)
     if low or not math.isfinite(result):
-        raise ValueError(f"{name}: wanted {_number_text(above, least)}, got {result:g}")
+        raise ValueError(f"{name}: expected {_number_text(above, least)}, got {result:g}")
     if abs(result) > LARGEST:
-        raise ValueError(f"{name}: wanted a number up to {LARGEST:g}, got {result:g}")
+        raise ValueError(f"{name}: expected a number up to {LARGEST:g}, got {result:g}")
     return result
 
 

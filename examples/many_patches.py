@@ -28,7 +28,7 @@ if not hasattr(bpy.types, "TACTILE_OT_reconstruct"):
     addon_utils.enable("bl_ext.user_default.tactile_patch", default_set=False)
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-parser.add_argument("scene", nargs="?", help="a .blend to open; without, the scene as it is")
+parser.add_argument("scene", nargs="?", help="a .blend to open (the open scene)")
 parser.add_argument("--count", type=int, default=20)
 parser.add_argument("--output", help="a .blend to save the patches in")
 options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c tactile reconstruct|fit|object|map|table FILE`: patches, objects and maps from the shell."""
+"""`blender -c tactile reconstruct|fit|object|join|map|table FILE`: patches and more from the shell."""
 
 import argparse
 import sys
@@ -22,6 +22,7 @@ NOT_OF_ALL = (
     "azimuths",
     "tilts",
 )
+SURFACE = "save the scene with the surface as .blend, or the surface alone as .ply"
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
 
@@ -38,7 +39,7 @@ def main(args):
         print(f"tactile: {_sentence(error)}", file=sys.stderr)
         return 1
     except MemoryError:
-        print("tactile: there is not enough memory for this: take a smaller file", file=sys.stderr)
+        print("tactile: there is not enough memory for this: use a smaller file", file=sys.stderr)
         return 1
     return 0
 
@@ -48,10 +49,11 @@ def _parser():
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
     for name, add_arguments, help in (
         ("reconstruct", _add_reconstruct, "touch a mesh and rebuild the patch around a point"),
-        ("fit", _add_fit, "rebuild the patch that measured contacts show"),
+        ("fit", _add_fit, "rebuild the patch from measured contacts"),
         ("object", _add_object, "touch a whole object and join the patches to one surface"),
-        ("map", _add_map, "touch a mesh all over and paint a copy by how well it goes"),
-        ("table", _add_table, "write what the patches of a scene have found, a row each"),
+        ("join", _add_join, "join measured contacts of a whole object to one surface"),
+        ("map", _add_map, "touch a mesh all over and paint a copy by how well touches go"),
+        ("table", _add_table, "write the results of a scene's patches as a table, one row each"),
     ):
         add_arguments(commands.add_parser(name, help=help))
     parser.set_defaults(**dict.fromkeys(NOT_OF_ALL))
@@ -62,7 +64,7 @@ def _add_reconstruct(command):
     add = command.add_argument
     add("--location", **VECTOR, help="where to touch (default: the 3D cursor)")
     add("--outward", **VECTOR, help="outward direction there (default: the surface's own)")
-    help = "add planes until the height is good to this in the mean, or no plane would help (0: that alone)"
+    help = "add planes until the mean deviation of the height is down to this or no plane would help"
     add("--tolerance", type=float, help=help)
     add("--contacts", type=Path, metavar="CSV", help="write the simulated contacts")
     _add_inputs(add)
@@ -71,20 +73,41 @@ def _add_reconstruct(command):
 
 def _add_fit(command):
     add = command.add_argument
-    add("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply, curves of one patch")
-    add("--unit", choices=list(contact_file.UNIT_METERS), help="of the numbers (what the file says)")
+    _add_contacts(add, ".csv or .ply with the curves of one patch")
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
-    help = "a place among strokes, which all curves are then (default, of strokes alone: their mean)"
+    help = "a place among strokes; all curves are then strokes (default for strokes alone: their mean)"
     add("--location", **VECTOR, help=help)
-    add("--radius", type=float, help="of strokes alone: how far from that place contacts count (all)")
-    add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
-    add("--flip", action="store_true", default=None, help="the other side is the outer one")
-    add("--noise", type=float, help="standard deviation of a contact, at least")
-    add("--normal-std", type=float, metavar="DEGREES", help="of measured normals, to fit them too")
+    add(
+        "--radius",
+        type=float,
+        help="for strokes alone: use contacts up to this distance from the place (all)",
+    )
+    add(
+        "--normal-std",
+        type=float,
+        metavar="DEGREES",
+        help="standard deviation of measured normals, to fit them too",
+    )
     help = "put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts"
     add("--onto", type=Path, metavar="MESH", help=help)
     _add_method(add)
     _add_verify(add)
+
+
+def _add_contacts(add, help):
+    """What was measured, and on which side."""
+    add("files", nargs="+", type=Path, metavar="FILE", help=help)
+    add("--unit", choices=list(contact_file.UNIT_METERS), help="unit of the numbers (the file's)")
+    add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
+    add("--flip", action="store_true", default=None, help="use the other side as the outer one")
+    add("--noise", type=float, help="least standard deviation of a contact")
+
+
+def _add_join(command):
+    add = command.add_argument
+    _add_contacts(add, ".csv or .ply with curves all over an object")
+    add("--tolerance", type=float, help="standard deviation to reach for heights (1.2 %% of each patch)")
+    _add_output(add, SURFACE)
 
 
 def _add_map(command):
@@ -98,16 +121,16 @@ def _add_object(command):
     add = command.add_argument
     _add_target(add)
     add("--location", **VECTOR, help="where to begin (default: any place that works)")
-    add("--tolerance", type=float, help="how well heights are to be known (size / 500)")
-    add("--edge", type=float, help="length of the triangles' edges (what the curvature asks)")
-    add("--most", type=int, help="touches, at most (1000)")
+    add("--tolerance", type=float, help="standard deviation to reach for heights (size / 500)")
+    add("--edge", type=float, help="length of the triangles' edges (chosen by the curvature)")
+    add("--most", type=int, help="number of touches after which to stop (1000)")
     _add_sensor(add)
-    _add_output(add, "save the scene with the surface, .blend; the surface alone as .ply")
+    _add_output(add, SURFACE)
 
 
 def _add_table(command):
-    command.add_argument("file", nargs="?", type=Path, metavar="FILE", help=".blend; without, the open scene")
-    command.add_argument("--output", type=Path, metavar="OUT", required=True, help="the table, .csv")
+    command.add_argument("file", nargs="?", type=Path, metavar="FILE", help=".blend (the open scene)")
+    command.add_argument("--output", type=Path, metavar="OUT", required=True, help="the table to write, .csv")
 
 
 def _add_verify(add):
@@ -119,16 +142,16 @@ def _add_inputs(add):
     _add_target(add)
     degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
     add("--azimuths", **degrees, help="three to six plane directions (0 60 120)")
-    add("--tilts", **degrees, help="as many plane tilts (0)")
+    add("--tilts", **degrees, help="tilts of the planes, one each (0)")
     help = "length of each half curve (as far as a patch can be trusted; map: size / 8)"
     add("--extent", type=float, help=help)
-    add("--step", type=float, help="distance between contacts (so many that more would tell little)")
+    add("--step", type=float, help="distance between contacts (such that more would add little)")
     _add_sensor(add)
     _add_method(add)
 
 
 def _add_target(add):
-    help = ".blend, .ply, .stl or .obj; without, the open scene"
+    help = ".blend, .ply, .stl or .obj (the open scene)"
     add("file", nargs="?", type=Path, metavar="FILE", help=help)
     help = "object to touch (default: the active one, or the only mesh)"
     add("--target", default="", metavar="NAME", help=help)
@@ -136,18 +159,18 @@ def _add_target(add):
 
 def _add_sensor(add):
     add("--noise", type=float, help="standard deviation of the simulated sensor (0)")
-    add("--seed", type=int, help="of the noise (0)")
+    add("--seed", type=int, help="seed of the noise (0)")
 
 
 def _add_method(add):
     """How to fit, and what to write."""
     add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (bayes)")
-    help = "of the polynomial (auto: the least that says what the contacts show)"
+    help = "degree of the polynomial (auto: the lowest that describes what the contacts show)"
     add("--degree", type=str.strip, choices=["auto", *"23456"], help=help)
-    add("--weight", type=float, help="lambda L^2, of the contacts against the smoothness (1000, 1e5)")
-    add("--solver", choices=[name for name, _, _ in SOLVERS], help="of tagc (fast)")
+    add("--weight", type=float, help="lambda L^2, the weight of the contacts against smoothness (1000, 1e5)")
+    add("--solver", choices=[name for name, _, _ in SOLVERS], help="solver of tagc (fast)")
     _add_output(
-        add, "save the scene with the result, .blend; the result alone as .ply; a patch also as .json"
+        add, "save the scene with the result as .blend, or the result alone as .ply; a patch also as .json"
     )
 
 

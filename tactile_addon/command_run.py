@@ -45,6 +45,7 @@ COMMANDS = {
     "fit": Command("import_contacts", patch_record.RECORD, readable, {}),
     "table": Command("", "", lambda report: f"{report['rows']} rows written", {}),
     "object": Command("touch_all_over", patch_record.ATLAS_RECORD, object_readable, {"progress": True}),
+    "join": Command("import_contacts", patch_record.ATLAS_RECORD, object_readable, {"whole": True}),
     "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
 }
 # What the operators take as it is given.
@@ -58,7 +59,7 @@ NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
 PATCH_FILES = (".blend", ".ply", ".json")
 MESH_FILES = (".blend", ".ply")
 KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
-KINDS |= {"object": MESH_FILES, "map": MESH_FILES}
+KINDS |= dict.fromkeys(("object", "join", "map"), MESH_FILES)
 
 
 def _require_numbers(options):
@@ -66,7 +67,7 @@ def _require_numbers(options):
     for name in NEVER_NEGATIVE:
         value = vars(options).get(name)
         if value is not None and not 0.0 <= value < math.inf:
-            raise Misuse(f"--{name.replace('_', '-')}: wanted a finite number of 0 or more, got {value:g}")
+            raise Misuse(f"--{name.replace('_', '-')}: expected a finite number of 0 or more, got {value:g}")
 
 
 def _arguments(options):
@@ -80,17 +81,17 @@ def _arguments(options):
     if "files" in options:
         if "location" in given:
             if "point" in given:
-                raise Misuse("--location: wanted it or --point, got both")
+                raise Misuse("--location: expected this or --point, got both")
             given |= {"point": given.pop("location"), "strokes": True}
         return given | _open_contacts(options)
     given["target"] = options.target or _default_target()
     if options.azimuths is not None:
         if not 3 <= len(options.azimuths) <= 6:
-            raise Misuse(f"--azimuths: wanted three to six, got {len(options.azimuths)}")
+            raise Misuse(f"--azimuths: expected three to six, got {len(options.azimuths)}")
         given |= {"plane_count": len(options.azimuths), "azimuths": _six_radians(options.azimuths)}
     if options.tilts is not None:
         if len(options.tilts) != given.get("plane_count", 3):
-            raise Misuse("--tilts: wanted as many as there are planes")
+            raise Misuse("--tilts: expected as many as there are planes")
         given["tilts"] = _six_radians(options.tilts)
     return given
 
@@ -98,7 +99,7 @@ def _arguments(options):
 def run(options):
     """Opens the file, runs the operator, saves; returns the report."""
     if "files" in options and options.verify is not None and options.onto is None:
-        raise Misuse("--verify: wanted --onto MESH too, to compare with")
+        raise Misuse("--verify: expected --onto MESH too, the mesh to compare with")
     _require_outputs(options)
     if options.file is not None:
         mesh_file.open_file(options.file)
@@ -113,6 +114,8 @@ def run(options):
     if command.record == patch_record.RECORD:
         _compare(made, options)
     report = made[command.record].to_dict()
+    if patch_record.GRAPH in made:
+        report["graph"] = json.loads(made[patch_record.GRAPH])
     if options.contacts is not None:
         r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
@@ -132,17 +135,20 @@ def _require_outputs(options):
     taken = {path.resolve(): "reads" for path in inputs}
     for name, path in outputs.items():
         if path.exists() and not path.is_file():
-            raise Misuse(f"--{name}: wanted the name of a file, got {path}")
+            raise Misuse(f"--{name}: expected the name of a file, got {path}")
         if path.resolve() in taken:
-            raise Misuse(f"--{name}: wanted another file than one that this {taken[path.resolve()]}: {path}")
+            raise Misuse(
+                f"--{name}: expected a file other than those that this command "
+                f"{taken[path.resolve()]}, got {path}"
+            )
         taken[path.resolve()] = "writes"
         if not path.absolute().parent.is_dir():
             raise OSError(f'there is no folder "{path.parent}" to write "{path.name}" to')
     kinds = KINDS[options.command]
     if "output" in outputs and options.output.suffix.lower() not in kinds:
-        raise Misuse(f"--output: wanted a file {' or '.join(kinds)}, got {options.output}")
+        raise Misuse(f"--output: expected a file {' or '.join(kinds)}, got {options.output}")
     if "report" in outputs and options.report.suffix.lower() != ".html":
-        raise Misuse(f"--report: wanted a file .html, got {options.report}")
+        raise Misuse(f"--report: expected a file .html, got {options.report}")
 
 
 def _compare(patch, options):
@@ -159,7 +165,7 @@ def _open_contacts(options):
     """The files as arguments; where no .blend is open, in an empty scene of their unit, so numbers stay."""
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
-        unit = measured.read(options.files, options.unit or "FILE", 1.0).unit
+        unit = measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit
         settings = bpy.context.scene.unit_settings
         name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
         settings.system = "METRIC" if unit else "NONE"
@@ -168,7 +174,7 @@ def _open_contacts(options):
             settings.length_unit = name
     paths = [path.absolute() for path in options.files]
     if len({path.parent for path in paths}) > 1:
-        raise Misuse("FILE: wanted files of one folder")
+        raise Misuse("FILE: expected files from one folder")
     return {
         "filepath": str(paths[0]),
         "directory": str(paths[0].parent),

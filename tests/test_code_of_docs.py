@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every sample of code in README.md and docs/ runs as it is written, page by page, in order.
+"""Every sample of code in README.md and docs/ runs as it is written, page by page, in order, and prints what
+the page shows below it.
 
 What a sample presupposes (a scan, contacts, a scene with Suzanne) lies in the folder that it runs in.
 """
@@ -18,7 +19,7 @@ pytest.importorskip("bpy", reason="needs Blender as a Python module: run make te
 import core
 
 ROOT = Path(__file__).resolve().parents[1]
-BLOCK = re.compile(r"^( *)```(python|sh)\n(.*?)^ *```", re.DOTALL | re.MULTILINE)
+BLOCK = re.compile(r"^( *)```(python|sh|)\n(.*?)^ *```", re.DOTALL | re.MULTILINE)
 PAGES = {
     path.relative_to(ROOT).as_posix(): found
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -131,17 +132,32 @@ def run_shell(bpy, command, line):
         bpy.ops.wm.open_mainfile(filepath=str(Path(words[2]).resolve()))
     code, out, err = command(*words[at + 2 :])
     assert code == 0, f"{line}\n{out}\n{err}"
+    return out
+
+
+NUMBER = re.compile(r"-?\b\d+(?:\.\d+)?(?:e[+-]\d+)?")
+
+
+def assert_printed(shown, out):
+    """Each line is printed with the same words and about the same numbers: other versions round otherwise."""
+    printed = {NUMBER.sub("#", line): line for line in out.splitlines()}
+    for line in shown.splitlines():
+        words = NUMBER.sub("#", line)
+        assert words in printed, f"{line}\n{out}"
+        numbers = [[float(n) for n in NUMBER.findall(each)] for each in (line, printed[words])]
+        assert numbers[0] == pytest.approx(numbers[1], rel=0.2), f"{line}\n{printed[words]}"
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_samples_run(page, empty, command, folder):
-    scope = names(page)
+    scope, out = names(page), None
     for kind, code in PAGES[page]:
         if kind == "python":
             exec(compile(code, f"{page}, a sample", "exec"), scope)
-        else:
-            for line in commands(code):
-                run_shell(empty, command, line)
+        elif kind == "sh":
+            out = "".join(run_shell(empty, command, line) or "" for line in commands(code))
+        elif out and not code.startswith("#"):  # the sample of a file has its own test
+            assert_printed(code, out)
 
 
 def test_the_sample_of_the_format_is_read(extension, tmp_path):

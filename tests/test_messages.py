@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 STATUS = re.compile(r"\| (ok|any|uncertain|outdated|not_)")
 ROWS = [
     cell.strip().replace("\\|", "|")
-    for line in (ROOT / "docs" / "messages.md").read_text().splitlines()
+    for line in (ROOT / "docs" / "messages.md").read_text(encoding="utf-8").splitlines()
     if line.startswith("|") and not line.startswith("|--")
     for cell in line.split(" | ")[slice(1, 2) if STATUS.match(line) else slice(1)]
 ]
@@ -49,7 +49,7 @@ def sentences(node):
 def messages():
     for folder in ("core", "tactile_addon", "cluster"):
         for path in sorted((ROOT / folder).rglob("*.py")):
-            for node in ast.walk(ast.parse(path.read_text())):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 for found in sentences(node):
                     for part in (found.body, found.orelse) if isinstance(found, ast.IfExp) else (found,):
                         text = text_of(part)
@@ -61,7 +61,7 @@ MESSAGES = sorted(set(messages()))
 
 
 def is_about_an_argument(text):
-    return re.match(r"(\w+|…): wanted ", text) and "single precision" not in text
+    return re.match(r"(\w+|…): expected ", text) and "single precision" not in text
 
 
 @pytest.mark.parametrize("message", [m for m in MESSAGES if not is_about_an_argument(m)])
@@ -72,10 +72,10 @@ def test_every_message_is_in_the_table(message):
 @pytest.mark.parametrize("row", ROWS)
 def test_every_row_is_a_message_and_in_a_test(row):
     fixed = [re.findall(r"\w+", part) for part in row.split("…")]
-    if row.startswith(("…: wanted", "The patch describes")):
+    if row.startswith(("…: expected", "The patch describes")):
         return
     assert row in MESSAGES
-    tests = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("*.py"))
+    tests = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py"))
     told = " ".join(re.findall(r"\w+", tests))
     runs = [" ".join(part[i : i + 3]) for part in fixed for i in range(len(part) - 2)]
     assert any(run in told for run in runs), "no test has any three words of it"

@@ -45,7 +45,7 @@ def test_what_agrees_can_be_released(checkout):
         ("CHANGELOG.md", "## [1.1.0] - 2026-01-02\n", "does not begin with a section [1.2.0]"),
         ("CHANGELOG.md", "## [1.2.0] - 2026-01-02\n\n", "says nothing in its section [1.2.0]"),
         ("CITATION.cff", "version: 1.1.0\n", "has another version than the manifest's 1.2.0"),
-        ("blender_manifest.toml", 'version = "1.2"\n', "wanted three numbers"),
+        ("blender_manifest.toml", 'version = "1.2"\n', "expected three numbers"),
         ("blender_manifest.toml", 'version = "1.3.0"\n', "no tag v1.3.0: git tag v1.3.0"),
     ],
 )

@@ -41,7 +41,7 @@ def modules(package):
 def imports(name, path):
     """Dotted names of all that a module imports relatively, wherever in it."""
     inside = name.split(".")
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = inside[: len(inside) - node.level] + (node.module.split(".") if node.module else [])
             for alias in node.names:
@@ -76,14 +76,16 @@ def test_no_import_goes_in_a_circle(package):
 def test_core_knows_no_blender_and_the_add_on_imports_it_only_as_a_whole():
     for name, path in modules("core"):
         assert all(imported.startswith("core") for imported in imports(name, path)), name
-        assert "bpy" not in path.read_text().replace("without bpy", ""), name
+        assert "bpy" not in path.read_text(encoding="utf-8").replace("without bpy", ""), name
 
 
 def test_what_is_shipped_knows_no_cluster():
     for package in ("core", "tactile_addon"):
         for name, path in modules(package):
             assert not any(imported.startswith("cluster") for imported in imports(name, path)), name
-            assert not re.search(r"(import|from) (dask|distributed|pyarrow)", path.read_text()), name
+            assert not re.search(
+                r"(import|from) (dask|distributed|pyarrow)", path.read_text(encoding="utf-8")
+            ), name
 
 
 @pytest.mark.parametrize("package", ROOMS)
@@ -91,12 +93,12 @@ def test_rooms_and_modules_are_small(package):
     for folder in [ROOT / package, *(p for p in (ROOT / package).iterdir() if p.is_dir())]:
         files = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
         assert len(files) <= MOST_FILES, folder
-    long = {name: len(path.read_text().splitlines()) for name, path in modules(package)}
+    long = {name: len(path.read_text(encoding="utf-8").splitlines()) for name, path in modules(package)}
     assert not {name: lines for name, lines in long.items() if lines > MOST_LINES}
 
 
 def test_the_tree_for_contributors_is_that_of_the_files():
-    tree = (ROOT / "CONTRIBUTING.md").read_text().split("```")[3]
+    tree = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("```")[3]
     named = re.findall(r"^ +(\w+)/? ", tree, re.MULTILINE)
     there = [p.stem for package in ROOMS for _, p in modules(package) if p.name != "__init__.py"]
     rooms = [room for package, rooms in ROOMS.items() for room in rooms if (ROOT / package / room).is_dir()]

@@ -55,7 +55,7 @@ def main() -> None:
         "none: one without scipy, for a Blender whose Python has it",
     )
     parser.add_argument(
-        "--each-series", action="store_true", help="a zip for each series of Blender too, of half the size"
+        "--each-series", action="store_true", help="also a zip for each series of Blender, half as large"
     )
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "dist", metavar="DIR")
     args = parser.parse_args()

@@ -30,7 +30,7 @@ TICKS = (0.1, 0.3, 1.0, 3.0, 10.0)  # permille of an object's size
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--objects", type=Path, help="a folder of .ply, .stl, .obj and .blend files")
-    parser.add_argument("--output", type=Path, default=BUILD / "dataset", help="made anew (%(default)s)")
+    parser.add_argument("--output", type=Path, default=BUILD / "dataset", help="folder to make (%(default)s)")
     options = parser.parse_args()
     objects = options.objects or (SCANS if SCANS.is_dir() else shapes(BUILD / "shapes"))
     shutil.rmtree(options.output, ignore_errors=True)

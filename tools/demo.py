@@ -23,7 +23,7 @@ BAR_REACH = 1.5  # patch radii from the middle of the bar to either end
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--zip", required=True, type=Path, help="the built extension")
-    parser.add_argument("--mesh", default="", help="a mesh file; Suzanne without")
+    parser.add_argument("--mesh", default="", help="a mesh file (Suzanne)")
     options = parser.parse_args()
     extension = blender.start(options.zip)
     import bpy
@@ -76,7 +76,7 @@ def compose(extension, patch, unit):
     if report["vertices"]:
         off, std = (100.0 * report[key] / radius for key in ("vertex_distance_mean", "height_std"))
         sentence = (
-            f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius in the mean, "
+            f"{report['vertices']} mesh vertices off by {off:.1f} % of the radius on average, "
             f"standard deviation {std:.1f} %"
         )
         put.text(sentence, -3.3, -2.48, 0.14)

@@ -20,7 +20,7 @@ STROKES, TURNS = 7, 15  # pictures a curve, and pictures of the turn
 SHORT, LONG = 90, 1500  # milliseconds
 CAPTIONS = (
     "A finger slides along three curves",
-    "From them alone: the patch, by Gaussian curvature",
+    "The patch from these curves alone, by Gaussian curvature",
     "Turn the planes, and the patch follows",
 )
 CURVE, FINGER = (0.02, 0.02, 0.02, 1.0), (0.9, 0.35, 0.02, 1.0)
@@ -55,7 +55,7 @@ def main():
     size = OUTPUT.stat().st_size
     print(f"saved {OUTPUT}: {len(pictures)} pictures, {size} bytes, {sum(times) / 1e3:.1f} s")
     if size > LARGEST:
-        sys.exit(f"film: wanted at most {LARGEST} bytes: lower QUALITY or the number of pictures")
+        sys.exit(f"film: expected at most {LARGEST} bytes: lower QUALITY or the number of pictures")
 
 
 class Film:

@@ -38,7 +38,7 @@ def main() -> None:
     run("tools/build.py", "--wheels", "all", "--each-series", "--output", folder / "repository")
     generate(folder / "repository")
     _, text = section(ROOT, version)
-    (folder / "CHANGES.md").write_text(text, encoding="utf-8")
+    (folder / "CHANGES.md").write_text(text, encoding="utf-8", newline="\n")
     write_checksums(folder)
     for path in sorted(folder.rglob("*.*")):
         print(f"{path.stat().st_size / 1e6:7.1f} MB  {path.relative_to(ROOT)}")
@@ -59,7 +59,7 @@ def disagreements(root: Path) -> Iterator[str]:
     """A sentence for each thing that does not agree with the manifest's version."""
     version = manifest_version(root)
     if not VERSION.fullmatch(version):
-        yield f'blender_manifest.toml has the version "{version}": wanted three numbers, as in 1.0.0'
+        yield f'blender_manifest.toml has the version "{version}": expected three numbers, as in 1.0.0'
     date, text = section(root, version)
     if date is None:
         yield f"CHANGELOG.md does not begin with a section [{version}], the manifest's version: write it"
@@ -108,7 +108,7 @@ def write_checksums(folder: Path) -> None:
         f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder).as_posix()}\n"
         for path in sorted(folder.rglob("*.zip"))
     ]
-    (folder / "SHA256SUMS").write_text("".join(lines), encoding="utf-8")
+    (folder / "SHA256SUMS").write_text("".join(lines), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ def main():
     size = options.output.stat().st_size
     print(f"saved {options.output}: {size} bytes")
     if size > LARGEST:
-        sys.exit(f"sample: wanted at most {LARGEST} bytes")
+        sys.exit(f"sample: expected at most {LARGEST} bytes")
 
 
 def profile(z):

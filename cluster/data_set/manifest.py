@@ -32,7 +32,7 @@ def read(data_set: DataSet) -> dict[str, Any] | None:
         return {key: dict(found[key]) for key in ("versions", "options", "files")}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ValueError(
-            f'"{data_set.manifest}" is no manifest of a data set: take another folder'
+            f'"{data_set.manifest}" is not the manifest of a data set: use another folder'
         ) from error
 
 
@@ -43,8 +43,8 @@ def require_same(old: dict[str, Any], options: Options) -> None:
             was, wanted = old[kind].get(name), now.get(name)
             if was != wanted:
                 raise ValueError(
-                    f"{name}: this data set was begun with {_said(was)}, and now it is {_said(wanted)}: "
-                    "take that again, or another folder"
+                    f"{name}: this data set was begun with {_said(was)}, and it is now "
+                    f"{_said(wanted)}: use the same again, or another folder"
                 )
 
 
@@ -54,8 +54,8 @@ def require_same_objects(old: dict[str, Any], files: dict[str, Any]) -> None:
         had = old["files"].get(path, {})
         if any(known is not None and hashes.get(name) != known for name, known in had.items()):
             raise ValueError(
-                f'"{path}" has changed since this data set was begun, or cannot be read any more: put the '
-                "old file back, or take another folder"
+                f'"{path}" has changed since this data set was begun, or can no longer be read: put the '
+                "old file back, or use another folder"
             )
 
 

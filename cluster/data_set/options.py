@@ -27,7 +27,9 @@ class Length:
         except ValueError:
             value = math.nan
         if not 0.0 <= value < math.inf:
-            raise ValueError(f"wanted a length, as 0.002, or a share of the object, as 1.5%, got {text}")
+            raise ValueError(
+                f"expected a length such as 0.002, or a share of the object such as 1.5%, got {text}"
+            )
         return cls(value / 100.0, True) if text.strip().endswith("%") else cls(value, False)
 
     def on(self, size: float) -> float:
@@ -76,10 +78,10 @@ class Options(Lengths):
         """Raises ValueError, with a sentence, for options that no touch can have."""
         for name, least in (("touches", 1), ("block", 1), ("seed", 0)):
             if getattr(self, name) < least:
-                raise ValueError(f"{name}: wanted a number of {least} or more, got {getattr(self, name)}")
+                raise ValueError(f"{name}: expected a number of {least} or more, got {getattr(self, name)}")
         if len(self.tilts) != len(self.azimuths):
             raise ValueError(
-                f"tilts: wanted as many as there are planes, {len(self.azimuths)}, got {len(self.tilts)}"
+                f"tilts: expected as many as there are planes, {len(self.azimuths)}, got {len(self.tilts)}"
             )
         self._rehearse()
 

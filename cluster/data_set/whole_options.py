@@ -26,12 +26,12 @@ class WholeOptions(Lengths):
     def __post_init__(self) -> None:
         """Raises ValueError, with a sentence, for options that no object can be touched with."""
         if self.seed < 0:
-            raise ValueError(f"seed: wanted a number of 0 or more, got {self.seed}")
+            raise ValueError(f"seed: expected a number of 0 or more, got {self.seed}")
         if self.tolerance is None:
             return
         tolerance, noise = Length.of(self.tolerance), Length.of(self.noise)
         if tolerance.is_share == noise.is_share and tolerance.value < noise.value:
-            raise ValueError(f"tolerance: wanted the noise {noise} or more, got {tolerance}")
+            raise ValueError(f"tolerance: expected the noise {noise} or more, got {tolerance}")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""

@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The edges of the graph (paper, VI): the boundary curve between two patches is where they weigh the same."""
+"""The graph (paper, VI): its nodes as data, and its edges, the curves where two patches weigh the same."""
 
-from typing import NamedTuple
+from collections.abc import Generator
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..reconstruction.result import Reconstruction
+from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts, Pairs
 from .field import DIFFER, LAYER, node_weights
 
@@ -21,6 +24,10 @@ class Edge(NamedTuple):
     curve: Array
     angle: Array
 
+    def to_dict(self) -> dict[str, Any]:
+        """The edge as plain values."""
+        return {"nodes": list(self.nodes), "curve": self.curve.tolist(), "angle": self.angle.tolist()}
+
 
 class _Crossing(NamedTuple):
     """Where on rays a patch gives way: its index, the other's, the ray, the point, the angle of normals."""
@@ -32,9 +39,27 @@ class _Crossing(NamedTuple):
     angle: Array
 
 
-def edges_of(charts: Charts) -> list[Edge]:
-    """All pairs that share a boundary, each with that of the patch on which it is seen from more rays."""
-    parts = [_crossings(charts, node) for node in range(len(charts.radii))]
+def node_dict(r: Reconstruction, std: float) -> dict[str, Any]:
+    """A patch as a node of this mean deviation: where it is and how it bends, as plain values."""
+    return {
+        "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
+        "radius": r.radius,
+        "polynomial": polynomial_dict(r.patch),
+        "domain": r.domain.ends.tolist(),
+        "mean_height_std": std,
+        **{name: getattr(r, name) for name in ("status", "message")},
+    }
+
+
+def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
+    """All pairs that share a boundary, each with that of the patch on which it is seen from more rays.
+
+    Yields the share that is done.
+    """
+    parts, count = [], len(charts.radii)
+    for node in range(count):
+        parts.append(_crossings(charts, node))
+        yield 0.9 * (node + 1) / count
     found = _Crossing(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     pairs: dict[tuple[int, int], list[int]] = {}
     for i, pair in enumerate(zip(found.node.tolist(), found.other.tolist(), strict=True)):
@@ -44,6 +69,7 @@ def edges_of(charts: Charts) -> list[Edge]:
         which = max(pairs.get(pair, []), pairs.get(pair[::-1], []), key=len)
         which = _in_turn(which, found.ray)
         edges.append(Edge(pair, found.point[which], found.angle[which]))
+        yield 1.0
     return edges
 
 

@@ -24,7 +24,7 @@ LIKELY = 2.0  # deviations of a patch, as many as a contact is off it at most th
 BEYOND = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain
 FARTHEST = 3.0  # times that, a contact is of another wall
 NOISE = 5e-4  # of the radius, at least
-AT_ONCE = 6  # patches in a step
+AT_ONCE, LOOK = 6, 1500  # patches, and contacts or other places of all, in a step
 NEAR = 1.3  # of a domain's radius, as far as heights are asked at knots
 OPPOSED = 0.34  # cosine of the angle of the surface to a patch, below which they are not made to agree
 MOVED = 0.03  # of the radius, that a patch is at most
@@ -45,7 +45,12 @@ def joined(
     known : tables of patches that were joined before, and of how many contacts; is changed
     """
     points, normals, owner = _contacts(contours)
-    pairs = charts.pairs(points)
+    parts = []
+    for start in range(0, len(points), LOOK):
+        part = charts.pairs(points[start : start + LOOK])
+        parts.append(part._replace(place=start + part.place))
+        yield 0.0
+    pairs = Pairs(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     each = np.argsort(pairs.node, kind="stable")
     bounds = np.searchsorted(pairs.node[each], np.arange(len(results) + 1))
     tables: list[Table] = []
@@ -57,7 +62,7 @@ def joined(
         tables.append(known[i][1])
         if len(tables) % AT_ONCE == 0:
             yield len(tables) / len(results)
-    return agreed(stacked(results, tables))
+    return (yield from _agreed(stacked(results, tables)))
 
 
 def _joined_table(
@@ -78,26 +83,31 @@ def _joined_table(
     return rim, half, *found
 
 
-def agreed(charts: Charts) -> Charts:
-    """Patches moved onto the surface that all of them make."""
+def _agreed(charts: Charts) -> Joining:
+    """Patches moved onto the surface that all of them make; yields 1."""
     from scipy.ndimage import spline_filter
 
     x, y = charts.knots().reshape(2, -1)
     node = np.repeat(np.arange(len(charts.radii)), SIDE**2)
     asked = np.flatnonzero(charts.shares(x, y, node) < NEAR)
-    x, y, node = x[asked], y[asked], node[asked]
+    moves = np.zeros(charts.heights.size)
+    for start in range(0, len(asked), LOOK):
+        some = asked[start : start + LOOK]
+        moves[some] = _move(charts, node[some], x[some], y[some])
+        yield 1.0
+    each = moves.reshape(charts.heights.shape)
+    change = np.array([spline_filter(move, order=3, mode="mirror") for move in each])
+    return replace(charts, heights=charts.heights + change)
+
+
+def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
+    """How far patches are from the surface of all above local (x, y), along their axes and in unit radius."""
     points, _ = charts.world(node, x, y)
     field = blended(charts, points)
     up = np.einsum("ki,ki->k", field.normal, charts.axes[node, :, 2])
     move = -field.distance / np.maximum(up, OPPOSED) / charts.radii[node]
     on = (field.node >= 0) & (up > OPPOSED) & (np.abs(move) < MOVED)
-    moves = np.zeros(charts.heights.size)
-    moves[asked[on]] = move[on]
-    each = moves.reshape(charts.heights.shape)
-    return replace(
-        charts,
-        heights=charts.heights + np.array([spline_filter(m, order=3, mode="mirror") for m in each]),
-    )
+    return np.where(on, move, 0.0)
 
 
 def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[np.intp]]:

@@ -21,7 +21,7 @@ STRETCH, STEPS = 1.4, 10  # by what patches grow, and how often
 MISSED = 3.0  # times what is expected, that contacts are off a patch in the median
 APART = 0.6  # radii from patch to patch
 NEIGHBORS = 16  # contacts that a normal follows from, where none was measured
-GROWN = 0.012  # of the radius, that a patch may be uncertain in the mean where there is no tolerance
+GROWN = 0.012  # of the radius, that a patch may be uncertain on average where there is no tolerance
 
 
 def atlas_of(
@@ -33,11 +33,11 @@ def atlas_of(
 ) -> Atlas:
     """The atlas of measured contacts: contours, with normals or without, and strokes (n, 3).
 
-    outward : (3,), on the outer side of all contacts; wanted where some have no normals that face outward
-    tolerance : mean deviation of the height until which patches grow; None for 1.2 % of their radius
+    outward : (3,), on the outer side of all contacts; required where some have no normals that face outward
+    tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
     noise : accuracy of a contact; None for the contours' own
 
-    Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, and where no
+    Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, and if no
     contacts carry a patch.
     """
     from scipy.spatial import cKDTree
@@ -57,10 +57,10 @@ def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -
     ]
     up = None if outward is None else unit_vector("outward", outward)
     if up is None and any(stroke.normals is None for stroke in strokes):
-        raise ValueError("outward: wanted a direction where contacts have no normals, got none")
+        raise ValueError("outward: expected a direction where contacts have no normals, got none")
     points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
     if len(points) < FIRST:
-        raise ValueError(f"contours_or_strokes: wanted {FIRST} contacts or more, got {len(points)}")
+        raise ValueError(f"contours_or_strokes: expected {FIRST} contacts or more, got {len(points)}")
     if up is None:
         normals = np.vstack([stroke.normals for stroke in strokes])  # type: ignore[misc]
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
@@ -119,7 +119,8 @@ class _Cloud(NamedTuple):
                 return radius
             radius *= STRETCH
         raise ValueError(
-            f"contours_or_strokes: wanted contacts all around some place, got {len(self.points)} without"
+            "contours_or_strokes: expected contacts all around at least one of them, got "
+            f"{len(self.points)} without"
         )
 
 

@@ -11,18 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number
+from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
-from .boundaries import Edge, edges_of
+from ..reconstruction.serialization import plain
+from .boundaries import Edge, edges_of, node_dict
 from .charts import Charts
 from .field import AGREE, DIFFER, LAYER, blended, node_weights
 from .frontier import FACING, INSIDE, Place
 from .meshing import SMALLEST, Mesh, meshed
 
+VERSION = 1  # of the graph as data
 TURNS, OUTWARD = 16, 6  # samples of each patch, from which what is far away is measured
 
 
 class NextTouch(NamedTuple):
-    """Where to touch next, (3,) each, and what it would bring: the area that is not known well enough."""
+    """Where to touch next, (3,) each, and the gain: the area that is not known well enough."""
 
     point: Array
     outward: Array
@@ -40,12 +43,12 @@ class _Samples(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Patches that overlap, nodes of a graph whose edges are the curves where one takes over from another.
+    """Overlapping patches: the nodes of a graph whose edges are the curves where one takes over from another.
 
-    patches : of n nodes
+    patches : those of the n nodes
     charts : the same as tables
-    tolerance : that they were felt to, a length; None where there was none
-    uncovered : places of rims beyond which there is something that was not felt
+    tolerance : a length that the touches were to reach; None if there was none
+    uncovered : places on rims beyond which the object goes on unfelt
     """
 
     patches: tuple[Reconstruction, ...]
@@ -55,8 +58,14 @@ class Atlas:
 
     @cached_property
     def edges(self) -> list[Edge]:
-        """Pairs of patches that share a boundary, with it."""
-        return edges_of(self.charts)
+        """Pairs of patches that share a boundary, with this boundary."""
+        edges: list[Edge] = result_of(edges_of(self.charts))
+        return edges
+
+    def bounding(self) -> Generator[float, None, None]:
+        """What `edges` does, in steps: yields the share that is done, after which `edges` are known."""
+        if "edges" not in vars(self):
+            vars(self)["edges"] = yield from edges_of(self.charts)  # where cached_property looks
 
     @property
     def status(self) -> str:
@@ -72,16 +81,16 @@ class Atlas:
     def _verdict(self) -> tuple[str, str]:
         if self.uncovered:
             return "uncertain", (
-                f"The patches end at {len(self.uncovered)} places where the object goes on: allow more "
-                "touches, or a larger tolerance."
+                f"The patches end at {len(self.uncovered)} places where the object goes on: allow "
+                "more touches or a larger tolerance."
             )
         rough = len(self._uncertain)
         if rough:
             return "uncertain", (
-                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch there "
-                "once more, or take a larger one."
+                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch "
+                "there again or use a larger tolerance."
             )
-        return "ok", "The object was felt wherever a finger could go on."
+        return "ok", "The object was felt everywhere a finger could reach."
 
     @cached_property
     def _uncertain(self) -> list[int]:
@@ -89,7 +98,7 @@ class Atlas:
         return self.charts.less_certain_than(np.inf if self.tolerance is None else self.tolerance)
 
     def next_touch(self) -> NextTouch | None:
-        """Where the next touch would bring most; None where all is covered as well as was asked for."""
+        """Where the next touch would bring most; None if all is covered to the tolerance."""
         if self.uncovered:
             place = max(self.uncovered, key=lambda place: place.radius)
             area = np.pi * place.radius**2
@@ -141,15 +150,10 @@ class Atlas:
     def mesh(self, edge: float) -> Mesh:
         """The surface as triangles whose edges are about as long as asked.
 
-        Watertight where the object was felt all round, open where it was not.
+        It is closed if the object was felt all round, and open where it was not.
         """
-        steps = self.meshing(edge)
-        try:
-            while True:
-                next(steps)
-        except StopIteration as end:
-            mesh: Mesh = end.value
-            return mesh
+        mesh: Mesh = result_of(self.meshing(edge))
+        return mesh
 
     def suggested_edge(self) -> float:
         """An edge at which triangles are off the surface by half its deviation, in the median of the patches.
@@ -162,12 +166,18 @@ class Atlas:
         return float(np.median(np.minimum(chords, 0.5 * radii)))
 
     def curvatures(self, mesh: Mesh) -> dict[str, Array]:
-        """Gaussian and mean curvature, shape index and curvedness (n,) at the vertices of its mesh, by name.
+        """Those of `curvatures_at` at the vertices of its mesh."""
+        return self.curvatures_at(mesh.vertices, mesh.normals)
 
-        K and H are means of what the patches say there, each as it counts in the blended surface; the others
-        follow from these. Where no patch has a say, all are 0.
+    def curvatures_at(self, points: Array, normals: Array) -> dict[str, Array]:
+        """Gaussian and mean curvature, shape index and curvedness (n,) at points of the surface, by name.
+
+        points, normals : (n, 3)
+
+        K and H are means over the patches there, each with its weight in the blended surface; the others
+        follow from these. Where there is no patch, all are 0.
         """
-        gauss, mean = _blended_curvatures(self.charts, mesh)
+        gauss, mean = _blended_curvatures(self.charts, points, normals)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # of the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,
@@ -180,17 +190,36 @@ class Atlas:
         """What `mesh` does, in steps: yields the share that is done, and returns the mesh."""
         return meshed(self.charts, number("edge", edge, above=0.0))
 
+    def to_dict(self) -> dict[str, Any]:
+        """The graph as a dict of numbers, words, lists and dicts, as JSON has them, in the caller's unit.
 
-def _blended_curvatures(charts: Charts, mesh: Mesh) -> tuple[Array, Array]:
-    """Means of K and H (n,) at the vertices, over the patches of the vertices' own wall."""
-    pairs = charts.pairs(mesh.vertices)
-    facing = np.einsum("mi,mi->m", pairs.normal, mesh.normals[pairs.place])
+        nodes : frame, radius, polynomial (1), ends of the domain, deviation and status of each patch
+        edges : indices of two nodes, their boundary curve, and the angle of their normals along it
+        uncovered, next_touch : where the object goes on, and where a touch would bring most, or None
+
+        The `to_dict` of a patch has all of it, and is thirty times as large.
+        """
+        touch, stds = self.next_touch(), self.charts.mean_stds
+        return {
+            "version": VERSION,
+            **{name: getattr(self, name) for name in ("status", "message", "tolerance")},
+            "nodes": [node_dict(r, float(std)) for r, std in zip(self.patches, stds, strict=True)],
+            "edges": [edge.to_dict() for edge in self.edges],
+            "uncovered": [{"point": list(p.point), "outward": list(p.normal)} for p in self.uncovered],
+            "next_touch": None if touch is None else plain(touch._asdict()),
+        }
+
+
+def _blended_curvatures(charts: Charts, points: Array, normals: Array) -> tuple[Array, Array]:
+    """Means of K and H (n,) at points, over the patches of their own wall."""
+    pairs = charts.pairs(points)
+    facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
     weights = node_weights(charts, pairs) * np.clip((facing - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
     radii = charts.radii[pairs.node]
     weights *= np.abs(pairs.distance) < LAYER * radii
-    x, y = charts.local(mesh.vertices, pairs.place, pairs.node)[:, :2].T
+    x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T
     curvatures = charts.curvatures(x, y, pairs.node)
-    count = len(mesh.vertices)
+    count = len(points)
     total = np.maximum(np.bincount(pairs.place, weights, count), SMALLEST)
     gauss, mean = (np.bincount(pairs.place, weights * each, count) / total for each in curvatures)
     return gauss, mean

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
-from ..contours.tracking import Surface, generator_of
+from ..contours.finger import Surface
+from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
-from ..exploration.touches import explore, explore_many
+from ..exploration.side_by_side import exploring
+from ..exploration.touches import explore
 from .charts import Charts
 from .frontier import Frontier, covered, side_of
 from .join import Table, joined
@@ -19,7 +21,7 @@ from .object_atlas import Atlas
 
 MOST = 1000
 FIRST = 300.0  # times the tolerance, that half curves of the first touch may become
-SIZE = 1.5  # times the tolerance, that a patch may be uncertain in the mean before its neighbors are known
+SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
 LEAST = 5.0  # times it, that a patch is wide at least
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
 AGAIN = 2  # times that patches less certain than the tolerance are touched again
@@ -29,7 +31,7 @@ Contact = tuple[Array, Array]  # a point and its normal, (3,) each
 
 
 class Progress(NamedTuple):
-    """How far it is: touches done, places known to be uncovered, and the touches that came since the last.
+    """Touches done, places known to be uncovered, and the touches since the last Progress.
 
     joining : the share of the patches that are joined; None while the object is touched
     """
@@ -55,32 +57,48 @@ def touch_all_over(
 ) -> Steps:
     """What `explore_object` does, in steps: yields a Progress after each, and returns the Atlas.
 
-    Sent False, it touches no more and joins what there is. Arguments and errors are those of
+    If it is sent False, it stops touching and joins the patches so far. Arguments and errors are those of
     `explore_object`; the errors come with the first step.
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     tolerance, noise = number("tolerance", tolerance, above=0.0), number("noise", noise, least=0.0)
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
     if tolerance < noise:
-        raise ValueError(f"tolerance: wanted the noise {noise:g} or more, got {tolerance:g}")
+        raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     run = _Run(surface, tolerance, most, {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance})
-    more = yield run.first(p, up)
+    more = (yield run.first(p, up)) is not False
     more = yield from _all_over(run, more)
     return (yield from _joined(run, more))
 
 
-def _all_over(run: "_Run", more: bool | None) -> Generator[Progress, bool | None, bool | None]:
-    """Touches until nothing within reach is uncovered; returns what was sent last."""
-    while more is not False and run.done < run.most:
-        chosen = run.frontier.take(min(SIDE_BY_SIDE, run.most - run.done))
-        if not chosen:
+def _all_over(run: "_Run", more: bool) -> Generator[Progress, bool | None, bool]:
+    """Touches until nothing within reach is uncovered; returns whether nobody has sent False."""
+    while more and run.done < run.most:
+        chosen, more = yield from _told(
+            run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)), run.now()
+        )
+        if not chosen or not more:
             break
         farthest = LARGER * max(touch.place.radius for touch in chosen)
-        state = run.touch([(touch.point, touch.outward) for touch in chosen], farthest)
+        contacts = [(touch.point, touch.outward) for touch in chosen]
+        new, more = yield from _told(run.touch(contacts, farthest), run.now())
         for touch in chosen:
             run.frontier.tried(touch)
-        more = yield state._replace(uncovered=len(run.frontier.queue))
+        more = (yield run.now(new)) is not False and more
     return more
+
+
+def _told(
+    steps: Generator[None, None, Any], progress: Progress
+) -> Generator[Progress, bool | None, tuple[Any, bool]]:
+    """What steps return, and whether nobody has sent False; tells the same progress after each of them."""
+    more = True
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value, more
+        more = (yield progress) is not False and more
 
 
 class _Run:
@@ -95,21 +113,25 @@ class _Run:
         """The touch from which all others go on; raises ValueError where there is none."""
         first = explore(self.surface, point, up, farthest=FIRST * self.tolerance, **self.wanted)
         self.frontier = Frontier(self.surface, side_of(self.surface, point, up, first.step))
-        return self._added([first], 1)
+        self.frontier.add(first.result)
+        self.found, self.done = [first], 1
+        return self.now([first])
 
-    def touch(self, contacts: Sequence[Contact], farthest: float) -> Progress:
-        """Touches at places, where there can be one that is wide enough."""
+    def now(self, new: Sequence[Exploration] = ()) -> Progress:
+        """How far it is."""
+        return Progress(self.done, len(self.frontier.queue), tuple(new))
+
+    def touch(self, contacts: Sequence[Contact], farthest: float) -> Generator[None, None, list[Exploration]]:
+        """Touches at places, where there can be one that is wide enough; their rims are the frontier's."""
         points, outward = (np.array(values) for values in zip(*contacts, strict=True))
-        results = explore_many(self.surface, points, outward, farthest=farthest, **self.wanted)
+        results = yield from exploring(self.surface, points, outward, farthest=farthest, **self.wanted)
         new = [e for e in results if isinstance(e, Exploration) and e.result.radius >= LEAST * self.tolerance]
-        return self._added(new, len(contacts))
-
-    def _added(self, new: list[Exploration], touches: int) -> Progress:
         for exploration in new:
             self.frontier.add(exploration.result)
+            yield
         self.found += new
-        self.done += touches
-        return Progress(self.done, len(self.frontier.queue), tuple(new))
+        self.done += len(contacts)
+        return new
 
     def missing(self, charts: Charts, rough: list[int]) -> list[Contact | None]:
         """For each of these patches the contact in the middle of those that no other covers, if there are."""
@@ -124,7 +146,7 @@ class _Run:
         return found
 
 
-def _joined(run: _Run, more: bool | None) -> Steps:
+def _joined(run: _Run, more: bool) -> Steps:
     """The atlas of what was found, after more touches where patches are less certain than the tolerance.
 
     Patches that stay less certain are left out where others cover all that they felt.
@@ -136,9 +158,10 @@ def _joined(run: _Run, more: bool | None) -> Steps:
         rough = charts.less_certain_than(run.tolerance)
         missing = run.missing(charts, rough)
         chosen = [contact for contact in missing if contact is not None][: run.most - run.done]
-        if not (again and chosen) or more is False:
+        if not (again and chosen and more):
             break
-        more = yield run.touch(chosen, float(charts.radii[rough].max()))
+        new, more = yield from _told(run.touch(chosen, float(charts.radii[rough].max())), run.now())
+        more = (yield run.now(new)) is not False and more
         more = yield from _all_over(run, more)
     gone = [i for i, contact in zip(rough, missing, strict=True) if contact is None]
     kept = np.setdiff1d(np.arange(len(run.found)), gone)
@@ -151,6 +174,7 @@ def _charts(
 ) -> Generator[Progress, bool | None, Charts]:
     """Joined patches; yields how far that is."""
     assert run.frontier.charts is not None
+    yield Progress(run.done, uncovered, joining=0.0)
     contours, results = [e.contours for e in run.found], [e.result for e in run.found]
     steps = joined(contours, results, run.frontier.charts, run.wanted["noise"], known)
     while True:
@@ -174,20 +198,22 @@ def explore_object(
 ) -> Atlas:
     """Touches a whole object, from one reference point on, and joins the patches to one surface.
 
-    point, outward : (3,), where to begin, and the side of the finger
-    tolerance : a length, that the mean deviation of each patch's height is to be below
+    point, outward : (3,), where to begin, and the outward direction
+    tolerance : a length; the mean deviation of each patch's height should be below it
     noise, rng : as in `explore`
     most : touches
-    progress : is called with the touches done and the places known to be uncovered; False ends it there
+    progress : called with the touches done and the places known to be uncovered; it returns False to end
 
-    Only rays are asked of the surface. Raises ValueError for bad arguments, for a tolerance below the noise
-    and where the first touch is none; whatever comes later is left uncovered, and the Atlas says so.
+    The surface only has to answer rays. Raises ValueError for bad arguments, for a tolerance below the noise,
+    and if the first touch fails. Where a later touch fails, the Atlas has an uncovered place.
     """
     steps = touch_all_over(surface, point, outward, tolerance=tolerance, noise=noise, most=most, rng=rng)
     try:
-        state = next(steps)
+        state, told = next(steps), 0
         while True:
-            more = progress(state.done, state.uncovered) if progress and state.joining is None else None
+            more = None
+            if progress and state.joining is None and state.done > told:
+                more, told = progress(state.done, state.uncovered), state.done
             state = steps.send(False if more is False else None)
     except StopIteration as end:
         atlas: Atlas = end.value

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How wavy a surface is, and how noisy its contacts are: by marginal likelihood, for the fit of bayes.py."""
+"""How wavy a surface is, and how noisy its contacts are: by marginal likelihood, for joint_fit.py."""
 
 from typing import NamedTuple
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The linear system of the fit in bayes.py: contacts and measured slopes against terms under their prior."""
+"""The linear system of joint_fit.py: contacts and measured slopes against terms under their prior."""
 
 from typing import NamedTuple
 
@@ -21,6 +21,8 @@ from .evidence import (
 )
 from .measured_slopes import slope_equations
 from .posterior import FREE, Posterior
+
+LEAST_FREEDOM = 5.0  # of few contacts: a prior tells of them too
 
 
 class System(NamedTuple):
@@ -123,6 +125,9 @@ def posterior(
     covariance = np.array(
         [inverse_definite(each) for each in _precision(system, hyper.variances, hyper.noise)]
     )
+    # Waviness and noise are estimates: with so many degrees of freedom Student's t has this more variance.
+    freedom = np.maximum(data.contacts - FREE, LEAST_FREEDOM)
+    covariance *= (freedom / (freedom - 2.0))[:, None, None]
     visibility = data.triangle * (PRIOR_SCALE / hyper.noise)[:, None, None]
     if system.slopes is not None:
         # What the slopes show of the free terms too: the QR of all there is, each in its deviation.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured normals as equations for the coefficients of the fit of bayes.py.
+"""Measured normals as equations for the coefficients of joint_fit.py.
 
 The unit normal m is off the surface's normal (-z_x, -z_y, 1) by no more than its error: with a and b,
 unit and across m and each other, a . (-z_x, -z_y, 1) is 0 but for |(z_x, z_y, 1)| times the deviation of

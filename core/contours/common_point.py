@@ -23,8 +23,8 @@ from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 MOST_APART = 0.1  # Share of a curve's size that it may miss the point by.
 GAP = 0.25  # Share of a curve's size, around the point, in which it may have no contacts.
 NEWTON_STEPS = 50  # of Gauss-Newton; five are the rule
-STARTS = 3  # curves may come near each other in several places
-MOST_CONTACTS = 1000  # contacts of a curve, and
+MOST_STARTS = 3  # curves may come near each other in several places
+MOST_SEARCHED = 1000  # contacts of a curve, and
 QUERIES = 10**6  # distances of a contact to a curve, that a start is looked for among
 CONTACTS_AROUND = 4 * WINDOW  # contacts of a curve that are looked at around a point
 
@@ -32,22 +32,22 @@ CONTACTS_AROUND = 4 * WINDOW  # contacts of a curve that are looked at around a 
 def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     """The point (3,) with the least sum of squared distances to two or more curves, and the distances (c,).
 
-    Curves measured one by one do not meet exactly: the distances say by how much each misses the point.
-    Where curves meet twice, as sections of a body do, it is the better meeting.
+    Curves measured one by one do not meet exactly: the distances tell by how much each misses the point.
+    Where curves meet twice, as sections of a body do, it is the better of the two.
 
     Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
-    that do not come near each other, or that run in one direction where they do.
+    that do not come near each other, or that run in the same direction where they do.
     """
     found = list_of("contours", contours, Contour)
     if len(found) < 2:
         raise DegenerateCurvesError(
-            f"the common point is where two or more curves meet, got {len(found)}: give more, or the point"
+            f"the common point needs two or more curves, got {len(found)}: give more curves, or the point"
         )
     for number, contour in enumerate(found, 1):
         if len(contour.points) <= LEAST_CONTACTS:
             raise DegenerateCurvesError(
-                f"curve {number} has {len(contour.points)} contacts, and {LEAST_CONTACTS + 1} are needed to "
-                "say where it runs: measure more, or give the reference point"
+                f"curve {number} has {len(contour.points)} contacts, and {LEAST_CONTACTS + 1} are "
+                "needed to tell where it runs: measure more, or give the reference point"
             )
     origin = found[0].points[0]  # far from the world's origin differences of points are exact, points are not
     contours = [Contour(contour.points - origin) for contour in found]
@@ -60,7 +60,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
 
 
 def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
-    """The contour with its contacts as they follow each other along a curve through `point`."""
+    """The contour with its contacts sorted along a curve through `point`."""
     r = contour.points - finite_array("point", point, (3,), LARGEST)
     if not len(r):
         return contour
@@ -83,7 +83,7 @@ def _starts(contours: Sequence[Contour]) -> Array:
     """
     from scipy.spatial import cKDTree
 
-    thinned = [contour.points[:: -(-len(contour.points) // MOST_CONTACTS)] for contour in contours]
+    thinned = [contour.points[:: -(-len(contour.points) // MOST_SEARCHED)] for contour in contours]
     contacts = np.vstack(thinned)
     contacts = contacts[:: -(-len(contacts) * len(thinned) // QUERIES)]
     squares = np.zeros(len(contacts))
@@ -91,7 +91,7 @@ def _starts(contours: Sequence[Contour]) -> Array:
         squares += cKDTree(points).query(contacts)[0] ** 2
     apart, starts = MOST_APART * min(map(_size, contours)), np.empty((0, 3))
     left = squares <= 4.0 * squares.min() + len(contours) * apart**2
-    while len(starts) < STARTS and left.any():
+    while len(starts) < MOST_STARTS and left.any():
         best = contacts[np.argmin(np.where(left, squares, np.inf))]
         starts = np.vstack([starts, best])
         left &= np.linalg.norm(contacts - best, axis=1) > 2.0 * apart
@@ -145,6 +145,7 @@ def _require_crossing(tangents: Array) -> None:
     sines = np.linalg.norm(np.cross(tangents[:, None], tangents[None]), axis=2)
     if sines.max() < math.sin(LEAST_ANGLE):
         raise DegenerateCurvesError(
-            f"the curves run in one direction (within {math.degrees(math.asin(sines.max())):.2g} degrees), "
-            "which leaves open where on them the common point is: give the reference point"
+            "the curves run in the same direction (within "
+            f"{math.degrees(math.asin(sines.max())):.2g} degrees), "
+            "which does not determine their common point: give the reference point"
         )

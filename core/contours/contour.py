@@ -20,7 +20,7 @@ from ..arguments import (
 )
 
 # Share of a curve's size: coordinates that are rounded by more say nothing about curvature.
-MOST_ROUNDING = 0.01
+CURVE_ROUNDING = 0.01
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 UNEXPLAINED = "not explained"
 BRINKS = (NO_CONTACT, CREASE)  # stops where the surface ends
@@ -49,7 +49,7 @@ class SamplingPlane:
         """`axes` of the unit n and of azimuth 0, across it."""
         azimuth, tilt = number("azimuth", self.azimuth), number("tilt", self.tilt)
         if abs(tilt) >= math.pi / 2:
-            raise ValueError(f"tilt: wanted less than 90 degrees, got {math.degrees(tilt):g}")
+            raise ValueError(f"tilt: expected less than 90 degrees, got {math.degrees(tilt):g}")
         t = along(scaled(e1, math.cos(azimuth)), cross(n, e1), math.sin(azimuth))
         u = along(scaled(n, math.cos(tilt)), cross(n, t), math.sin(tilt))
         return t, u, cross(t, u)
@@ -60,12 +60,12 @@ class Contour:
     """A tracked contour: the contacts along one curve through the reference point.
 
     points : (n, 3), in any order, the reference point among them or not
-    plane_normal : (3,), of the sampling plane, or None for a curve of unknown plane or of none
+    plane_normal : (3,), normal of the sampling plane, or None if it is unknown or there is none
     normals : (n, 3), the surface normal at each contact, of any length, outward or inward; or None
-    noise : standard deviation of the contacts, or None where it is not known
+    noise : standard deviation of the contacts, or None if it is not known
     stops : why tracking ended at the first and at the last point, or None
-    normal_std : standard deviation of normals that were measured, in radians; the fit by "bayes" then takes
-        them for slopes. None where they are not to be fitted, as the paper's methods never do.
+    normal_std : standard deviation of measured normals, in radians; "bayes" then fits them as slopes.
+      None to leave them out. The paper's methods never use them.
 
     Raises ValueError for another shape, for numbers that are not finite, for numbers of single
     precision too far from the origin, and for measured normals without a direction.
@@ -83,10 +83,10 @@ class Contour:
         single = getattr(self.points, "dtype", None) == np.float32
         if single and len(points):
             spacing = float(np.spacing(np.abs(points).max().astype(np.float32)))
-            if spacing > MOST_ROUNDING * np.ptp(points, axis=0).max() > 0.0:
+            if spacing > CURVE_ROUNDING * np.ptp(points, axis=0).max() > 0.0:
                 raise ValueError(
                     f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
-                    "of this size: wanted coordinates relative to a point near by, or double precision"
+                    "of this size: expected coordinates relative to a nearby point, or double precision"
                 )
         object.__setattr__(self, "points", points)
         if self.plane_normal is not None:
@@ -99,13 +99,13 @@ class Contour:
         if self.stops is not None:
             object.__setattr__(self, "stops", tuple(list_of("stops", self.stops, str)))
             if len(self.stops) != 2:
-                raise ValueError(f"stops: wanted two words, got {shown(self.stops)}")
+                raise ValueError(f"stops: expected two words, got {shown(self.stops)}")
         if self.normal_std is not None:
             object.__setattr__(self, "normal_std", number("normal_std", self.normal_std, least=0.0))
             if self.normals is None:
-                raise ValueError("normal_std: wanted measured normals that it is of, got none")
+                raise ValueError("normal_std: expected the measured normals that it belongs to, got none")
             if not np.abs(self.normals).max(axis=1, initial=0.0).all():
-                raise ValueError("normals: wanted directions where normal_std is given, got (0, 0, 0)")
+                raise ValueError("normals: expected directions where normal_std is given, got (0, 0, 0)")
 
     def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
         """Some of its contacts, as they are: they are in order."""
@@ -136,7 +136,7 @@ def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:
     e1 = along(given, n, -dot(given, n))
     length = math.hypot(*e1)
     if length < 1e-6:
-        raise ValueError("tangent: wanted a direction across the normal, got one along it")
+        raise ValueError("tangent: expected a direction across the normal, got one along it")
     return scaled(e1, 1.0 / length)
 
 

@@ -105,7 +105,7 @@ def degeneracy(
             why = f" (it ended by: {', '.join(contour.stops)})" if contour.stops else ""
             return DegenerateCurvesError(
                 f"curve {i} has {count} of the {LEAST_CONTACTS} contacts it needs besides the reference "
-                f"point{why}: move the point away from the crease or edge there, or take a shorter step"
+                f"point{why}: move the point away from the crease or edge there, or use a shorter step"
             )
     if len(contours) < 3:
         return DegenerateCurvesError(
@@ -116,9 +116,9 @@ def degeneracy(
     off_plane = np.abs(heights)
     if not off_plane.max() < OFF_PLANE:
         return DegenerateCurvesError(
-            "the tangents of the curves at the point lie in no plane, that of curve "
-            f"{np.argmax(off_plane) + 1} least of all: move the point away from the edge or corner, or give "
-            "each curve in its running order"
+            "the tangents of the curves at the point do not lie in one plane, that of curve "
+            f"{np.argmax(off_plane) + 1} least of all: move the point away from the edge or corner, "
+            "or sort the contacts along each curve"
         )
     in_plane = tangents - heights[:, None] * normal
     return _indistinct(in_plane / np.sqrt(np.einsum("ci,ci->c", in_plane, in_plane))[:, None])
@@ -137,6 +137,6 @@ def _indistinct(tangents: Array) -> DegenerateCurvesError | None:
     j, i = next((j, i) for i in range(len(rows)) for j in range(i) if rows[i][j] < least)
     angle = math.degrees(math.asin(min(1.0, rows[i][j])))
     return DegenerateCurvesError(
-        f"curves {j + 1} and {i + 1} run in one direction ({angle:.2g} degrees apart), "
-        f"which leaves {len(distinct)} distinct ones of the three needed: turn one of their planes"
+        f"curves {j + 1} and {i + 1} run in the same direction ({angle:.2g} degrees apart), "
+        f"which leaves {len(distinct)} of the three directions needed: turn one of their planes"
     )

@@ -33,11 +33,7 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     if size <= 1:
         return contour, 1
     r = r[beside]
-    # The tangent at the point: of a steep curve the longest axis of all is its normal.
-    order = np.argsort(np.einsum("ni,ni->n", r, r), kind="stable")
-    near = r[order[: max(WINDOW * size, len(r) // 4)]]
-    along = r @ np.linalg.eigh(near.T @ near)[1][:, -1]
-    along *= np.copysign(1.0, (np.arange(len(along)) - (len(along) - 1) / 2.0) @ along)
+    along = _along(r, max(WINDOW * size, len(r) // 4))
     order = np.argsort(along, kind="stable")
     before = int(np.count_nonzero(along < 0.0))
     starts = np.concatenate([_starts(0, before, size), _starts(before, len(order), size)])
@@ -57,6 +53,16 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
         normal_std=None if std is None else std / root,
     )
     return fewer, size
+
+
+def _along(r: Array, count: int) -> Array:
+    """Signed places (n,) of contacts (n, 3) along their curve, which runs as they do."""
+    # The tangent at the point, by `count` contacts near it: the longest axis of a steep curve is its normal.
+    order = np.argsort(np.einsum("ni,ni->n", r, r), kind="stable")
+    near = r[order[:count]]
+    along = r @ np.linalg.eigh(near.T @ near)[1][:, -1]
+    along *= np.copysign(1.0, (np.arange(len(along)) - (len(along) - 1) / 2.0) @ along)
+    return along
 
 
 def _alike(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) -> Array:

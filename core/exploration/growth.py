@@ -37,7 +37,7 @@ EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square o
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
 Fits = Generator[list[Contour], Reconstruction | DegenerateCurvesError, "Grown"]
-Feel = Callable[[float], list[Contour]]  # contours of an extent
+Feel = Callable[[float], list[Contour]]  # contours of an extent, which becomes longer each time
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,10 @@ def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: f
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
         if (felt.open & (longer > felt.whole)).any():
-            felt = Felt(feel(farthest), point, step, largest_std)
+            reach = min(
+                (float(longer.max()) + 1.0) * step, farthest
+            )  # one more, so that where they end shows
+            felt = Felt(feel(reach), point, step, largest_std, partial=reach < farthest)
         longer = np.minimum(longer, felt.whole)
         try:
             trial = known.get(longer.tobytes()) or (yield from tried(felt, longer))

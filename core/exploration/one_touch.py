@@ -22,6 +22,7 @@ from .growth import (
     LEAST,
     STRETCH,
     Counts,
+    Feel,
     Felt,
     Grown,
     grown,
@@ -35,9 +36,9 @@ HELPS = 0.1  # Share of it that one more plane must take off.
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
-    """What was felt and found, and the length of the longest half curve and the step that it took.
+    """The contours and the reconstruction, the length of the longest half curve, and the step.
 
-    planes : those that were given, and those that were added
+    planes : the given planes and those that were added
     stds : the mean deviation of the height with the planes given, and after each that was added
     """
 
@@ -63,7 +64,7 @@ Contacts = tuple[list[Contour], float, Reconstruction | None]  # with their step
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """A place and how to feel there: a function of planes, extent and step; and what is wanted.
+    """A place and how to feel there, a function of planes and step that gives one of extents; what is wanted.
 
     Lengths are None where they are to be chosen, the tolerance where no planes are to be added.
     reference : columns e1, n and e1 x n, which azimuths are measured by
@@ -71,7 +72,7 @@ class Touch:
     is_grown : whether what makes curves grow is the fit that is asked for
     """
 
-    feel: Callable[..., list[Contour]]
+    follow: Callable[..., Feel]
     point: Array
     reference: Array
     planes: tuple[SamplingPlane, ...]
@@ -102,17 +103,17 @@ class Touch:
 
     def _of_extent(self, extent: float) -> Steps:
         steps = [extent / count for count in CONTACT_COUNTS] if self.step is None else [self.step]
-        return (yield from self._enough(lambda step: (self._felt(extent, step), step, None), extent, steps))
 
-    def _felt(self, extent: float, step: float) -> list[Contour]:
-        return self.feel(self.planes, extent=extent, step=step)
+        def at(step: float) -> Contacts:
+            return self.follow(self.planes, step=step)(extent), step, None
+
+        return (yield from self._enough(at, extent, steps))
 
     def _grown(self) -> Steps:
         """The touch that is as large as it can be trusted."""
         between = max(self.step or 0.0, self.farthest / FELT)
-        fits = grown(
-            lambda extent: self._felt(extent, between), self.point, self.farthest, between, self.largest_std
-        )
+        feel = self.follow(self.planes, step=between)
+        fits = grown(feel, self.point, self.farthest, between, self.largest_std)
         contours = next(fits)
         while True:
             answer = yield Ask(contours, growing=not self.is_grown)
@@ -140,7 +141,7 @@ class Touch:
                 known = largest.result if same else None
                 return felt.shortened(counts, stride), stride * felt.step, known
             # A step longer than that, so that where they end shows.
-            longer = self._felt(min(length + step, self.farthest), step)
+            longer = self.follow(self.planes, step=step)(min(length + step, self.farthest))
             again = Felt(longer, self.point, step, self.largest_std)
             fewer = np.minimum((reaches / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
             return again.shortened(fewer), step, None
@@ -168,7 +169,8 @@ class Touch:
         Felt twice as densely as fitted: what lies between tells whether it is explained.
         """
         half = 0.5 * found.step
-        felt = Felt(self.feel((plane,), extent=found.extent, step=half), self.point, half, self.largest_std)
+        contours = self.follow((plane,), step=half)(found.extent)
+        felt = Felt(contours, self.point, half, self.largest_std)
         counts = felt.whole // 2 * 2
         while True:
             contours = [*found.contours, *felt.shortened(counts, 2)]
@@ -190,14 +192,18 @@ def is_enough(r: Reconstruction) -> bool:
     if r.mean_height_std <= MISFIT * r.radius:
         return True
     (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
-    some = contacts[np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)]
+    if r.residual is None:
+        which = np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)
+        some = contacts[which] / r.radius
+    else:
+        some = r.residual.places
     over, m = points / r.radius, len(some)
-    shared, seen = r.uncertainty.height_covariances(some / r.radius, over)
+    shared, seen = r.uncertainty.covariances_with(over)(some)
     # A patch by another method departs from the posterior's mean, of which no contact takes anything off.
     own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
     variance = own**2
     seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
     told = solved(cholesky(seen), shared)
-    lost = np.einsum("in,in->n", told, told)
+    lost = r.geometry.widening(*points.T) ** 2 * np.einsum("in,in->n", told, told)
     then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
     return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))

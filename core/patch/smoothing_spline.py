@@ -3,9 +3,9 @@
 """Heights as a smoothing spline: of least third derivatives through contacts and across their normals.
 
 Beside the paper. A cubic B-spline on SIDE x SIDE knots, whose prior is that of a surface with random third
-derivatives (Wahba 1990, in the knots of Eilers and Marx 1996), so that quadrics are free. How large these are,
-the noise of contacts and that of normals follow from their marginal likelihood; outlying ones weigh as under a
-Student t distribution. Equations are banded, for thousands of contacts as for hundreds. All is in unit radius.
+derivatives (Wahba 1990, in the knots of Eilers and Marx 1996), so that quadrics are free. How large these are
+and how exact contacts and normals are follow from their marginal likelihood; outlying ones weigh as under a
+Student t distribution. Equations are banded, for thousands of contacts as for hundreds. All in unit radius.
 """
 
 from functools import cache
@@ -171,7 +171,7 @@ def bases(x: Array, y: Array, half: float) -> list[Any]:
 
 
 def weights_at(at: Array) -> tuple[Any, Array, Array, Array]:
-    """The knot before places (m,), in steps from the middle; weights of four knots, (m, 4), and their slopes."""
+    """The knot before places (m,) in steps from the middle; weights (m, 4) of four knots and their slopes."""
     at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - ROUNDING)
     knot = at.astype(np.intp)
     powers = np.vander(at - knot, 4, increasing=True)

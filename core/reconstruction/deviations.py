@@ -14,14 +14,14 @@ from .result import Reconstruction
 
 
 def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
-    """mean_height_std of each: of many at once it is some times as fast as one by one."""
+    """mean_height_std of each, which is several times as fast as one by one."""
     plain = [r for r in results if r.residual is None]
     of_sextics = iter(_mean_stds_of_sextics(plain))
     return [r.radius * next(of_sextics) if r.residual is None else r.mean_height_std for r in results]
 
 
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
-    """Reconstructions whose mean_height_std is known: what status and message ask for first."""
+    """Reconstructions whose mean_height_std is known, which status and message need first."""
     stds = mean_height_stds(results)
     # With a residual they know it already, and more than the mean.
     pairs = zip(results, stds, strict=True)

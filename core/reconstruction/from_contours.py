@@ -49,19 +49,19 @@ def reconstruct(
 
     point : (3,), exact; outward : (3,), on the outer side of the surface
     strokes : contacts beside the point, (n, 3) each or Contours, whose normals are not fitted; only "bayes"
-        takes them. With contours those beyond the domain are ignored. From strokes alone (no contours) the
-        point is only a place: the origin is its foot on the polynomial, L is that of the farthest contact and
-        the domain is the hull of the contacts
-    radius : from strokes alone, of the contacts around the point that are used; None for all
-    method : "bayes" (bayes.py), or one of the paper's: "tagc" (9), "quadratic-variation",
+      fits them. With contours, those beyond the domain are ignored. Without contours the point is only a
+      place: the origin is its projection onto the polynomial, L is the distance of the farthest contact, and
+      the domain is the hull of the contacts
+    radius : without contours, use contacts up to this distance from the point; None for all
+    method : "bayes" (bayes/joint_fit.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)
-    degree : d of (1), 2 to 6, or "auto", the least that says what the contacts show
-    noise : accuracy of a contact; noise is taken for no less. None: the contours' own
+    degree : d of (1), 2 to 6, or "auto", the lowest that describes what the contacts show
+    noise : least standard deviation of a contact; None for the contours' own
     weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000 and 1e5
-    solver : of "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
+    solver : for "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 
     Raises ValueError for bad arguments, DegenerateCurvesError for contours that cannot carry the
-    method. A fit in doubt comes back with a status.
+    method. The status of the result tells a fit in doubt.
 
     >>> s, azimuths = np.linspace(-0.5, 0.5, 21), np.radians([0, 60, 120])  # meridians of the unit ball
     >>> meridian = lambda a: Contour(np.stack([np.sin(s) * np.cos(a), np.sin(s) * np.sin(a), np.cos(s)], 1))
@@ -91,11 +91,11 @@ def reconstruct_many(
     weight: float | None = None,
     solver: str = "fast",
 ) -> list[Reconstruction | DegenerateCurvesError]:
-    """What `reconstruct` gives for each of n touches; in stacks, which makes "bayes" some times as fast.
+    """What `reconstruct` gives for each of n touches; "bayes" is several times as fast in stacks.
 
     points : (n, 3); contours_list : n lists of contours; outward : (n, 3); strokes_list : n lists of strokes
 
-    In the place of a touch that cannot carry the method stands its DegenerateCurvesError. Raises
+    A touch that cannot carry the method is returned as its DegenerateCurvesError. Raises
     ValueError for bad arguments.
     """
     p = finite_array("points", points, (None, 3), LARGEST)
@@ -104,7 +104,7 @@ def reconstruct_many(
     beside = [()] * len(lists) if strokes_list is None else list_of("strokes_list", strokes_list, Sequence)  # type: ignore[type-abstract]
     for name, given in (("contours_list", lists), ("strokes_list", beside)):
         if len(given) != len(p):
-            raise ValueError(f"{name}: wanted {len(p)} lists of {name[:-5]}, got {len(given)}")
+            raise ValueError(f"{name}: expected {len(p)} lists of {name[:-5]}, got {len(given)}")
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
     touches = [
@@ -144,9 +144,9 @@ def options_of(
     """The options of a fit. Raises ValueError for bad ones."""
     for name, value, choices in (("method", method, METHODS), ("solver", solver, SOLVERS)):
         if not isinstance(value, str) or value not in choices:
-            raise ValueError(f"{name}: wanted one of {', '.join(choices)}, got {shown(value)}")
+            raise ValueError(f"{name}: expected one of {', '.join(choices)}, got {shown(value)}")
     if not isinstance(degree, int | np.integer | str) or degree not in ("auto", 2, 3, 4, 5, 6):
-        raise ValueError(f'degree: wanted a whole number from 2 to 6 or "auto", got {shown(degree)}')
+        raise ValueError(f'degree: expected a whole number from 2 to 6 or "auto", got {shown(degree)}')
     return Options(
         method,
         None if isinstance(degree, str) else int(degree),
@@ -161,8 +161,8 @@ def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], opti
     found = Given(contours, *gathered(strokes, contours))
     if len(found.strokes) and options.method != "bayes":
         raise ValueError(
-            f'strokes: wanted none with "{options.method}", which is a method of contours: take "bayes"'
+            f'strokes: expected none with "{options.method}", which fits contours only: use "bayes"'
         )
     if contours and options.radius is not None:
-        raise ValueError("radius: wanted none beside contours, which say how far the patch reaches")
+        raise ValueError("radius: expected none with contours, which say how far the patch reaches")
     return found

@@ -28,20 +28,20 @@ MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at m
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """A patch around a reference point, what it was fitted to and what was found; in the caller's unit.
+    """A patch around a reference point, its contacts and all results, in the caller's unit.
 
-    geometry : the surface that was found: of "bayes" the posterior's mean, else `patch`
+    geometry : the surface that was found: the posterior's mean for "bayes", or else `patch`
     patch : equation (1) of the degree asked for, in the frame
-    contours : what was fitted, in the world
-    strokes : contacts beside them that were fitted, in the world, (n, 3); means of neighbors, of many
-    accuracy : standard deviation of a contact, at least, in units of L
+    contours : the fitted contours, in the world
+    strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
+    accuracy : least standard deviation of a contact, in units of L
     method : of the fit
     converged : whether its solver did
-    joint_posterior : what "bayes" has found
-    known_height_std : mean_height_std, where it is known already
-    known_curves : the contours as Curves of one touch, in the world, where they are known already
+    joint_posterior : the posterior of "bayes"
+    known_height_std : mean_height_std, if it is known already
+    known_curves : the contours as Curves of one touch, in the world, if they are known already
 
-    All else follows from these, once it is asked for.
+    All else is computed from these when it is needed.
     """
 
     geometry: Geometry
@@ -72,19 +72,19 @@ class Reconstruction:
 
     @property
     def residual(self) -> Residual | None:
-        """What the surface is beside its polynomial, where the contacts ask for more."""
+        """The difference of the surface from its polynomial, or None."""
         return self.geometry.residual
 
     @cached_property
     def contacts(self) -> Array:
-        """What was fitted besides the reference point, (n, 3), in the frame."""
+        """The fitted contacts besides the reference point, (n, 3), in the frame."""
         curves = [contour.points - self.frame.origin for contour in self.contours]
         beside = self.strokes - self.frame.origin
         return np.vstack([*(r[besides_point(r)[1]] for r in curves), beside]) @ self.frame.axes
 
     @cached_property
     def misses(self) -> Array:
-        """At which distance each of the c curves passes the reference point, and its deviation, (c, 2)."""
+        """Distance at which each of the c curves passes the reference point, and its deviation, (c, 2)."""
         curves = self.known_curves or curves_through(*stacked(self.frame.origin[None], [self.contours]))
         return misses(curves)[0, : len(self.contours)]
 
@@ -112,7 +112,7 @@ class Reconstruction:
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
         u, v = self.geometry.in_unit_radius(x, y)
-        std = self.uncertainty.height_std(u, v)
+        std = self.geometry.widening(x, y) * self.uncertainty.height_std(u, v)
         if self.joint_posterior is None:  # a patch by another method departs from the posterior's mean too
             off = self.posterior.height(u, v) - np.ravel(self.height(x, y)) / self.radius
             std = np.hypot(std, off)
@@ -133,7 +133,7 @@ class Reconstruction:
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
-        As fine as what is known of it: off it by 0.6 of mean_height_std at most.
+        It is as fine as the patch is certain: off it by 0.6 of mean_height_std at most.
         """
         return self.geometry.mesh(MESH_SHARE * self.mean_height_std)
 
@@ -155,7 +155,7 @@ class Reconstruction:
 
     @property
     def gaussian_curvature_std(self) -> float:
-        """Standard deviation of K at the point, in 1/length^2; of normally distributed k1 and k2."""
+        """Standard deviation of K at the point, in 1/length^2, for normally distributed k1 and k2."""
         c, k = (
             4.0 * self.posterior.covariance[2:FREE:2, 2:FREE:2],
             self.radius * np.array([self.patch.k2, self.patch.k1]),
@@ -165,7 +165,7 @@ class Reconstruction:
 
     @cached_property
     def blind(self) -> int:
-        """How many of the coefficients of degree 1 to d, as directions, the contacts say nothing of."""
+        """Number of directions among the coefficients of degree 1 to d that the contacts do not show."""
         return self.posterior.blind(self.patch.degree)
 
     @property
@@ -186,7 +186,7 @@ class Reconstruction:
 
     @property
     def typical_miss(self) -> float:
-        """The median of |dz| over the contacts, which outlying ones do not change."""
+        """The median of |dz| over the contacts, which outliers do not change."""
         return float(np.median(self._departures))
 
     @cached_property
@@ -225,7 +225,7 @@ class Reconstruction:
 
     @property
     def message(self) -> str:
-        """The status in a sentence, with advice; and whether directions are undefined, or blind."""
+        """The status in a sentence with advice, and whether directions are undefined or blind."""
         _, message = self._verdict
         if self.posterior.is_round:
             message += " The curvatures are alike, so there are no principal directions."
@@ -240,7 +240,7 @@ class Reconstruction:
 
     @cached_property
     def contradiction(self) -> tuple[float, float]:
-        """By how many deviations, and by what angle in radians, fitted normals contradict the contacts."""
+        """Number of deviations, and angle in radians, by which fitted normals contradict the contacts."""
         if self.joint_posterior is None or not has_measured_normals(self.contours):
             return 0.0, 0.0
         contacts, normals = measured_normals(self.contours, self.frame, self.radius)

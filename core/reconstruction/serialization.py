@@ -26,7 +26,7 @@ COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Coefficien
 
 
 def to_dict(r: Reconstruction) -> dict[str, Any]:
-    """`r` as a dict of numbers, words, lists and dicts, as JSON has them; `from_dict` takes it back.
+    """`r` as a dict of numbers, words, lists and dicts, as in JSON; `from_dict` reads it.
 
     Lengths are in the caller's unit, those of the geometry in its frame; `accuracy` and `posterior` are in
     units of the radius. `status` and `message` are for readers only: they follow from the rest.
@@ -43,27 +43,28 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "geometry": {
             "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
             "radius": r.radius,
-            "polynomial": _polynomial_dict(r.geometry.polynomial),
+            "polynomial": polynomial_dict(r.geometry.polynomial),
             "residual": None if residual is None else _residual_dict(residual),
             "domain": r.domain.ends.tolist(),
             "brinks": None if r.domain.brinks is None else r.domain.brinks.tolist(),
         },
-        "patch": _polynomial_dict(r.patch),
-        "contours": [_plain(vars(contour)) for contour in r.contours],
+        "patch": polynomial_dict(r.patch),
+        "contours": [plain(vars(contour)) for contour in r.contours],
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
-        "posterior": None if posterior is None else _plain(posterior._asdict()),
+        "posterior": None if posterior is None else plain(posterior._asdict()),
     }
 
 
-def _polynomial_dict(patch: MongePatch) -> dict[str, Any]:
+def polynomial_dict(patch: MongePatch) -> dict[str, Any]:
+    """The polynomial (1) as plain values."""
     return {"k1": patch.k1, "k2": patch.k2, "coefficients": patch.coefficients.tolist()}
 
 
 def _residual_dict(residual: Residual) -> dict[str, Any]:
-    return _plain({field.name: getattr(residual, field.name) for field in fields(residual)})
+    return plain({field.name: getattr(residual, field.name) for field in fields(residual)})
 
 
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+def plain(values: Mapping[str, Any]) -> dict[str, Any]:
     """Arrays as lists."""
     return {
         key: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
@@ -72,18 +73,18 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def from_dict(d: Mapping[str, Any]) -> Reconstruction:
-    """The reconstruction that `to_dict` made this of, to the last bit.
+    """The reconstruction from which `to_dict` made this, to the last bit.
 
-    Raises ValueError for another version, and for what is missing or has no such value.
+    Raises ValueError for another version, and for missing or wrong values.
     """
     if _of(d, "version") != VERSION:
         raise ValueError(
-            f"version: wanted {VERSION}, got {shown(d['version'])}: this was written by another release"
+            f"version: expected {VERSION}, got {shown(d['version'])}: this was written by another release"
         )
     method, posterior, strokes = _of(d, "method"), _of(d, "posterior"), _of(d, "strokes")
     contours = _contours(_of(d, "contours"), strokes is not None)
     if not isinstance(method, str) or method not in METHODS:
-        raise ValueError(f"method: wanted one of {', '.join(METHODS)}, got {shown(method)}")
+        raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
     r = Reconstruction(
         geometry=_geometry(_of(d, "geometry")),
         patch=_polynomial(_of(d, "patch")),
@@ -96,15 +97,15 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
     )
     if not len(r.contacts):
-        raise ValueError("contours: wanted contacts besides the reference point, got none")
+        raise ValueError("contours: expected contacts besides the reference point, got none")
     return r
 
 
 def _of(d: Any, key: str) -> Any:
     if not isinstance(d, Mapping):
-        raise ValueError(f"{key}: wanted it in a dict, got {shown(d)}")
+        raise ValueError(f"{key}: expected it in a dict, got {shown(d)}")
     if key not in d:
-        raise ValueError(f"{key}: wanted it in the dict of a reconstruction, got none")
+        raise ValueError(f"{key}: expected it in the dict of a reconstruction, got none")
     return d[key]
 
 
@@ -112,7 +113,7 @@ def _geometry(d: Any) -> Geometry:
     frame, radius = _of(d, "frame"), number("radius", _of(d, "radius"), least=SMALLEST)
     axes = finite_array("axes", _of(frame, "axes"), (3, 3))
     if np.abs(axes.T @ axes - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(axes) < 0.0:
-        raise ValueError("axes: wanted a right-handed frame of unit vectors, got another matrix")
+        raise ValueError("axes: expected a right-handed frame of unit vectors, got another matrix")
     residual, brinks = _of(d, "residual"), _of(d, "brinks")
     ends = finite_array("domain", _of(d, "domain"), (None, 2))
     if brinks is not None:
@@ -130,14 +131,14 @@ def _polynomial(d: Any) -> MongePatch:
     coefficients = finite_array("coefficients", _of(d, "coefficients"), (None,))
     if len(coefficients) not in COEFFICIENTS:
         raise ValueError(
-            f"coefficients: wanted {', '.join(map(str, COEFFICIENTS))} of them, got {len(coefficients)}"
+            f"coefficients: expected {', '.join(map(str, COEFFICIENTS))} of them, got {len(coefficients)}"
         )
     return MongePatch(number("k1", _of(d, "k1")), number("k2", _of(d, "k2")), coefficients)
 
 
 def _contours(contours: Any, may_be_none: bool) -> tuple[Contour, ...]:
     if not isinstance(contours, Sequence) or not (contours or may_be_none):
-        raise ValueError(f"contours: wanted a list of some, got {shown(contours)}")
+        raise ValueError(f"contours: expected a list of some, got {shown(contours)}")
     names = [field.name for field in fields(Contour)]
     return tuple(Contour(**{name: _of(contour, name) for name in names}) for contour in contours)
 
@@ -161,7 +162,7 @@ def _require_covariance(matrix: Array) -> None:
     apart = np.abs(matrix - matrix.T).max()
     least = min(np.linalg.eigvalsh(matrix).min() + 1e-9 * largest, matrix.diagonal().min())
     if apart > 1e-9 * largest or least < 0.0:
-        raise ValueError("covariance: wanted a symmetric matrix without negative eigenvalues, got another")
+        raise ValueError("covariance: expected a symmetric matrix without negative eigenvalues, got another")
 
 
 def _residual(d: Any) -> Residual:
@@ -178,10 +179,12 @@ def _residual(d: Any) -> Residual:
     # This is the factor of the precision, which priors keep from being singular.
     if not np.array_equal(factor, np.tril(factor)) or factor.diagonal().min() < LEAST_PIVOT:
         raise ValueError(
-            f"factor: wanted a lower triangle, its diagonal {LEAST_PIVOT:g} or more, got another"
+            f"factor: expected a lower triangle, its diagonal {LEAST_PIVOT:g} or more, got another"
         )
     if not (
         variances.min() >= 0.0 < variances.max() and noise > 0.0 and np.abs(places).max(initial=0.0) < 2.0
     ):
-        raise ValueError("residual: wanted variances and noise above 0, places on the unit disk, got others")
+        raise ValueError(
+            "residual: expected variances and noise above 0, places on the unit disk, got others"
+        )
     return Residual(places, **values)

@@ -187,10 +187,10 @@ def _result(
         domain = domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)
     except ValueError:
         return DegenerateCurvesError(
-            "the curves end in fewer than three places apart from each other, so they bound no patch: "
+            "the curves end in fewer than three separate places, so they bound no patch: "
             "turn the sampling planes, or move the point away from the edge"
             if contours
-            else "the point is beside the strokes or at their rim: give a place among them"
+            else "the point is outside the strokes or at their rim: give a point among them"
         )
     converged = True
     if touch.posterior is None:

@@ -25,7 +25,7 @@ from ..patch.domain import BRINK, Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
 from .strokes import STRIPS, FirstFrame, first_frame, means, unit_in
 
-MOST_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
+TOUCH_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
 
 
 class Given(NamedTuple):
@@ -89,7 +89,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     each = zip(touches, curves.present, curves.tangents, normals, strict=True)
     apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
     errors = [
-        degeneracy(*touch) or (_coarse(gap, size) if gap > MOST_ROUNDING * size else None)
+        degeneracy(*touch) or (_coarse(gap, size) if gap > TOUCH_ROUNDING * size else None)
         for touch, gap, size in zip(each, apart, reach, strict=True)
     ]
     good = [i for i, error in enumerate(errors) if error is None]
@@ -97,15 +97,10 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         return None, touches, errors
     curves = curves.at(good)
     axes, k1, k2, radii = darboux_frames(curves, normals[good])
-    local = curves.points @ axes[:, None] / radii[:, None, None, None]
     strokes, stds, told = [], [], []
     for row, i in enumerate(good):
-        beside, size = given[i].strokes, 1
-        if len(beside):
-            beside = (beside - points[i]) @ axes[row] / radii[row]
-            turned = replace(curves.at(row), points=local[row], tangents=curves.tangents[row] @ axes[row])
-            along = unit_in(axes[row], curves.tangents[row, 0])
-            beside, size = means(beside[_over(turned, touches[i], beside)], along)
+        relative = given[i].strokes - points[i]
+        beside, size = _beside(curves.at(row), touches[i], axes[row], radii[row], relative)
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
@@ -120,6 +115,17 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
 def _std(noise: float | None, size: int, known: list[float]) -> float:
     """The least deviation of contacts, the means of `size` others of that noise; or what is known of them."""
     return max(known) if noise is None else noise / math.sqrt(size)
+
+
+def _beside(
+    curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, strokes: Array
+) -> tuple[Array, int]:
+    """Strokes (n, 3) over the domain of curves as means, in the axes and in unit radius, and of how many."""
+    if not len(strokes):
+        return strokes, 1
+    local = strokes @ axes / radius
+    turned = replace(curves, points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
+    return means(local[_over(turned, contours, local)], unit_in(axes, curves.tangents[0]))
 
 
 def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArray[np.bool_]:
@@ -141,7 +147,7 @@ def strokes_start(
     ]
     for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
         first = frames[i]
-        if isinstance(first, FirstFrame) and gap > MOST_ROUNDING * first.radius:
+        if isinstance(first, FirstFrame) and gap > TOUCH_ROUNDING * first.radius:
             frames[i] = _coarse(gap, first.radius)
     errors = [None if isinstance(first, FirstFrame) else first for first in frames]
     firsts = {i: first for i, first in enumerate(frames) if isinstance(first, FirstFrame)}
@@ -183,14 +189,17 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     brinks = np.zeros_like(felt)
     for i, contour in enumerate(contours):
         brinks[:, i] = [stop in BRINKS for stop in contour.stops or ("", "")]
-    at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
-    ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
-    counted = felt | at_point
+    counted = felt
+    if brinks.any():
+        at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
+        ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
+        counted = felt | at_point
     return closed_spline_domain(ends[counted], 1.0, brinks[counted])
 
 
 def _coarse(gap: float, size: float) -> DegenerateCurvesError:
     return DegenerateCurvesError(
-        f"the coordinates at the point are {gap:.2g} apart in double precision, too coarse for curves of "
+        f"neighboring coordinates at the point are {gap:.2g} apart in double precision, too coarse "
+        "for curves of "
         f"{size:.2g}: move the origin nearer to the point"
     )

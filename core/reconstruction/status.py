@@ -9,11 +9,10 @@ import numpy as np
 
 from ..arguments import Array
 from ..bayes.posterior import Posterior
-from ..patch.monge import MongePatch
 from ..patch.residual import Residual
 
 # Chosen with benchmarks.stability, but for what benchmarks.real says of rough surfaces.
-DOUBTFUL_STD = 0.02  # Share of the radius that the height may deviate in the mean over the domain.
+DOUBTFUL_STD = 0.02  # Share of the radius that the height may deviate on average over the domain.
 DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise this many times larger.
 DOUBTFUL_TURN = math.radians(10.0)  # Angle that the frame may be off.
 LIKELY = 0.5  # Probability of that on a rough surface, whose directions are others at each scale.
@@ -29,42 +28,61 @@ class _Judged(Protocol):
     """What a status follows from; see Reconstruction."""
 
     @property
-    def method(self) -> str: ...
+    def method(self) -> str:
+        """The method of the fit."""
+
     @property
-    def converged(self) -> bool: ...
+    def converged(self) -> bool:
+        """Whether the solver of the fit converged."""
+
     @property
-    def radius(self) -> float: ...
+    def radius(self) -> float:
+        """The radius L."""
+
     @property
-    def accuracy(self) -> float: ...
+    def accuracy(self) -> float:
+        """The least standard deviation of a contact, in units of L."""
+
     @property
-    def misses(self) -> Array: ...
+    def misses(self) -> Array:
+        """The distances at which the curves pass the point, and their deviations, (c, 2)."""
+
     @property
-    def patch(self) -> MongePatch: ...
+    def residual(self) -> Residual | None:
+        """What the surface is beside its polynomial, if anything."""
+
     @property
-    def residual(self) -> Residual | None: ...
+    def posterior(self) -> Posterior:
+        """What the contacts leave open."""
+
     @property
-    def posterior(self) -> Posterior: ...
+    def condition_number(self) -> float:
+        """The condition number of the least-squares system."""
+
     @property
-    def condition_number(self) -> float: ...
+    def mean_height_std(self) -> float:
+        """The mean deviation of the height over the domain."""
+
     @property
-    def mean_height_std(self) -> float: ...
+    def typical_miss(self) -> float:
+        """The median of |dz| over the contacts."""
+
     @property
-    def typical_miss(self) -> float: ...
-    @property
-    def contradiction(self) -> tuple[float, float]: ...
+    def contradiction(self) -> tuple[float, float]:
+        """By how many deviations, and by what angle, normals contradict contacts."""
 
 
 def doubt(r: _Judged) -> tuple[str, str] | None:
     """Status and a sentence of advice; None where there is no doubt."""
     if not r.converged:
         return "not_converged", (
-            "The minimization stopped at its step limit, the patch is its best so far: use the fast "
-            "solver, or a smaller weight."
+            "The minimization stopped at its step limit, and the patch is the best so far: use the "
+            "fast solver or a smaller weight."
         )
     if r.method == "least-squares" and r.condition_number > DOUBTFUL_CONDITION:
         return "uncertain", (
             "The contacts alone do not determine the surface between the curves (condition number "
-            f"{r.condition_number:.1e}): take another method, or add sampling planes."
+            f"{r.condition_number:.1e}): use another method or add sampling planes."
         )
     return _about_data(r) or _about_heights(r) or _about_frame(r)
 
@@ -73,15 +91,15 @@ def _about_data(r: _Judged) -> tuple[str, str] | None:
     deviations, angle = r.contradiction
     if deviations > SIGNIFICANT and angle > CONTRADICTED:
         return "uncertain", (
-            f"The measured normals contradict the contacts by {math.degrees(angle):.1f} degrees in the "
-            "mean, more than their deviation explains: check in which frame they were measured, or "
+            f"The measured normals contradict the contacts by {math.degrees(angle):.1f} degrees on "
+            "average, more than their deviation explains: check the frame they were measured in, or "
             "leave them out."
         )
     missed = r.typical_miss / r.radius
     if missed > DOUBTFUL_FIT + r.accuracy:
         return "uncertain", (
             f"Half of the contacts are off the patch by more than {100.0 * missed:.1f} % of the radius, "
-            "which their noise does not explain: take a shorter extent, or say how noisy they are."
+            "which their noise does not explain: use a shorter extent or give their noise."
         )
     return None
 
@@ -90,8 +108,8 @@ def _about_heights(r: _Judged) -> tuple[str, str] | None:
     share = r.mean_height_std / r.radius
     if share > DOUBTFUL_STD:
         return "uncertain", (
-            f"Heights are good to {100.0 * share:.1f} % of the radius in the mean: take a shorter "
-            "extent, or add sampling planes."
+            f"Heights are accurate to {100.0 * share:.1f} % of the radius on average: use a shorter "
+            "extent or add sampling planes."
         )
     return None
 
@@ -108,13 +126,13 @@ def _about_frame(r: _Judged) -> tuple[str, str] | None:
     turn = r.posterior.turn() if r.residual is None else r.posterior.turn(LIKELY)
     if turn > DOUBTFUL_TURN and not r.posterior.is_round:
         return "uncertain", (
-            f"The principal directions may be {math.degrees(turn):.0f} degrees off: take a longer "
-            "extent, or add sampling planes."
+            f"The principal directions may be {math.degrees(turn):.0f} degrees off: use a longer "
+            "extent or add sampling planes."
         )
     std = r.posterior.curvature_std()
     if std > DOUBTFUL_CURVATURE:
         return "uncertain", (
-            f"Curvatures are good to {std / r.radius:.2g} in the direction known least: take a longer "
-            "extent, or add sampling planes."
+            f"Curvatures are accurate to only {std / r.radius:.2g} in the least known direction: "
+            "use a longer extent or add sampling planes."
         )
     return None

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..contours.tracking import Surface
+from ..contours.finger import Surface
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.refusals counts the patches that are off and say nothing.
 PATCH_SAMPLES = 15  # So many samples of a patch are compared with the mesh.
 MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh.
-BEYOND = 3.0  # A mesh that is off by more than so many deviations contradicts the patch.
+CONTRADICTING = 3.0  # A mesh that is off by more than so many deviations contradicts the patch.
 
 
 def height_error(r: Reconstruction, surface: Surface) -> float | None:
@@ -31,15 +31,15 @@ def height_error(r: Reconstruction, surface: Surface) -> float | None:
 def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
     """Status and message: the fit's own, unless it has no doubt and the mesh contradicts it.
 
-    mean : distance of the mesh from the patch, in the mean
+    mean : distance of the mesh from the patch, on average
     """
     std, percent = r.mean_height_std, 100.0 / r.radius
-    if r.status != "ok" or mean <= BEYOND * std:
+    if r.status != "ok" or mean <= CONTRADICTING * std:
         return r.status, r.message
     return "uncertain", (
-        f"The mesh is {percent * mean:.3g} % of the radius off the patch in the mean, which "
-        f"expects {percent * std:.3g} %, for between the curves there is what they do not show: take a "
-        "shorter extent, or add sampling planes."
+        f"The mesh is {percent * mean:.3g} % of the radius off the patch on average, which expects "
+        f"{percent * std:.3g} %, so the curves miss something between them: use a shorter extent or "
+        "add sampling planes."
     )
 
 

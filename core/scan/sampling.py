@@ -11,23 +11,23 @@ from ..arguments import Array
 
 SORTED_AT_ONCE = 100_000  # points that are sorted at once (benchmarks.stability_map)
 JAMMED = 0.575  # points in a square of the spacing, once no more have room
-CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
+SAMPLING_CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
 
 
 def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[int | None]:
     """Yields indices of points (n, 3) none of which are nearer to each other than `spacing`.
 
-    In random order, so that a part of them is an even cover too, up to all that have room; now and
-    then None, where there is work in between.
+    They come in random order, so that a part of them is an even cover too, until no more have room. It
+    yields None now and then during longer work.
     """
     from scipy.spatial import cKDTree
 
     left = []
     for start in range(0, len(points), SORTED_AT_ONCE):
-        left.append(start + _one_a_cell(points[start : start + SORTED_AT_ONCE], CELL * spacing))
+        left.append(start + _one_a_cell(points[start : start + SORTED_AT_ONCE], SAMPLING_CELL * spacing))
         yield None
     chosen = np.concatenate(left)
-    chosen = rng.permutation(chosen[_one_a_cell(points[chosen], CELL * spacing)])
+    chosen = rng.permutation(chosen[_one_a_cell(points[chosen], SAMPLING_CELL * spacing)])
     yield None
     tree = cKDTree(points[chosen])
     yield None
@@ -61,7 +61,7 @@ def scattered(
     normals = np.cross(*sides)
     areas = np.linalg.norm(normals, axis=1)
     if not areas.sum() > 0.0:
-        raise ValueError("triangles: wanted some with an area, got none")
+        raise ValueError("triangles: expected some with an area, got none")
     chosen = rng.choice(len(areas), count, p=areas / areas.sum())
     shares = rng.random((count, 2))
     shares = np.where(shares.sum(axis=1, keepdims=True) > 1.0, 1.0 - shares, shares)

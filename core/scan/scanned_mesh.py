@@ -14,7 +14,7 @@ from ..arguments import Array, finite_array
 
 LARGEST_MESH = 40.0
 LONGEST_EDGE = 0.25  # longer ones are halved: a patch covers a hundred triangles
-FACING = 0.05  # what a right angle between normals counts, about, as a distance to a triangle
+FACING_WEIGHT = 0.05  # what a right angle between normals counts, about, as a distance to a triangle
 TOUCHING = 1e-9
 
 
@@ -32,9 +32,9 @@ def corners_of(faces: ArrayLike, count: int) -> NDArray[np.intp]:
     """The faces as indices of vertices (m, 3), of which there are `count`. Raises ValueError for others."""
     indices = finite_array("faces", faces if np.size(faces) else np.zeros((0, 3)), (None, 3))
     if not len(indices):
-        raise ValueError("faces: wanted triangles, got none: make a mesh of a cloud of points first")
+        raise ValueError("faces: expected triangles, got none: make a mesh of a cloud of points first")
     if (indices % 1.0).any() or indices.min() < 0 or indices.max() >= count:
-        raise ValueError(f"faces: wanted whole numbers from 0 to {count - 1}, got others among them")
+        raise ValueError(f"faces: expected whole numbers from 0 to {count - 1}, got others among them")
     return indices.astype(np.intp)
 
 
@@ -45,7 +45,7 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> Mesh:
     size = np.linalg.norm(np.ptp(co[corners], axis=(0, 1)))
     if not patch <= size <= LARGEST_MESH:
         raise ValueError(
-            f"vertices: wanted a mesh from {patch:.2g} (the patch) to {LARGEST_MESH:g} times the radius, "
+            f"vertices: expected a mesh from {patch:.2g} (the patch) to {LARGEST_MESH:g} times the radius, "
             f"got {size:.2g}: bring both to one unit, or take another extent"
         )
     normals = np.zeros_like(co)
@@ -56,9 +56,9 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> Mesh:
     lengths, bends = np.linalg.norm(across, axis=1), np.linalg.norm(mean[:, 3:], axis=1)
     good = (lengths > 1e-12) & (bends > 1e-6)
     if not good.any():
-        raise ValueError("faces: wanted triangles, got none that has an area")
+        raise ValueError("faces: expected triangles, got none that has an area")
     centers, smooth = mean[good, :3], mean[good, 3:] / bends[good, None]
-    tree = cKDTree(np.concatenate([centers, FACING * smooth], axis=1))
+    tree = cKDTree(np.concatenate([centers, FACING_WEIGHT * smooth], axis=1))
     return Mesh(pieces[good, :, :3], across[good] / lengths[good, None], centers, smooth, tree)
 
 
@@ -90,7 +90,7 @@ def mesh_distances(places: Array, felt: Array, mesh: Mesh, neighbors: int) -> tu
     turned = places[..., :3].swapaxes(1, 2)
     arms, normals = felt[0] @ turned, (felt[1] @ turned).reshape(-1, 3)
     points = (arms + places[:, None, :, 3]).reshape(-1, 3)
-    near = mesh.tree.query(np.hstack([points, FACING * normals]), range(1, neighbors + 1))[1]
+    near = mesh.tree.query(np.hstack([points, FACING_WEIGHT * normals]), range(1, neighbors + 1))[1]
     nearest = near[:, 0]
     up, offsets = mesh.normals[nearest], points - mesh.centers[nearest]
     if neighbors > 1:

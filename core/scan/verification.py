@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, finite_array
 from ..contours.contour import SamplingPlane, Vector
-from ..contours.tracking import Surface, track
+from ..contours.finger import Surface
+from ..contours.tracking import track
 from ..patch.domain import GRID, Domain
 from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
@@ -19,9 +20,9 @@ from ..reconstruction.result import Reconstruction
 EXTRA = 9  # contours, as in the paper's Fig. 3
 # benchmarks.scans prints what is found with these.
 STEPS_A_RADIUS = 12  # Steps of such a contour in a radius.
-REACHES = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
-AT_ONCE = 5000  # vertices whose distances are found in one step, in some hundredths of a second
-HAIR = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.
+FOOT_REACH = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
+MISSES_AT_ONCE = 5000  # vertices whose distances are found in one step, in some hundredths of a second
+OWN_LAYER = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.
 
 
 def reachable(
@@ -38,19 +39,19 @@ def reachable(
 def verify(
     r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
 ) -> dict[str, float]:
-    """All that tells how good a patch is, as plain numbers, lengths in the caller's unit.
+    """Measures of how good a patch is, as plain numbers, with lengths in the caller's unit.
 
-    vertices : (n, 3), in the world, of the mesh, those that are `reachable`
-    extra : how many contours are tracked on the surface between those that were fitted
+    vertices : (n, 3), the `reachable` vertices of the mesh, in the world
+    extra : number of contours to track on the surface between those that were fitted
 
     contacts, contact_distance_mean, .._median, .._max, .._rms : Euclidean distances to the patch
     vertices, vertex_distance_mean, ... : the same, where there are vertices
     fit_error : (6) over the contacts
     extra_contours, extra_points, extra_fit_error : how many there are, without noise, and (6) over them;
-        the last where there are points
+        the last only if there are points
     total_absolute_curvature : (8)
-    overlap : the share of the patch's area under which there is something of the surface that a finger
-        could reach, to about 0.01; the paper has no number for it
+    overlap : the share of the patch's area that has surface below it that a finger could reach, to
+      about 0.01; the paper has no number for it
 
     Raises ValueError for bad numbers.
     """
@@ -61,13 +62,13 @@ def verify(
 def verifying(
     r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
 ) -> Iterator[dict[str, float]]:
-    """`verify` step by step, none of them long: each yields what is known so far, the last all of it."""
+    """`verify` in short steps: each yields what is known so far, and the last all of it."""
     local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
     found: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
     found |= _spread("contact", distances(r.geometry, r.contacts))
     misses = np.empty(len(local))
-    for start in range(0, len(local), AT_ONCE):
-        some = slice(start, start + AT_ONCE)
+    for start in range(0, len(local), MISSES_AT_ONCE):
+        some = slice(start, start + MISSES_AT_ONCE)
         misses[some] = distances(r.geometry, local[some])
         yield found
     contours = _extra_contours(r, surface, extra)
@@ -128,7 +129,7 @@ def _azimuths_between(domain: Domain, count: int) -> list[float]:
 
 def _start(r: Reconstruction, surface: Surface) -> Vector | None:
     """The place of the surface nearest to the reference point along the normal; None where there is none."""
-    hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in REACHES)
+    hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in FOOT_REACH)
     return next((hit for hit in hits if hit is not None), None)
 
 
@@ -153,7 +154,7 @@ def _below(r: Reconstruction, surface: Surface, local: Vector, distance: float) 
 
 def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:
     """Whether something of the surface is above the point, within `reach` along the unit `up`."""
-    (x, y, z), (ux, uy, uz), hair = point, up, HAIR * reach
+    (x, y, z), (ux, uy, uz), hair = point, up, OWN_LAYER * reach
     return surface.ray_cast((x + hair * ux, y + hair * uy, z + hair * uz), up, reach) is not None
 
 

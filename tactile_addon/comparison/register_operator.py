@@ -13,7 +13,7 @@ from mathutils import Matrix
 from ... import core
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import is_unlocked, target_object
+from ..probes.operators import is_in_object_mode, is_unlocked, target_object
 from ..scene import patch_record
 from ..touch.surface import MeshSurface
 from ..touch.wording import registration_summary
@@ -31,7 +31,7 @@ class Search:
 
     def __init__(self, patch, target, depsgraph):
         if probe.probe_of(patch) is not None:
-            raise ValueError(f'The place of "{patch.name}" is that of its probe: it is known already')
+            raise ValueError(f'The place of "{patch.name}" is that of its probe, so it is known already')
         vertices, faces = MeshSurface(target, depsgraph).triangles()
         given = patch_record.reconstruction_of(patch), vertices, faces
         self.patch, self.target, self._matrix = patch.name, target.name, patch.matrix_world.copy()
@@ -44,7 +44,7 @@ class Search:
             self._found = core.register(*given, best=POSES)
         except MemoryError:
             self._error = ValueError(
-                f'"{self.target}" is too large to be searched: take away what is far from the patch'
+                f'"{self.target}" is too large to be searched: remove what is far from the patch'
             )
         except ValueError as error:
             self._error = error
@@ -72,10 +72,10 @@ class Search:
     def put(self, pose):
         """Moves the patch to one of the poses, from where it was; its `registration`, a dict."""
         if pose > len(self.poses):
-            raise ValueError(f'There are {len(self.poses)} poses on "{self.target}": take one of them')
+            raise ValueError(f'There are {len(self.poses)} poses on "{self.target}": choose one of them')
         chosen, matrix, patch = self.poses[pose - 1], np.eye(4), bpy.data.objects.get(self.patch)
         if patch is None:
-            raise ValueError(f'"{self.patch}" was deleted while its place was looked for')
+            raise ValueError(f'"{self.patch}" was deleted while its place was searched for')
         matrix[:3, :3], matrix[:3, 3] = chosen.rotation, chosen.translation
         patch.matrix_world = Matrix(matrix.tolist()) @ self._matrix
         patch[patch_record.RECORD]["registration"] = {
@@ -109,11 +109,12 @@ class TACTILE_OT_register(InSlices, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     target: StringProperty(
-        name="Target", description="Name of the mesh object to put it onto; empty for the selected mesh"
+        name="Target",
+        description="Name of the mesh object to put the patch onto; empty for the selected mesh",
     )
     pose: IntProperty(
         name="Pose",
-        description="1 is the best place; others may be about as good",
+        description="Which of the places that were found: 1 is the best, others may be about as good",
         default=1,
         min=1,
         max=POSES,
@@ -124,10 +125,7 @@ class TACTILE_OT_register(InSlices, bpy.types.Operator):
         if probe.patch_near(context.view_layer.objects.active) is None:
             cls.poll_message_set("Select a mesh and then the patch to put onto it")
             return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave this mode: patches are registered in Object Mode")
-            return False
-        return is_unlocked(cls, context)
+        return is_in_object_mode(cls, context, "Patches are registered") and is_unlocked(cls, context)
 
     def _begin(self, context):
         patch = probe.patch_near(context.view_layer.objects.active)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A verification as tables and sentences for people, and as the columns of a file."""
 
+import bpy
+
 from ..touch import units
 from ..touch.wording import SPREAD
 
@@ -21,13 +23,17 @@ def verification_summary(record):
     if not (vertices or percent or found["extra_points"]):
         return True, f'Nothing of "{name}" is below the patch: move one to the other, or choose another mesh'
     if not vertices:
-        return True, f'No vertex of "{name}" is over the patch, of which it covers {percent:.0f} %'
+        return (
+            True,
+            f'No vertex of "{name}" is over the patch; the mesh covers {percent:.0f} % of it',
+        )
     if record["status"] != "ok":
         return True, record["message"]
-    mean, most = found["vertex_distance_mean"], found["vertex_distance_max"]
+    unit = units.unit_of(bpy.context.scene, record["radius"])
+    mean, most = (_length(found, f"vertex_distance_{key}", unit) for key in ("mean", "max"))
     return False, (
-        f'{vertices} vertices of "{name}" are {units.length(mean)} off the patch in the mean, '
-        f"{units.length(most)} at most; it covers {percent:.0f} %"
+        f'{vertices} vertices of "{name}" are {mean} off the patch on average, '
+        f"{most} at most; the mesh covers {percent:.0f} % of it"
     )
 
 

@@ -10,13 +10,13 @@ from ... import core
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices
-from ..probes.operators import is_unlocked, target_object
+from ..probes.operators import is_in_object_mode, is_unlocked, target_object
 from ..scene import mesh_data, patch_object, patch_record
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import judgment
 from .verification_wording import verification_summary
 
-AT_ONCE = 2000  # vertices that are looked at in one step
+VERTICES_AT_ONCE = 2000  # vertices that are looked at in one step
 
 
 class Verification:
@@ -54,11 +54,11 @@ class Verification:
         _, vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
         self.count, seen = len(vertices), [np.empty((0, 3))]
         yield
-        for start in range(0, self.count, AT_ONCE):
-            some = slice(start, start + AT_ONCE)
+        for start in range(0, self.count, VERTICES_AT_ONCE):
+            some = slice(start, start + VERTICES_AT_ONCE)
             over = core.reachable(r.geometry, self, vertices[some], normals[some])
             seen.append(vertices[some][over])
-            self.done = min(start + AT_ONCE, self.count)
+            self.done = min(start + VERTICES_AT_ONCE, self.count)
             yield
         for found in core.verifying(r, self, np.vstack(seen)):
             self._found = found
@@ -130,12 +130,9 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if probe.patch_near(context.view_layer.objects.active) is None:
-            cls.poll_message_set("Select a patch; after the mesh to compare with, if that is another one")
+            cls.poll_message_set("Select a patch; to compare it with another mesh, select that first")
             return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave this mode: patches are verified in Object Mode")
-            return False
-        return is_unlocked(cls, context)
+        return is_in_object_mode(cls, context, "Patches are verified") and is_unlocked(cls, context)
 
     def _begin(self, context):
         obj = context.view_layer.objects.active
@@ -175,12 +172,13 @@ def chosen_mesh(context, patch):
     names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]
     if len(names) > 1:
         raise ValueError(
-            f"{len(names)} meshes are selected: select one besides the patch, or none for the one touched"
+            f"{len(names)} meshes are selected: select one besides the patch, or none to compare "
+            "with the one that was touched"
         )
     name = names[0] if names else patch.tactile_target
     source = probe.record_of(patch)
     if not name and source is not None and source["source"] not in bpy.data.objects:
         raise ValueError(
-            f'"{patch.name}" was touched on no mesh of this file: select the mesh, then the patch'
+            f'"{patch.name}" was not touched on a mesh of this file: select the mesh, then the patch'
         )
     return name

@@ -18,7 +18,7 @@ from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 VERSION = 2
 TITLE = "# Tactile Patch contacts, version "
 UNIT_METERS = dict(units.METERS.values())  # meters in each unit
-DIRECTIONS, DEVIATIONS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
+VECTOR_KEYS, DEVIATION_KEYS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
 COLUMNS = ("curve", "time", *POINT_COLUMNS, *NORMAL_COLUMNS)
 STROKE = "stroke"  # the name of a curve that runs beside the reference point begins with it
 
@@ -34,12 +34,12 @@ def read(path):
         raise OSError(f'there is no file "{path}"')
     readers = {".csv": _read_csv, ".txt": _read_csv, ".tsv": _read_csv, ".ply": ply_contacts.read}
     if path.suffix.lower() not in readers:
-        raise OSError(f'cannot read "{path.name}": wanted a .csv or .ply file of contacts')
+        raise OSError(f'cannot read "{path.name}": expected a .csv or .ply file of contacts')
     try:
         return readers[path.suffix.lower()](f'"{path.name}"', path)
     except MemoryError:
         name = f'"{path.name}"'
-        raise ValueError(f"{name}: wanted contacts that fit into memory, got more") from None
+        raise ValueError(f"{name}: expected contacts that fit into memory, got more") from None
 
 
 def contacts_of(r):
@@ -62,7 +62,7 @@ def write(path, contacts):
     contours = [*contours, *strokes]
     names = POINT_COLUMNS + (NORMAL_COLUMNS if any(c.normals is not None for c in contours) else ())
     told = {"point": point, "outward": outward}
-    for key in DEVIATIONS:
+    for key in DEVIATION_KEYS:
         stds = [getattr(c, key) for c in contours]
         if any(std is not None for std in stds):
             told[key] = stds[:1] if len(set(stds)) == 1 else stds
@@ -95,7 +95,7 @@ def _read_csv(name, path):
     told = _told(name, text)
     found = contact_rows.header_of(text)
     if found is None:
-        raise ValueError(f"{name}: wanted a header with the columns curve, x, y, z, got an empty file")
+        raise ValueError(f"{name}: expected a header with the columns curve, x, y, z, got an empty file")
     header, number, start = found
     at = f"{name}, line {number}"
     separator = next((s for s in ";\t" if s in header), ",")
@@ -104,11 +104,11 @@ def _read_csv(name, path):
     for _, first, block in contact_rows.blocks(text, start, number + 1):
         rows.add(first, block)
     contours = rows.contours()
-    for key in DEVIATIONS:
+    for key in DEVIATION_KEYS:
         stds = told.pop(key, [None])
         stds = stds * len(contours) if len(stds) == 1 else stds
         if len(stds) != len(contours):
-            raise ValueError(f"{name}: wanted one {key} or {len(contours)}, one a curve, got {len(stds)}")
+            raise ValueError(f"{name}: expected one {key} or {len(contours)}, one a curve, got {len(stds)}")
         contours = [_with(name, c, key, std) for c, std in zip(contours, stds, strict=True)]
     beside = [label.lower().startswith(STROKE) for label in rows.labels]
     strokes = tuple(itertools.compress(contours, beside))
@@ -137,11 +137,11 @@ def _told(name, text):
         if number == 1:
             _require_version(at, line.removeprefix(TITLE).partition(",")[0].strip())
         key, *words = line[1:].rstrip(",;\t\n ").split() or [""]  # A spreadsheet may leave separators behind.
-        if key in DIRECTIONS and len(words) != 3:
-            raise ValueError(f"{at}: wanted 3 numbers for {key}, got {len(words)}")
-        if key in DIRECTIONS:
+        if key in VECTOR_KEYS and len(words) != 3:
+            raise ValueError(f"{at}: expected 3 numbers for {key}, got {len(words)}")
+        if key in VECTOR_KEYS:
             told[key] = [contact_rows.number_of(f'{at}, "{key}"', word, LARGEST) for word in words]
-        elif key in DEVIATIONS:
+        elif key in DEVIATION_KEYS:
             told[key] = [_deviation(f'{at}, "{key}"', word) for word in words]
         start, number = end, number + 1
     return told
@@ -151,14 +151,15 @@ def _deviation(at, word):
     """A number of 0 or more; None for "-"."""
     std = None if word == "-" else contact_rows.number_of(at, word, LARGEST)
     if std is not None and std < 0.0:
-        raise ValueError(f"{at}: wanted a number of 0 or more, got {word[:40]}")
+        raise ValueError(f"{at}: expected a number of 0 or more, got {word[:40]}")
     return std
 
 
 def _require_version(at, version):
     if not version.isdecimal() or int(version) > VERSION:
         raise ValueError(
-            f"{at}: wanted version {VERSION} or less, got {version[:40]}: this was written by a later release"
+            f"{at}: expected version {VERSION} or less, got {version[:40]}: this was written by a "
+            "later release"
         )
 
 
@@ -168,7 +169,7 @@ def _text(name, path):
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", errors="replace")
     elif b"\0" in data:
-        raise ValueError(f"{name}: wanted a text file, got bytes that are none")
+        raise ValueError(f"{name}: expected a text file, got binary data")
     else:
         try:
             text = data.decode("utf-8-sig")
@@ -189,19 +190,19 @@ def _columns(at, header):
         if key in POINT_COLUMNS and unit and unit not in UNIT_METERS:
             if suffix:  # Columns such as x_offset are not coordinates.
                 continue
-            raise ValueError(f'{at}: wanted a unit out of {", ".join(UNIT_METERS)}, got "{unit}"')
+            raise ValueError(f'{at}: expected a unit out of {", ".join(UNIT_METERS)}, got "{unit}"')
         if key in columns:
-            raise ValueError(f'{at}: wanted one column "{key}", got two')
+            raise ValueError(f'{at}: expected one column "{key}", got two')
         columns[key], found[key] = i, unit
     missing = [key for key in POINT_COLUMNS if key not in columns]
     missing += [
         key for key in NORMAL_COLUMNS if key not in columns and any(k in columns for k in NORMAL_COLUMNS)
     ]
     if missing:
-        raise ValueError(f'{at}: wanted the column "{missing[0]}", got "{_shown(header)}"')
+        raise ValueError(f'{at}: expected the column "{missing[0]}", got "{_shown(header)}"')
     used = {found[key] for key in POINT_COLUMNS}
     if len(used) > 1:
-        raise ValueError(f"{at}: wanted x, y and z in one unit, got {' and '.join(sorted(used))}")
+        raise ValueError(f"{at}: expected x, y and z in one unit, got {' and '.join(sorted(used))}")
     return len(header), columns, used.pop()
 
 

@@ -15,26 +15,28 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper
 
-from ..probes.operators import is_in_object_mode, make_active, report_error
+from ..probes.operators import is_in_object_mode, make_active, report_error, waiting
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_solver
+from ..touch.settings import FitSettings, draw_solver, length_property
 from ..touch.units import length
 from ..touch.wording import fit_summary
+from ..whole_object import whole_mesh
+from ..whole_object.object_report import object_summary
 from . import contact_file, measured
 
 UNITS = [
     (
         "FILE",
         "From File",
-        "The unit that the columns name; where they name none, numbers are taken as they are",
+        "Use the unit that the columns name; without one, use the numbers as they are",
     ),
-    ("NONE", "As They Are", "Numbers are lengths of the scene, whatever the file says"),
+    ("NONE", "As They Are", "Use the numbers as lengths of the scene, whatever the file says"),
     *((unit, unit, f"Numbers are lengths in {unit}") for unit in contact_file.UNIT_METERS),
 ]
 
 
 class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
-    """Rebuild the surface patch that measured contours and strokes show"""
+    """Rebuild the surface patch, or the whole surface, that measured contours and strokes show"""
 
     bl_idname = "tactile.import_contacts"
     bl_label = "Import Contact Data"
@@ -43,51 +45,59 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.ply", options={"HIDDEN"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
-    unit: EnumProperty(name="Unit", description="What the numbers of the file measure", items=UNITS)
+    unit: EnumProperty(name="Unit", description="Unit of the numbers in the file", items=UNITS)
+    whole: BoolProperty(
+        name="Whole Object",
+        description="Cover all contacts with patches, and join these to one surface",
+        options={"SKIP_PRESET"},
+    )
+    tolerance: length_property(
+        "Tolerance",
+        "Standard deviation to reach for heights of a whole object, in the scene's unit; 0: 1.2 % of a patch",
+        precision=4,
+    )
     point: FloatVectorProperty(
         name="Reference Point",
         subtype="TRANSLATION",
-        description="Where the curves meet, exact, or a place among strokes; until it is set "
-        "that of the file, or the point nearest to all curves",
+        description="The point where the curves meet, or a place among strokes; if not set, the "
+        "file's, or the point nearest to all curves",
         options={"SKIP_SAVE", "SKIP_PRESET"},
     )
     strokes: BoolProperty(
         name="Strokes",
-        description="All curves run beside the reference point, which is only a place among them",
+        description="No curve passes through the reference point, which is only a place among them",
         options={"SKIP_PRESET"},
     )
-    radius: FloatProperty(
-        name="Radius",
-        subtype="DISTANCE",
-        description="How far from a place among strokes they count, in units of the scene; 0: all do",
+    radius: length_property(
+        "Radius",
+        "Use strokes up to this distance from the reference point, in units of the scene; 0 uses all",
         min=0.0,
         precision=4,
     )
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="A direction on the outer side of the surface, for scripts; Flip chooses the other side",
+        description="A direction that points to the outer side of the surface, if no normals were measured",
         options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
     )
-    flip: BoolProperty(name="Flip", description="The other side is the outer one")
-    noise: FloatProperty(
-        name="Noise",
-        subtype="DISTANCE",
-        description="Standard deviation of a contact, in units of the scene; 0 where it is not known",
+    flip: BoolProperty(name="Flip", description="Use the other side of the surface as its outer side")
+    noise: length_property(
+        "Noise",
+        "Standard deviation of a contact, in units of the scene; 0 if it is not known",
         min=0.0,
         precision=4,
     )
     normal_std: FloatProperty(
         name="Normal Deviation",
         subtype="ANGLE",
-        description="Standard deviation of measured normals, which are then fitted; 0 to leave them out",
+        description="Standard deviation of the measured normals, to fit them too; 0 leaves them out",
         min=0.0,
         soft_max=0.5,
     )
 
     @classmethod
     def poll(cls, context):
-        return is_in_object_mode(cls, context, "Contacts are imported")
+        return context.area is None or is_in_object_mode(cls, context, "Contacts are imported")
 
     def invoke(self, context, event):
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.
@@ -95,7 +105,10 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     def execute(self, context):
         paths = [str(Path(self.directory) / file.name) for file in self.files if file.name] or [self.filepath]
         try:
-            contacts = measured.read(paths, self.unit, context.scene.unit_settings.scale_length)
+            scale = context.scene.unit_settings.scale_length
+            contacts = measured.read(paths, self.unit, scale, self.whole)
+            if self.whole:
+                return self._joined(context, paths, contacts)
             touched = measured.fit(
                 Path(paths[0]).name,
                 contacts,
@@ -121,15 +134,34 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
+    def _joined(self, context, paths, contacts):
+        """Adds the surface of all contacts, as that of a whole object."""
+        more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+        with waiting(context):
+            whole, report = measured.whole_of(
+                contacts,
+                outward=self._given("outward"),
+                flip=self.flip,
+                tolerance=self.tolerance,
+                noise=self.noise,
+            )
+        made = whole_mesh.insert(context.scene, Path(paths[0]).name + more, whole, report)
+        make_active(context, made)
+        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, object_summary(report))
+        return {"FINISHED"}
+
     def _given(self, name):
         return list(getattr(self, name)) if self.properties.is_property_set(name) else None
 
     def draw(self, context):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        for name in ("unit", "point", "strokes", "radius", "flip", "noise", "normal_std"):
+        of_patch = "point", "strokes", "radius", "flip", "noise", "normal_std"
+        of_object = "outward", "flip", "tolerance", "noise"
+        for name in ("unit", "whole", *(of_object if self.whole else of_patch)):
             layout.prop(self, name)
-        draw_solver(layout, self)
+        if not self.whole:
+            draw_solver(layout, self)
 
 
 class TACTILE_FH_contacts(bpy.types.FileHandler):

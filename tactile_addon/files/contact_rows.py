@@ -83,7 +83,7 @@ class Rows:
     def contours(self):
         numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
         if not len(numbers):
-            raise ValueError(f"{self._name}: wanted contacts below the header, got none")
+            raise ValueError(f"{self._name}: expected contacts below the header, got none")
         normals = numbers[:, 3:6] if "nx" in self._columns else None
         return contours(
             self._name,
@@ -130,17 +130,17 @@ class Rows:
     def _row(self, at, fields):
         if any(fields[self._width :]):
             raise ValueError(
-                f"{at}: wanted {self._width} fields, got {len(fields)}: decimal commas need semicolons or "
+                f"{at}: expected {self._width} fields, got {len(fields)}: decimal commas need semicolons or "
                 "tabs between the fields"
             )
         row = {key: fields[i] if i < len(fields) else "" for key, i in self._columns.items()}
         label = row.get("curve", "1")
         if not label:
-            raise ValueError(f'{at}: wanted a number or a name in the column "curve", got none')
+            raise ValueError(f'{at}: expected a number or a name in the column "curve", got none')
         values = [self._value(at, row, key) for key in POINT_COLUMNS]
         measured = "nx" in row and any(row[key] for key in NORMAL_COLUMNS)
         if measured is not self._measured.setdefault(label, measured):
-            raise ValueError(f"{at}: wanted normals all along a curve or nowhere, got some")
+            raise ValueError(f"{at}: expected normals at all contacts of a curve or at none, got some")
         if "nx" in row:
             values += [self._value(at, row, key) if measured else math.nan for key in NORMAL_COLUMNS]
         return label, [*values, *([self._value(at, row, "time")] if "time" in row else [])]
@@ -183,7 +183,7 @@ def fields_of(at, line, separator):
     try:
         (fields,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
     except csv.Error:
-        raise ValueError(f"{at}: wanted fields of some letters, got a longer one") from None
+        raise ValueError(f"{at}: expected short fields, got a very long one") from None
     return [field.strip() for field in fields]
 
 
@@ -206,9 +206,9 @@ def number_of(at, text, largest=math.inf):
     try:
         (value,) = numbers_of([text])
     except ValueError:
-        raise ValueError(f'{at}: wanted a number, got "{text[:40]}"') from None
+        raise ValueError(f'{at}: expected a number, got "{text[:40]}"') from None
     if abs(value) > largest:
         raise ValueError(
-            f'{at}: wanted numbers up to {largest:g}, got "{text[:40]}": take another unit of length'
+            f'{at}: expected numbers up to {largest:g}, got "{text[:40]}": use another unit of length'
         )
     return float(value)

@@ -72,7 +72,7 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
     use_selection: BoolProperty(
-        name="Selected Only", description="Only of selected probes and patches", default=False
+        name="Selected Only", description="Write the selected probes and patches only", default=False
     )
 
     @classmethod

@@ -36,10 +36,13 @@ def add(path, empty=False):
         ".obj": lambda: bpy.ops.wm.obj_import(filepath=full, forward_axis="Y", up_axis="Z"),
     }
     if kind not in imports:
-        raise OSError(f'cannot read "{path.name}": wanted a .blend, .ply, .stl or .obj file')
+        raise OSError(f'cannot read "{path.name}": expected a .blend, .ply, .stl or .obj file')
     if empty:
         bpy.ops.wm.read_homefile(use_empty=True)
-    unreadable, there = f'no mesh could be read from "{path.name}": is the file whole?', set(bpy.data.objects)
+    unreadable, there = (
+        f'no mesh could be read from "{path.name}": is the file complete?',
+        set(bpy.data.objects),
+    )
     if kind == ".ply" and not _has_header(path):
         raise OSError(unreadable)
     try:

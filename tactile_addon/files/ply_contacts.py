@@ -32,7 +32,7 @@ def read(name, path):
     wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN is nowhere
     if wild.any():
         at = f"{name}, contact {np.argmax(wild) + 1}"
-        raise ValueError(f"{at}: wanted finite coordinates up to {LARGEST:g}, got others")
+        raise ValueError(f"{at}: expected finite coordinates up to {LARGEST:g}, got others")
     normals = (
         np.column_stack([table[key] for key in NORMAL_COLUMNS]) if set(NORMAL_COLUMNS) <= set(table) else None
     )
@@ -49,14 +49,14 @@ def _vertices(name, data):
     lines = [line.split() for line in data[: max(end, 0)].decode("latin-1").splitlines()]
     order = PLY_ORDERS.get(lines[1][1]) if len(lines) > 1 and len(lines[1]) > 1 else None
     if not data.startswith(b"ply") or end < 0 or order is None:
-        raise ValueError(f"{name}: wanted the header of a .ply file, got another or half of one")
+        raise ValueError(f"{name}: expected the complete header of a .ply file, got something else")
     below = data.find(b"\n", end) + 1 or len(data)
     before, count, fields = _ply_vertices(name, lines, order)
     text = data[below:].splitlines() if lines[1][1] == "ascii" else None
     sizes = [number * (1 if text is not None else np.dtype(kinds).itemsize) for kinds, number in before]
     start, size = sum(sizes), 1 if text is not None else np.dtype(fields).itemsize
     if (len(data) - below if text is None else len(text)) < start + count * size:
-        raise ValueError(f"{name}: wanted {count} contacts, got a file that ends before: is it whole?")
+        raise ValueError(f"{name}: expected {count} contacts, got a file that ends earlier: is it complete?")
     if text is None:
         rows = np.frombuffer(data, fields, count, below + start)
     else:
@@ -85,7 +85,7 @@ def _ply_vertices(name, lines, order):
                     (line[-1].lower(), "list" if line[1] == "list" else PLY_TYPES[line[1]])
                 )
         except (IndexError, ValueError, KeyError):
-            raise ValueError(f'{name}: wanted an element or a property, got "{" ".join(line)}"') from None
+            raise ValueError(f'{name}: expected an element or a property, got "{" ".join(line)}"') from None
     before = []
     for element, count, properties in elements:
         if count < 0 or any(kind == "list" for _, kind in properties):
@@ -96,7 +96,7 @@ def _ply_vertices(name, lines, order):
                 break
             return before, count, fields
         before.append((fields, count))
-    raise ValueError(f"{name}: wanted vertices with the properties x, y and z, got none of that kind")
+    raise ValueError(f"{name}: expected vertices with the properties x, y and z, got none of that kind")
 
 
 def _ply_rows(name, first, lines, fields):
@@ -119,6 +119,6 @@ def _refuse_ply_row(name, first, words, fields):
     for number, row in enumerate(words, first):
         at = f"{name}, line {number}"
         if len(row) != len(fields):
-            raise ValueError(f"{at}: wanted {len(fields)} numbers, got {len(row)}")
+            raise ValueError(f"{at}: expected {len(fields)} numbers, got {len(row)}")
         for (key, _), word in zip(fields, row, strict=True):
             contact_rows.number_of(f'{at}, "{key}"', word)

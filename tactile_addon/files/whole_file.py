@@ -48,4 +48,4 @@ def write_text(path, text):
 def require_file(path):
     """Raises OSError for a folder, a device or a pipe, in whose place there can be no file."""
     if Path(path).exists() and not Path(path).is_file():
-        raise OSError(f'"{path}" is no file that could be replaced: choose the name of one')
+        raise OSError(f'"{path}" is not a file that can be replaced: choose another name')

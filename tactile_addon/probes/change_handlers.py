@@ -13,7 +13,9 @@ from time import perf_counter
 import bpy
 from bpy.app.handlers import persistent
 
+from ..scene import undo
 from ..scene.family import remembered
+from ..scene.viewports import has_gesture
 from . import anchor, deleted
 from .probe import forget_targets, is_free, is_probe, probe_of, record_of, targets
 from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
@@ -21,7 +23,6 @@ from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, 
 SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
 SLICE = 0.2  # seconds of work between two events, in a window
 CHEAP = 0.05  # seconds that a touch may take to be made in every frame of an animation
-GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
 _unsure = True  # whether any patch may be another than its inputs ask for, as after undo
 _seen = None  # the scene and view layer that were looked at last
@@ -51,7 +52,7 @@ def _bring_up_to_date(depsgraph, dearest):
     if not targets():
         _unsure = False
         return
-    with remembered():
+    with remembered(), undo.after_step():
         concerned, unsure = _concerned(depsgraph)
         if not concerned:
             return
@@ -163,13 +164,11 @@ def _settle():
     """Completes what the gesture has left, once it has ended, some at a time; a timer."""
     if not targets():
         return None
-    windows = bpy.context.window_manager.windows
-    running = [operator.bl_idname for window in windows for operator in window.modal_operators]
-    if bpy.app.is_job_running("RENDER") or any(name.startswith(GESTURES) for name in running):
+    if bpy.app.is_job_running("RENDER") or has_gesture():
         return SETTLE
     end = perf_counter() + SLICE
-    for window in windows:
-        with bpy.context.temp_override(window=window), remembered():
+    for window in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=window), remembered(), undo.after_step():
             depsgraph = bpy.context.evaluated_depsgraph_get()
             if _unsure:
                 on_depsgraph_update(window.scene, depsgraph)
@@ -186,13 +185,28 @@ def _settle():
     return None
 
 
+@persistent
+def before_undo(*_):
+    """Has undo free what is in no step of it, and nothing point there."""
+    undo.take_out()
+
+
+@persistent
+def after_undo(*_):
+    """Puts back what is there all the same, and has all probes looked at."""
+    undo.put_back()
+    on_other_data()
+
+
 HANDLERS = {
     "depsgraph_update_post": on_depsgraph_update,
     "frame_change_post": on_frame_change,
     "blend_import_post": on_blend_import,
     "load_post": on_other_data,
-    "undo_post": on_other_data,
-    "redo_post": on_other_data,
+    "undo_pre": before_undo,
+    "redo_pre": before_undo,
+    "undo_post": after_undo,
+    "redo_post": after_undo,
 }
 
 

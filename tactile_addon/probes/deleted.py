@@ -5,10 +5,12 @@
 import bpy
 
 from ..scene import patch_object, patch_record
+from ..scene.viewports import has_gesture
 from ..touch.settings import silent
 from . import anchor
 from .probe import DIGEST, is_result
 
+LATER = 0.25  # seconds until another look at whether a gesture has ended
 _deleted = set()  # session_uids of targets
 _owners = {}  # those of contours, and of the patches they were seen with last: undo may bring them back
 
@@ -105,11 +107,18 @@ def _unused_meshes():
 
 def remove():
     """Takes away what was deleted, and what nothing is left of but a datablock that nobody uses; a timer."""
+    if has_gesture():
+        return LATER
     there = {obj.session_uid: obj for obj in bpy.data.objects}
     gone = [there[number] for number in _deleted if number in there and not there[number].users]
+    # Children and modifiers point to an object without being its users, and undo may leave them as they are:
+    # it would bring back the object, and not these links.
+    pointing = bpy.data.user_map(subset=gone) if gone else {}
+    gone = [obj for obj in gone if not pointing.get(obj)]
     left = [obj for obj in there.values() if _is_left(obj, there) and is_result(obj)]
     _deleted.clear()
     patch_object.remove_objects(left)
     for obj in gone:
         bpy.data.objects.remove(obj)
     patch_object.remove_meshes(_unused_meshes())
+    return None

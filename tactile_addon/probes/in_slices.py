@@ -5,10 +5,13 @@
 import sys
 from time import perf_counter
 
+from bpy.props import BoolProperty
+
+from ..touch.settings import UNSAVED
 from .operators import report_error
 
-AT_ONCE = 0.2  # seconds of work before a window is told that there is more
-SLICE = 0.05  # seconds of work between two events
+FIRST_SLICE = 0.2  # seconds of work before a window is told that there is more
+SLICE = 0.03  # seconds of work between two events
 SAY = 1.0  # seconds between two lines of progress where there is no window
 NEXT = 0.01  # seconds from one slice to the next
 
@@ -21,6 +24,12 @@ class InSlices:
     `_done` may raise ValueError, with a sentence for the user.
     """
 
+    progress: BoolProperty(
+        name="Progress",
+        description="Print progress to stderr where there is no window to show it",
+        options={"HIDDEN", *UNSAVED},
+    )
+
     _timer = None  # while it is running in a window
     _in_window = False  # whether a dialog has been agreed to, after which it goes on in slices
     stop = "Stop"  # what Esc does
@@ -29,7 +38,7 @@ class InSlices:
     def invoke(self, context, event):
         try:
             self._begin(context)
-            if self._advance(context, AT_ONCE):
+            if self._advance(context, FIRST_SLICE):
                 return self._finish(context)
         except ValueError as error:
             return report_error(self, error)
@@ -43,7 +52,7 @@ class InSlices:
             self._check(context)
             said = perf_counter()
             for _ in self._steps:
-                if getattr(self, "progress", False) and perf_counter() > said + SAY:
+                if self.progress and perf_counter() > said + SAY:
                     said = perf_counter()
                     print(self._done()[0], file=sys.stderr, flush=True)
             return self._finish(context)

@@ -1,47 +1,89 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lengths as the panel has them: dragged, they move by the object's size, from what a touch has found.
+"""Lengths as panels and dialogs have them: dragged, they move by the object's size, from what was found.
 
 By how much the mouse moves a number is a constant of Blender's property, so there is one more property for
-each power of ten, which shows and sets the length itself; the panel takes the one that suits the object.
+each power of ten, which shows and sets the length itself; a panel takes the one that suits the object.
 """
 
 import math
+from inspect import get_annotations
 
+import bpy
 from bpy.props import FloatProperty
 
-from ..touch.settings import TouchSettings
+# What a pixel is to move, of the object's size.
+PACES = {
+    "extent": 1.5e-3, "spacing": 5e-4, "step": 1.5e-4, "edge": 1.5e-4, "noise": 1.5e-5, "tolerance": 1.5e-5
+}  # fmt: skip
+DECADES = range(-6, 7)  # of the properties' steps
+UNSAVED = {"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"}
+# Blender's units of length in meters, each with the least length that is said in it.
+UNITS = {
+    "METRIC": ((1e3, 1e3), (1.0, 1.0), (1e-2, 1e-2), (1e-3, 1e-4), (1e-6, 1e-6)),
+    "IMPERIAL": ((1609.344, 1609.344), (0.3048, 0.3048), (0.0254, 0.0254), (2.54e-5, 2.54e-5)),
+}
+WHOLE = {"METRIC": 1.0, "IMPERIAL": 0.3048}  # and those for what is less than all
 
-DECADES = range(-6, 6)  # of the object's size
-STEPS = {"extent": 0.15, "step": 0.015, "noise": 0.0015}  # of the object's size; a pixel moves 1/100 of it
 
-
-def annotations(found):
-    """Those of a property group with TouchSettings: the properties besides its own, by name.
+def annotations(cls, found=lambda owner, name: 0.0):
+    """The properties besides the lengths of a property group or operator, by name.
 
     found : gives for an object and the name of a length what was found in the place of 0
     """
-    return {_name(name, decade): _field(name, decade, found) for name in STEPS for decade in DECADES}
+    given = {name: kind for base in reversed(cls.__mro__) for name, kind in get_annotations(base).items()}
+    return {
+        _name(name, decade): _field(name, given[name].keywords, decade, found)
+        for name in PACES.keys() & given.keys()
+        for decade in DECADES
+    }
+
+
+def dragged(cls):
+    """Decorates an operator that shows its lengths by `fields`."""
+    cls.__annotations__.update(annotations(cls))
+    return cls
 
 
 def fields(size):
-    """The names of the properties that the panel shows lengths by, for an object of that size, by length."""
-    decade = math.floor(math.log10(size) + 0.5) if 0.0 < size < math.inf else 0
-    return {name: _name(name, min(max(decade, DECADES[0]), DECADES[-1])) for name in STEPS}
+    """The names of the properties that show lengths, for an object of that size, by those of the lengths."""
+    size = size if 0.0 < size < math.inf else 1.0
+
+    def fitting(pace):
+        return min(DECADES, key=lambda decade: abs(math.log(pace_of(decade) / (pace * size))))
+
+    return {name: _name(name, fitting(pace)) for name, pace in PACES.items()}
+
+
+def pace_of(decade):
+    """What a pixel moves a property of that step, in the open scene; Blender's ui_get_but_step_unit.
+
+    Blender makes it a whole unit, one that suits ten pixels, unless this is the unit of the number 1.
+    """
+    settings, step = bpy.context.scene.unit_settings, 0.01 * 10.0**decade
+    if settings.system == "NONE":
+        return step
+    scale = settings.scale_length
+    unit, own = (_unit_of(settings.system, meters) for meters in (10.0 * step * scale, scale))
+    return unit / scale * (step if unit == own else 1.0)
+
+
+def _unit_of(system, meters):
+    found = (unit for unit, least in UNITS[system] if meters >= least * (1.0 - 1e-4))
+    return next(found, WHOLE[system])
 
 
 def _name(name, decade):
     return f"{name}_by_{'m' if decade < 0 else ''}{abs(decade)}"
 
 
-def _field(name, decade, found):
-    given = TouchSettings.__annotations__[name].keywords
+def _field(name, given, decade, found):
     shown = {key: given[key] for key in ("name", "description", "subtype", "soft_min")}
     return FloatProperty(
         **shown,
         precision=given.get("precision", 2),
-        step=STEPS[name] * 10.0**decade,
-        options={"HIDDEN"},
+        step=10.0**decade,
+        options=UNSAVED,
         get=lambda settings: getattr(settings, name) or found(settings.id_data, name),
         set=lambda settings, value: setattr(settings, name, value),
     )

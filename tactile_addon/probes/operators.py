@@ -5,15 +5,25 @@
 from contextlib import contextmanager
 
 import bpy
-from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
+from bpy.props import FloatVectorProperty
 
 from ..scene import patch_object, patch_record
-from ..touch.settings import TouchSettings, draw_all, touch_arguments
+from ..touch.settings import (
+    LOCATION,
+    TARGET,
+    UNSAVED,
+    TouchSettings,
+    draw_all,
+    length_property,
+    touch_arguments,
+)
 from ..touch.touch_object import completed, touch
 from ..touch.wording import fit_summary, sentence
+from .number_fields import dragged, fields
 from .probe import lock_of, probe_of, record_of
 
 
+@dragged
 class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     """Feel the surface along curves through a point and rebuild the patch around it"""
 
@@ -21,35 +31,25 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     bl_label = "Fit Tactile Patch"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    target: StringProperty(
-        name="Target",
-        description="Name of the mesh object to touch; empty for the active object",
-        options={"SKIP_PRESET"},
-    )
-    location: FloatVectorProperty(
-        name="Location",
-        subtype="TRANSLATION",
-        description="Where to touch; the 3D cursor where it is not set",
-        options={"SKIP_PRESET"},
-    )
+    target: TARGET
+    location: LOCATION
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="The outward direction there; the surface's own where it is not set",
-        options={"SKIP_PRESET"},
+        description="The outward direction there; if not set, the surface's own",
+        options=UNSAVED,
     )
-
-    tolerance: FloatProperty(
-        name="Tolerance",
-        description="Add planes until the height is good to this, where it is set, or no plane would help",
-        subtype="DISTANCE",
-        soft_min=0.0,
-        options={"SKIP_PRESET"},
+    tolerance: length_property(
+        "Tolerance",
+        "Add planes until the height is accurate to this or no plane would help; if not set, add none",
+        options=UNSAVED,
     )
 
     @classmethod
     def poll(cls, context):
-        return is_in_object_mode(cls, context, "Patches are fitted") and has_target(cls, context)
+        if context.area is not None and not is_in_object_mode(cls, context, "Patches are fitted"):
+            return False  # a script may leave any mode alone
+        return has_target(cls, context)
 
     def execute(self, context):
         given = self.properties.is_property_set
@@ -80,9 +80,10 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         # Where they are not set, the cursor and the surface decide: zeros would say otherwise.
         for name in filter(self.properties.is_property_set, ("location", "outward")):
             layout.prop(self, name)
-        draw_all(layout, self)
+        shown = fields_of(context, self.target)
+        draw_all(layout, self, shown)
         given = self.properties.is_property_set("tolerance")
-        layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
+        layout.prop(self, shown["tolerance"], text="Tolerance" if given else "Tolerance (Off)")
 
 
 def report_error(operator, error):
@@ -109,6 +110,14 @@ def target_object(context, name):
     return obj
 
 
+def fields_of(context, name):
+    """By which of its properties an operator shows lengths, for what it touches, as number_fields.fields."""
+    try:
+        return fields(max(target_object(context, name).dimensions))
+    except ValueError:
+        return fields(1.0)
+
+
 @contextmanager
 def waiting(context):
     """Shows in a window that it takes a while: the first touch of a large mesh builds a tree of its faces."""
@@ -123,8 +132,8 @@ def waiting(context):
 
 
 def is_in_object_mode(operator, context, what):
-    """For its poll, where a person would start it; a script may leave any mode alone."""
-    if context.area is None or context.mode == "OBJECT":
+    """For its poll; says so where it is in another mode."""
+    if context.mode == "OBJECT":
         return True
     operator.poll_message_set(f"{what} in Object Mode: leave this mode first")
     return False

@@ -5,7 +5,7 @@
 The patch is a child of its probe, so a copy of a probe has none and makes its own, and where a probe is
 deleted its patch stays as an ordinary object. Each probe keeps the digest of the inputs it was last
 touched with, and so do the datablocks made from them: undo takes back every datablock by itself, and
-where they differ afterwards the handler of live.py touches again.
+where they differ afterwards change_handlers.py touches again.
 """
 
 import bpy
@@ -46,21 +46,21 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     )
     live: BoolProperty(
         name="Live",
-        description="Touch again whenever the probe, its target or a number changes. Off, the patch is "
-        "frozen: it stays as it is until Touch Again, the button beside this",
+        description="Touch again whenever the probe, its target or a number changes. When off, the "
+        "patch stays as it is until you press Touch Again beside this",
         default=True,
         update=changed,
         override=OVERRIDABLE,
     )
     show_handles: BoolProperty(
         name="Handles",
-        description="Show what is dragged: the point, the sampling planes and the extent",
+        description="Show the handles of the point, the sampling planes and the extent",
         default=True,
         override=OVERRIDABLE,
     )
     active_plane: IntProperty(
         name="Active Plane",
-        description="The one with a handle to tilt it",
+        description="The plane that has a handle to tilt it",
         min=0,
         options={"HIDDEN"},
         override=OVERRIDABLE,
@@ -69,9 +69,7 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     digest: StringProperty(options={"HIDDEN"})
     shape: StringProperty(options={"HIDDEN"})
     seat: FloatVectorProperty(size=anchor.SEAT, options={"HIDDEN"})
-    lost: StringProperty(
-        description="What there was to know of a target that was deleted", options={"HIDDEN"}
-    )
+    lost: StringProperty(description="Data of a target that was deleted", options={"HIDDEN"})
 
 
 _targets = None  # session_uids of what there are probes on, 0 for none; None where it is to be looked up
@@ -213,7 +211,7 @@ def _found(probe, name):
 
 
 def register():
-    TactileProbe.__annotations__.update(number_fields.annotations(_found))
+    TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
     bpy.utils.register_class(TactileProbe)
     bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
     bpy.types.Object.tactile_colors = EnumProperty(

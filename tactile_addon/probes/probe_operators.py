@@ -5,15 +5,16 @@
 import math
 
 import bpy
-from bpy.props import FloatProperty, IntProperty
+from bpy.props import IntProperty
 
 from ..scene import color_range, patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
-from ..touch.settings import MOST_PLANES
+from ..touch.settings import MOST_PLANES, length_property
 from ..touch.wording import added_planes
 from . import probe, touch_again
-from .operators import is_unlocked, report_error, waiting
+from .number_fields import dragged
+from .operators import fields_of, is_in_object_mode, is_unlocked, report_error, waiting
 
 
 class _ProbeOperator:
@@ -26,10 +27,7 @@ class _ProbeOperator:
         if probe.probe_of(context.view_layer.objects.active) is None:
             cls.poll_message_set("Select a probe, or pick a reference point first")
             return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave this mode: probes are changed in Object Mode")
-            return False
-        return is_unlocked(cls, context)
+        return is_in_object_mode(cls, context, "Probes are changed") and is_unlocked(cls, context)
 
 
 class _PlaneOperator(_ProbeOperator):
@@ -40,7 +38,7 @@ class _PlaneOperator(_ProbeOperator):
         if not super().poll(context):
             return False
         if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == MOST_PLANES:
-            cls.poll_message_set("Six planes are the most: remove one first")
+            cls.poll_message_set("A patch has six planes at most: remove one first")
             return False
         return True
 
@@ -59,17 +57,15 @@ class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+@dragged
 class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
     """Feel along more planes, each time the one that tells most, until it is enough or none would help"""
 
     bl_idname = "tactile.add_planes"
     bl_label = "Add Planes While They Help"
 
-    tolerance: FloatProperty(
-        name="Tolerance",
-        description="Standard deviation of the height that is good enough; 0 to go on while a plane helps",
-        subtype="DISTANCE",
-        soft_min=0.0,
+    tolerance: length_property(
+        "Tolerance", "Standard deviation of the height to reach; 0 goes on as long as a plane helps"
     )
 
     def execute(self, context):
@@ -89,6 +85,10 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         self.report({"INFO"}, added_planes(touched.report, unit))
         return {"FINISHED"}
 
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, fields_of(context, "")["tolerance"])
+
 
 def _add(settings, suggested):
     """One more plane, where it is suggested, or as it was there before."""
@@ -106,7 +106,7 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
     bl_idname = "tactile.remove_plane"
     bl_label = "Remove Plane"
 
-    plane: IntProperty(name="Plane", description="Which one, from 0", min=0, max=MOST_PLANES - 1)
+    plane: IntProperty(name="Plane", description="Index of the plane, from 0", min=0, max=MOST_PLANES - 1)
 
     @classmethod
     def poll(cls, context):
@@ -123,7 +123,7 @@ class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
         count = settings.plane_count
         if self.plane >= count:
             return report_error(
-                self, ValueError(f"There are {count} planes, 0 to {count - 1}: take one of them")
+                self, ValueError(f"There are {count} planes, 0 to {count - 1}: choose one of them")
             )
         for name in ("azimuths", "tilts"):
             values = list(getattr(settings, name))

@@ -17,7 +17,7 @@ from . import anchor
 from .probe import DIGEST, patch_of, record_of
 
 NO_SHAPE = " 00000000"  # the checksum of a mesh that cannot be touched, as settings.shape ends
-VERTICES = 2000  # of the mesh around, compared with the patch at most; a quarter or more lies over it
+VERTICES = 1000  # of the mesh around, compared with the patch at most; a quarter or more lies over it
 
 
 def _put(probe, touched):
@@ -115,7 +115,7 @@ def touch_at(probe, depsgraph, complete, **more):
     if anchor.is_attached(probe):  # what is scaled to nothing there is so here
         require_invertible(settings.target.name, np.array(settings.target.matrix_world)[:3, :3])
     if not anchor.can_have_children(probe):
-        raise ValueError("the probe is scaled to nothing, or beyond all numbers: give it a scale of 1")
+        raise ValueError("the probe has a scale of 0 or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)
     if not complete and record is not None:  # Finding out how far a patch can be trusted is dear.
         kept = {"extent": 0.0, "step": 0.0, "degree": "auto"}

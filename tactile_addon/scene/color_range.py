@@ -61,7 +61,8 @@ def _set(obj, value):
 def register():
     bpy.types.Object.tactile_range = FloatProperty(
         name="Range",
-        description="Where the colors of the patch end, in the unit of the legend; 0 for what its values ask",
+        description="Value at which the colors of the patch end, in the unit of the legend; 0 "
+        "chooses it by the values",
         min=0.0,
         precision=4,
         step=0.1,  # small beside what is common in a unit that suits the patch

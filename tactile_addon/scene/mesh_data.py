@@ -5,6 +5,8 @@
 import bpy
 import numpy as np
 
+from .undo import note_copied
+
 ATTRIBUTE_KEYS = {
     "FLOAT": "value",
     "INT": "value",
@@ -54,8 +56,10 @@ def values(mesh, name):
 
 def own_mesh(obj):
     """A linked copy, or the override of a library's object, shows something of its own from now on."""
-    if obj.data.users > 1 or not obj.data.is_editable:
-        obj.data = obj.data.copy()
+    shared = obj.data
+    if shared.users > 1 or not shared.is_editable:
+        obj.data = shared.copy()
+        note_copied(obj, shared)
 
 
 def _has_triangles(mesh, count, triangles):

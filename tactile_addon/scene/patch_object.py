@@ -28,12 +28,13 @@ from .patch_record import (
     matrix_of,
     place,
 )
+from .undo import note_added
 from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 NORMAL, PLACE = "custom_normal", "domain_place"  # attributes: as shaded; on the unit disk, see core.Domain
-FLOOR = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
+WHITE_RANGE = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
 
 
 def insert(scene, touched, parent=None, lines=None):
@@ -57,6 +58,7 @@ def _new(scene, name, material):
     obj.show_in_front = True  # it lies in the surface it describes
     collection(scene).objects.link(obj)
     obj.data.materials.append(material)
+    note_added(obj)
     return obj
 
 
@@ -110,7 +112,7 @@ def recolor(patch):
     own_mesh(patch)
     shown, mesh = patch.tactile_colors, patch.data
     shades, record = values(mesh, shown), patch[RECORD if RECORD in patch else ATLAS_RECORD]
-    floor = FLOOR * record["radius"] ** POWERS[shown]
+    floor = WHITE_RANGE * record["radius"] ** POWERS[shown]
     limit = patch.get(RANGE) or colors.symmetric_range(shades, floor)
     mesh.attributes[COLOR].data.foreach_set("color", colors.diverging(shades, limit).ravel())
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
@@ -130,6 +132,7 @@ def collection(scene):
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
         scene.collection.children.link(found)
+        note_added(found)
     return found
 
 

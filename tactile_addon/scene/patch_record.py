@@ -17,6 +17,7 @@ COLOR = "curvature_color"
 RANGE = "tactile_color_range"  # and the one with the range of its colors, where that is given
 MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
 ATLAS_RECORD = "tactile_object"  # The one of a whole object that holds the report of its touches.
+GRAPH = "tactile_graph"  # and the one with its patches and their boundaries, core.Atlas.to_dict as JSON
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
 QUANTITIES = [
@@ -28,7 +29,7 @@ QUANTITIES = [
         "1 on caps, 0.5 on ridges, 0 on saddles, -0.5 in ruts, -1 in cups",
         0,
     ),
-    ("curvedness", "Curvedness", "How strongly it bends, whatever the shape", -1),
+    ("curvedness", "Curvedness", "How strongly the surface bends, whatever its shape", -1),
     ("deviation", "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
 ]
@@ -64,13 +65,19 @@ def extent_of(patch):
 def require_whole(patch):
     """Raises ValueError where the patch object has been edited into what is none."""
     if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
-        raise ValueError(f'"{patch.name}" was edited, and is no whole patch any more: touch again')
+        raise ValueError(f'"{patch.name}" was edited and is no longer a complete patch: touch again')
 
 
 def is_colored(obj):
     """Whether it is a patch or a whole object that can show its colors, as nobody has edited it."""
     is_one = ATLAS_RECORD in obj or (RECORD in obj and report_of(obj) is not None)
     return is_one and obj.type == "MESH" and _is_whole(obj.data)
+
+
+def require_colored(obj):
+    """Raises ValueError where the whole object has been edited into what is none."""
+    if not is_colored(obj):
+        raise ValueError(f'"{obj.name}" was edited and is no longer a complete surface: touch all over again')
 
 
 def touched_record(obj):
@@ -89,7 +96,7 @@ def _is_whole(mesh):
 
 def mark_failed(patch, why):
     """The patch is that of an earlier touch, for the last one failed."""
-    _outdate(patch, {"message": f"This is the patch of an earlier touch, for the last one failed. {why}"})
+    _outdate(patch, {"message": f"This patch is from an earlier touch, because the last one failed. {why}"})
 
 
 def mark_stale(patch):
@@ -97,8 +104,8 @@ def mark_stale(patch):
     _outdate(
         patch,
         {
-            "message": "This is the patch of an earlier touch, for the probe or its target has changed "
-            "since: touch again."
+            "message": "This patch is from an earlier touch, and the probe or its target has "
+            "changed since: touch again."
         },
     )
 
@@ -131,7 +138,7 @@ def reconstruction_of(patch):
     try:
         r = core.from_dict(json.loads(patch[RECONSTRUCTION]))
     except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f'"{patch.name}" cannot be read any more: touch again ({error})') from error
+        raise ValueError(f'"{patch.name}" can no longer be read: touch again ({error})') from error
     if is_at(patch, r.frame.axes, r.frame.origin):  # where it is, that is in double precision
         return r
     placed = np.array(patch.matrix_world, dtype=float)
@@ -139,7 +146,8 @@ def reconstruction_of(patch):
         return r.moved(placed @ np.linalg.inv(matrix_of(r.frame.axes, r.frame.origin)))
     except ValueError as error:
         raise ValueError(
-            f'"{patch.name}" is stretched, mirrored or scaled to nothing: give it one scale above 0'
+            f'"{patch.name}" is stretched, mirrored or has a scale of 0: give it one positive scale '
+            "for all axes"
         ) from error
 
 

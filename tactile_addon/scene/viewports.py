@@ -1,14 +1,23 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether viewports show the colors of vertices, and making them do so."""
+"""Whether viewports show the colors of vertices, making them do so, and whether anything is dragged."""
 
 import bpy
+
+GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
 
 def shows_colors(space):
     """Whether a 3D viewport draws the colors of vertices."""
     kind = space.shading.type
     return kind in ("MATERIAL", "RENDERED") or (kind == "SOLID" and space.shading.color_type == "VERTEX")
+
+
+def has_gesture():
+    """Whether something is being dragged in some window: it keeps pointers to what it drags."""
+    windows = bpy.context.window_manager.windows
+    names = [operator.bl_idname for window in windows for operator in window.modal_operators]
+    return any(name.startswith(GESTURES) or "_move" in name for name in names)
 
 
 def show_colors(chosen=None):

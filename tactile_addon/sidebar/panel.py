@@ -30,7 +30,7 @@ from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
-HELP = "Click a mesh: a probe feels it there, and keeps a patch of its surface with its curvatures"
+HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
 
 
@@ -155,9 +155,11 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
-        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on It", icon="EYEDROPPER").new = True
+        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER").new = True
+        record = obj[patch_record.ATLAS_RECORD]
+        draw_sentence(context, layout, record["message"], ICONS.get(record["status"], "ERROR"))
         _draw_colors(context, layout, obj, "tactile_colors")
-        draw_rows(context, layout.box(), object_rows(obj[patch_record.ATLAS_RECORD]))
+        draw_rows(context, layout.box(), object_rows(record))
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):

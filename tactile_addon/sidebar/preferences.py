@@ -85,7 +85,10 @@ class TactilePreferences(bpy.types.AddonPreferences):
     bl_idname = __package__.rsplit(".", 2)[0]
 
     tab: StringProperty(
-        name="Sidebar Tab", description="Where the panels are in the sidebar", default=TAB, update=_move_tab
+        name="Sidebar Tab",
+        description="Tab of the sidebar that has the panels",
+        default=TAB,
+        update=_move_tab,
     )
 
     def draw(self, context):

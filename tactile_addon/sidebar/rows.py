@@ -5,42 +5,46 @@
 import re
 import textwrap
 
+import blf
 import bpy
 from bpy.props import StringProperty
+
+FONT, TEXT = 0, 11.0  # Blender's own, and its size in panels,
+LETTER, PADDING = 6.5, 12.0  # the width of a letter, about, and what is free around a text: pixels at scale 1
 
 TIPS = {
     "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
     "κ2": "The larger principal curvature at the point; below 0 the surface bulges outward",
     "Height": "Standard deviation of the patch's height: how well the contacts determine it",
-    "Misfit": "Mean distance of the mesh's vertices over the patch from it; … until you let go",
+    "Misfit": "Mean distance from the patch to the mesh's vertices over it; … until you let go",
     "1/κ1": "Radius of the circle that bends like the surface along the first principal direction",
     "1/κ2": "Radius of the circle that bends like the surface along the second principal direction",
     "K Gaussian": "Gaussian curvature, κ1 times κ2: above 0 on domes and bowls, below 0 on saddles",
     "H Mean": "Mean curvature, the mean of κ1 and κ2",
     "Shape Index": "1 on caps, 0.5 on ridges, 0 on saddles, -0.5 in ruts, -1 in cups",
     "Curvedness": "How strongly the surface bends, whatever its shape",
-    "Fit Error": "Mean distance in height of the contacts from the patch",
-    "Farthest": "Greatest distance of the mesh's vertices over the patch from it",
+    "Fit Error": "Mean distance in height between contacts and patch",
+    "Farthest": "Largest distance from the patch to the mesh's vertices over it",
     "Extent": "How far the longest half curve reaches from the point",
     "Radius": "How far the contacts reach from the point",
     "Step": "Distance between contacts",
     "Degree": "Degree of the polynomial that describes the patch",
-    "Contacts": "How many contacts the patch was fitted to",
-    "Suggested Plane": "Azimuth of the sampling plane that tells most of what is still open",
-    "Would Bring": "Standard deviation of the height to expect with the suggested plane",
-    "Error on Curves": "Mean difference in height of the contacts from the patch, equation (6) of the paper",
-    "Error on … More": "The same over contacts of more contours between the sampling planes, felt on it",
+    "Contacts": "Number of contacts that the patch was fitted to",
+    "Suggested Plane": "Azimuth of the sampling plane that would improve the patch most",
+    "Would Bring": "Standard deviation of the height expected with the suggested plane",
+    "Error on Curves": "Mean difference in height between contacts and patch, equation (6) of the paper",
+    "Error on … More": "The same for more contours, which are felt on the mesh between the sampling planes",
     "Total |K|": "Absolute Gaussian curvature summed over the patch: 0 where it is flat or rolled",
     "Overlap": "Share of the patch's area that has mesh below it",
-    "Touches": "How many touches the object took",
-    "Surface": "Closed where the object was felt all round",
-    "Rims Left": "Places from which touches could go on",
-    "Tolerance": "How well the height of each patch was to be known",
-    "Points": "How many points of the mesh were touched",
+    "Touches": "Number of touches that the object took",
+    "Surface": "Whether the surface is closed, that is, felt all round",
+    "Rims Left": "Number of places from which touches could go on",
+    "Tolerance": "Standard deviation to reach for the height of each patch",
+    "Points": "Number of points of the mesh that were touched",
     "Spacing": "Distance between the points that were touched",
-    "Patches": "How many touches gave a patch",
-    "No Patch": "How many touches gave none, by the reason",
-    "… in Doubt": "How many of these patches are in doubt",
+    "Patches": "Number of touches that gave a patch",
+    "No Patch": "Number of touches that gave no patch, by reason",
+    "… in Doubt": "Number of these patches that are in doubt",
 }
 
 
@@ -56,8 +60,8 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
     bl_label = "Copy Value"
     bl_options = {"INTERNAL"}
 
-    label: StringProperty(name="Label", description="Of the row", options={"SKIP_SAVE"})
-    value: StringProperty(name="Value", description="What is copied", options={"SKIP_SAVE"})
+    label: StringProperty(name="Label", description="Label of the row", options={"SKIP_SAVE"})
+    value: StringProperty(name="Value", description="Value to copy", options={"SKIP_SAVE"})
 
     @classmethod
     def description(cls, context, properties):
@@ -70,21 +74,30 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
 
 
 def draw_rows(context, layout, rows, active=True):
-    """Labels and values side by side, gray where they are not active; a heading has no value."""
+    """Labels and values side by side, gray where they are not active; a heading has no value.
+
+    A value that has no room there stands below its label.
+    """
     longest = max((len(label) for label, value in rows if value), default=0)
-    share = min(max((longest + 4) / _letters(context), 0.34), 0.66)
+    share = min(max((longest + 3) / _letters(context), 0.34), 0.66)
+    room = (1.0 - share) * _letters(context) * LETTER - PADDING
+    blf.size(FONT, TEXT)
     column = layout.column(align=True)
     column.active = active
     for label, value in rows:
         if not value:
             column.label(text=label)
             continue
-        split = column.split(factor=share, align=True)
-        left = split.row(align=True)
+        is_long = blf.dimensions(FONT, value)[0] > room
+        line = column if is_long else column.split(factor=share, align=True)
+        left = line.row(align=True)
         left.alignment = "LEFT"
         copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
         copy.label, copy.value = label, value
-        split.label(text=value, translate=False)
+        if is_long:
+            line = column.split(factor=0.15, align=True)
+            line.label(text="")
+        line.label(text=value, translate=False)
 
 
 def draw_sentence(context, layout, sentence, icon):
@@ -97,4 +110,4 @@ def draw_sentence(context, layout, sentence, icon):
 
 def _letters(context):
     """How many stand beside each other in the sidebar, about."""
-    return context.region.width / (6.5 * context.preferences.system.ui_scale) - 8.0
+    return context.region.width / (LETTER * context.preferences.system.ui_scale) - 8.0

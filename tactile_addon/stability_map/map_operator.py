@@ -3,21 +3,35 @@
 """Stability Map: touches all over an object; in slices in a window, at once from a script."""
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import has_target, make_active, report_error, target_object
+from ..probes.number_fields import dragged
+from ..probes.operators import (
+    fields_of,
+    has_target,
+    is_in_object_mode,
+    make_active,
+    report_error,
+    target_object,
+)
 from ..scene import patch_record
-from ..touch.settings import NAMES, TouchSettings, draw_all, draw_chosen, touch_arguments
+from ..touch.settings import (
+    NAMES,
+    TARGET,
+    TouchSettings,
+    draw_all,
+    draw_chosen,
+    length_property,
+    touch_arguments,
+)
 from ..touch.wording import sentence
 from . import map_object
 from .map_report import map_summary
 from .stability import StabilityMap, expected_count
 
-UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
-
+@dragged
 class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     """Touch a mesh all over and paint a copy of it: where a patch can be trusted, and where there is none"""
 
@@ -25,21 +39,9 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     bl_label = "Stability Map"
     bl_options = {"UNDO", "PRESET"}
 
-    target: StringProperty(
-        name="Target",
-        description="Name of the mesh object to touch; empty for the active object",
-        options=UNSAVED,
-    )
-    spacing: FloatProperty(
-        name="Spacing",
-        description="Distance between the points that are touched; 0 for a quarter of the extent",
-        subtype="DISTANCE",
-        soft_min=0.0,
-    )
-    progress: BoolProperty(
-        name="Progress",
-        description="Print progress to stderr, where there is no window to show it",
-        options={"HIDDEN", *UNSAVED},
+    target: TARGET
+    spacing: length_property(
+        "Spacing", "Distance between the points that are touched; 0 uses a quarter of the extent"
     )
 
     stop = "Stop and Keep"
@@ -47,10 +49,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Maps are made in Object Mode: leave this mode first")
-            return False
-        return has_target(cls, context)
+        return is_in_object_mode(cls, context, "Maps are made") and has_target(cls, context)
 
     def invoke(self, context, event):
         if bpy.app.background:
@@ -66,11 +65,11 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
     def _begin(self, context):
-        target = target_object(context, self.target)
-        # No reference to the target: whatever happens to the scene, the touches go on in a snapshot of it.
-        self._name, self._uid = target.name, target.session_uid
         self._map = StabilityMap(
-            target, context.evaluated_depsgraph_get(), spacing=self.spacing, **touch_arguments(self)
+            target_object(context, self.target),
+            context.evaluated_depsgraph_get(),
+            spacing=self.spacing,
+            **touch_arguments(self),
         )
         self._steps = self._map.steps()
 
@@ -87,22 +86,10 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         return f"Stability Map: {done} of {count} points", done / max(count, 1)
 
     def _check(self, context):
-        self._target(context)
-
-    def _target(self, context):
-        """The target, if it is still what it was when it was first touched; raises ValueError if not."""
-        found = next((o for o in context.view_layer.objects if o.session_uid == self._uid), None)
-        if found is None:
-            raise ValueError(f'"{self._name}" is gone: the map of it was stopped')
-        if context.mode != "OBJECT" or found.mode != "OBJECT":
-            raise ValueError("The map was stopped, for Object Mode was left: start it again")
-        if found.matrix_world != self._map.surface.matrix:
-            raise ValueError(f'"{self._name}" was moved while it was touched: start again')
-        return found
+        self._map.surface.require_source(context)
 
     def _finish(self, context):
-        target = self._target(context)
-        self._map.require_same(target, context.evaluated_depsgraph_get())
+        target = self._map.surface.require_same(context)
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
         record = painted[patch_record.MAP_RECORD].to_dict()
@@ -124,6 +111,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")
         layout.label(text=self._about(context), translate=False)
-        draw_chosen(layout, self, "spacing")
+        fields = fields_of(context, self.target)
+        draw_chosen(layout, self, "spacing", fields=fields)
         layout.separator()
-        draw_all(layout, self)
+        draw_all(layout, self, fields)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches all over an object, step by step, with nothing changed in the scene: what a stability map shows."""
 
-import zlib
 from collections import Counter
 from statistics import median
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from ... import core
 from ..touch.detached_mesh import DetachedMesh
-from ..touch.evaluated_mesh import coordinates, evaluated_object, size_of
+from ..touch.evaluated_mesh import evaluated_object, size_of
 from ..touch.touch_object import LEAST_STEPS, require_fine, require_lengths
 from ..touch.units import length
 
@@ -159,12 +158,6 @@ class StabilityMap:
         self.height_std[number] = result.mean_height_std
         self.condition_number[number] = result.condition_number
         self.blind_share[number] = result.blind_share
-
-    def require_same(self, obj, depsgraph):
-        """Raises ValueError where the mesh has another shape than the one touched."""
-        evaluated, _, _ = evaluated_object(obj, depsgraph)
-        if zlib.crc32(coordinates(obj.name, evaluated)) != self.surface.checksum:
-            raise ValueError(f'"{obj.name}" was changed while it was touched: start again')
 
     def report(self):
         """What there is to say, a dict of plain values; medians are of the patches."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh to be touched many times, whatever happens to the scene meanwhile."""
+"""A mesh to be touched many times, whatever happens to the scene meanwhile; and what has happened."""
 
 import zlib
 
@@ -15,9 +15,9 @@ class DetachedMesh(PlacedMesh):
 
     All is in the directions of the world, from the object's origin: so rounding knows no place in the world.
 
+    name, matrix : of the object, its transform
     points, normals : (n, 3), of the vertices; has_face : (n,), which of them are in a face
     size : as in MeshSurface; spacing : how far apart neighboring float32 numbers are at most, in the mesh
-    checksum, matrix : another for another shape; the object's transform
     """
 
     def __init__(self, obj, depsgraph):
@@ -25,7 +25,9 @@ class DetachedMesh(PlacedMesh):
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
         co = coordinates(obj.name, evaluated)
         mesh = evaluated.data
-        self.checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
+        # No reference to the object: somebody may delete it.
+        self.name, self._uid = obj.name, obj.session_uid
+        self._checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
         self.size = size_of(evaluated, linear)
         farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
         self.spacing = farthest * np.finfo(np.float32).eps
@@ -43,6 +45,25 @@ class DetachedMesh(PlacedMesh):
             raise disabled(obj) from error
         rays = self._tree.ray_cast
         super().__init__(linear, np.zeros(3), lambda *ray: rays(*ray)[:2])
+
+    def require_source(self, context):
+        """The object that was taken, where it was. Raises ValueError, with a sentence, where it is not."""
+        found = next((o for o in context.view_layer.objects if o.session_uid == self._uid), None)
+        if found is None:
+            raise ValueError(f'"{self.name}" is gone, so touching was stopped')
+        if context.mode != "OBJECT" or found.mode != "OBJECT":
+            raise ValueError("Touching was stopped because Object Mode was left: start it again")
+        if found.matrix_world != self.matrix:
+            raise ValueError(f'"{self.name}" was moved while it was touched: start again')
+        return found
+
+    def require_same(self, context):
+        """The object, as `require_source` finds it, if it is of the same shape; raises ValueError if not."""
+        found = self.require_source(context)
+        evaluated, _, _ = evaluated_object(found, context.evaluated_depsgraph_get())
+        if zlib.crc32(coordinates(found.name, evaluated)) != self._checksum:
+            raise ValueError(f'"{self.name}" was changed while it was touched: start again')
+        return found
 
     @property
     def origin(self):

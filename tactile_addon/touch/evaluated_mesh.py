@@ -7,6 +7,7 @@ import zlib
 
 import numpy as np
 
+SHORT = 0.05  # Share of the reach within which a patch has its mesh, mostly.
 FARTHEST_VERTEX = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
 
 
@@ -44,7 +45,7 @@ def evaluated_object(obj, depsgraph):
     Raises ValueError, with a sentence, where it cannot be touched; but for disabled objects.
     """
     if obj.type != "MESH":
-        raise ValueError(f'"{obj.name}" is no mesh: select a mesh object, or convert this one')
+        raise ValueError(f'"{obj.name}" is not a mesh: select a mesh object, or convert this one')
     if is_disabled(obj):
         raise disabled(obj)
     evaluated = obj.evaluated_get(depsgraph)
@@ -55,7 +56,7 @@ def evaluated_object(obj, depsgraph):
     matrix = np.array(evaluated.matrix_world, dtype=float)
     require_invertible(obj.name, matrix[:3, :3])
     if not len(evaluated.data.polygons):
-        raise ValueError(f'"{obj.name}" has no faces to touch: give it some')
+        raise ValueError(f'"{obj.name}" has no faces to touch: add some')
     return evaluated, matrix[:3, :3], matrix[:3, 3]
 
 
@@ -67,7 +68,9 @@ def coordinates(name, evaluated):
     co, matrix = _coordinates(evaluated.data), np.array(evaluated.matrix_world, dtype=float)
     largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
     if not math.isfinite(largest):
-        raise ValueError(f'"{name}" has vertices at no finite place: delete them, or mend its modifiers')
+        raise ValueError(
+            f'"{name}" has vertices whose coordinates are not finite: delete them, or correct its modifiers'
+        )
     reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
     if not reach <= FARTHEST_VERTEX:  # NaN is nowhere
         raise ValueError(f'"{name}" reaches farther than {FARTHEST_VERTEX:g} from the origin: scale it down')
@@ -95,7 +98,7 @@ def require_invertible(name, linear):
     """Raises ValueError, with a sentence, where the linear part (3, 3) of a transform has no inverse."""
     lengths = np.linalg.norm(linear, axis=0)
     if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
-        raise ValueError(f'"{name}" is scaled to nothing in some direction: give it a scale other than 0')
+        raise ValueError(f'"{name}" has a scale of 0 in some direction: give it another scale')
 
 
 class PlacedMesh:
@@ -143,13 +146,12 @@ class PlacedMesh:
         return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
 
     def _deviation(self, point, normal, reach):
-        found = []
-        for sign in (-1.0, 1.0):
-            hit = self.ray_cast(point, [-sign * v for v in normal], reach)
-            if hit is not None:
-                found.append(sign * math.dist(point, hit[0]))
-        if found:
-            return min(found, key=abs)
+        ways = [(sign, [-sign * v for v in normal]) for sign in (-1.0, 1.0)]
+        for within in (SHORT * reach, reach):  # A long ray that meets nothing is dear.
+            hits = [(sign, self.ray_cast(point, way, within)) for sign, way in ways]
+            found = [sign * math.dist(point, hit[0]) for sign, hit in hits if hit is not None]
+            if found:
+                return min(found, key=abs)
         foot = self._to_world(self._nearest(self._to_local(point))[0])
         return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
 

@@ -6,7 +6,7 @@ import math
 from contextlib import contextmanager
 
 from bpy.app.translations import pgettext_iface as iface
-from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
+from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 from bpy.types import Object
 
 from ... import core
@@ -15,27 +15,28 @@ METHODS = [
     (
         "bayes",
         "Bayesian",
-        "All coefficients and the frame at once, with what the contacts leave open: the most accurate",
+        "Fit all coefficients and the frame together, and say what the contacts leave open; the "
+        "most accurate",
     ),
     (
         "tagc",
         "Total Curvature",
-        "The paper's fit: close to the contacts, with as little folding as possible",
+        "The paper's fit: stay close to the contacts and fold as little as possible",
     ),
     (
         "quadratic-variation",
         "Quadratic Variation",
-        "Close to the contacts, with as little bending as possible",
+        "Stay close to the contacts and bend as little as possible",
     ),
     (
         "least-squares",
         "Least Squares",
-        "Closest to the contacts, whatever the surface does between the curves",
+        "Stay closest to the contacts, whatever the surface does between the curves",
     ),
 ]
 SOLVERS = [
     ("fast", "Fast", "Newton's method"),
-    ("descent", "Steepest Descent", "The paper's minimization, slower, to compare with"),
+    ("descent", "Steepest Descent", "The paper's minimization: slower, for comparison"),
 ]
 AUTO = {  # literals, to be translated
     "extent": "Extent (Auto)",
@@ -75,6 +76,29 @@ def changed(settings, context):
         context.view_layer.update()
 
 
+KEPT = {"update": changed, "override": OVERRIDABLE}  # what a probe's properties have beside an operator's
+UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
+TARGET = StringProperty(
+    name="Target",
+    description="Name of the mesh object to touch; empty for the active object",
+    options=UNSAVED,
+)
+LOCATION = FloatVectorProperty(
+    name="Location",
+    subtype="TRANSLATION",
+    description="Where to touch; if not set, the 3D cursor",
+    options=UNSAVED,
+)
+
+
+def length_property(name, description, **more):
+    """A length of 0 or more, in units of the scene."""
+    return FloatProperty(name=name, description=description, subtype="DISTANCE", soft_min=0.0, **more)
+
+
+NOISE = length_property("Noise", "Standard deviation of the simulated sensor", precision=4, **KEPT)
+
+
 class FitSettings:
     """Mixed into operators and property groups."""
 
@@ -82,35 +106,31 @@ class FitSettings:
         name="Method",
         description="How to fit the patch",
         items=METHODS,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     degree: IntProperty(
         name="Degree",
-        description="Of the polynomial that describes the patch, 2 to 6; 0 for the least that says what "
-        "the contacts show",
+        description="Degree of the polynomial, 2 to 6; 0 chooses the lowest that describes what the "
+        "contacts show",
         default=0,
         min=0,
         max=6,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     weight: FloatProperty(
         name="Weight",
-        description="Of the contacts against the smoothness, in the two fits by curvature; 0 for what suits "
-        "each of them",
+        description="Weight of the contacts against smoothness in the two fits by curvature; 0 "
+        "chooses one for the method",
         default=0.0,
         soft_min=0.0,
         soft_max=1e5,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     solver: EnumProperty(
         name="Solver",
         description="How to minimize the curvature",
         items=SOLVERS,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
 
 
@@ -119,64 +139,44 @@ class TouchSettings(FitSettings):
 
     plane_count: IntProperty(
         name="Planes",
-        description="How many sampling planes to feel along",
+        description="Number of sampling planes to feel along",
         default=3,
         min=3,
         max=MOST_PLANES,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     azimuths: FloatVectorProperty(
         name="Azimuths",
-        description="Directions of the planes about the normal",
+        description="Directions of the sampling planes, as angles about the normal",
         size=MOST_PLANES,
         unit="ROTATION",
         default=[math.radians(a) for a in (0, 60, 120, 30, 90, 150)],
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
     tilts: FloatVectorProperty(
         name="Tilts",
-        description="How far the planes lean from upright",
+        description="Angles by which the sampling planes lean away from the normal",
         size=MOST_PLANES,
         unit="ROTATION",
         soft_min=-STEEPEST,
         soft_max=STEEPEST,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
-    extent: FloatProperty(
-        name="Extent",
-        description="How far to feel to either side of the point; 0 for as far as a patch can be trusted. "
-        "In a map 0 is an eighth of the object's size",
-        subtype="DISTANCE",
-        soft_min=0.0,
-        update=changed,
-        override=OVERRIDABLE,
+    extent: length_property(
+        "Extent",
+        "Distance to feel on either side of the point; 0 goes as far as a patch can be trusted, in "
+        "a map an eighth of the object's size",
+        **KEPT,
     )
-    step: FloatProperty(
-        name="Step",
-        description="Distance between contacts; 0 for so many that more would tell little",
-        subtype="DISTANCE",
-        soft_min=0.0,
-        update=changed,
-        override=OVERRIDABLE,
+    step: length_property(
+        "Step", "Distance between contacts; 0 chooses it so that more contacts would add little", **KEPT
     )
-    noise: FloatProperty(
-        name="Noise",
-        description="Standard deviation of the simulated sensor",
-        subtype="DISTANCE",
-        soft_min=0.0,
-        precision=4,
-        update=changed,
-        override=OVERRIDABLE,
-    )
+    noise: NOISE
     seed: IntProperty(
         name="Seed",
-        description="Of the noise: the same seed gives the same contacts",
+        description="Seed of the noise: the same seed gives the same contacts",
         min=0,
-        update=changed,
-        override=OVERRIDABLE,
+        **KEPT,
     )
 
 
@@ -228,13 +228,13 @@ def draw_solver(layout, settings, found=None, fields=None):
         layout.prop(settings, "weight")
 
 
-def draw_all(layout, settings):
-    """Everything, with nothing folded away, as Adjust Last Operation has it."""
-    draw_chosen(layout, settings, "extent")
+def draw_all(layout, settings, fields=None):
+    """Everything, with nothing folded away, as Adjust Last Operation has it; `fields` as in draw_chosen."""
+    draw_chosen(layout, settings, "extent", fields=fields)
     layout.prop(settings, "plane_count")
     for i in range(settings.plane_count):
         column = layout.column(align=True)
         column.prop(settings, "azimuths", index=i, text=f"Azimuth {i + 1}")
         column.prop(settings, "tilts", index=i, text="Tilt")
-    draw_sensor(layout, settings)
+    draw_sensor(layout, settings, fields=fields)
     draw_solver(layout, settings)

@@ -15,6 +15,7 @@ def require_single(result):
     reach = result.radius + float(np.abs(result.frame.origin).max())
     if not (result.radius >= SMALLEST_SINGLE and reach <= LARGEST_SINGLE):
         raise ValueError(
-            f"The patch has a radius of {result.radius:.3g} and reaches to {reach:.3g}, and Blender's "
-            f"numbers are good from {SMALLEST_SINGLE:g} to {LARGEST_SINGLE:g}: take another unit of length"
+            f"The patch has a radius of {result.radius:.3g} and reaches to {reach:.3g}, and "
+            f"Blender's numbers range from {SMALLEST_SINGLE:g} to {LARGEST_SINGLE:g}: use another "
+            "unit of length"
         )

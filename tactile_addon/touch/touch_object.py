@@ -28,7 +28,7 @@ AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where n
 FINEST_STEP = 1.0 / 128.0  # Share of it: the step where neither is given.
 LEAST_STEPS = 12  # Least steps of a half contour, where no step is given.
 LARGE_FACET = 4.0  # Steps: the finger feels facets that are longer, and creases between them.
-MOST_ROUNDING = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
+STEP_ROUNDING = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +115,8 @@ def _explored(surface, point, outward, planes, **given):
         if given["noise"] or facet < LARGE_FACET * step:
             raise
         raise ValueError(
-            f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier, if the mesh "
-            "stands for a smooth shape"
+            f"{error}. The facets there are {length(facet)} long: add a Subdivision modifier if the "
+            "mesh stands for a smooth shape"
         ) from error
 
 
@@ -164,16 +164,16 @@ def require_lengths(name, size, extent, step, noise):
         )
     if extent > size:
         raise ValueError(
-            f'The extent {length(extent)} is longer than "{name}" ({length(size)}): take a shorter one'
+            f'The extent {length(extent)} is longer than "{name}" ({length(size)}): use a shorter one'
         )
     longest = extent or FARTHEST_SHARE * size
     if step > longest:
         raise ValueError(
-            f"The step {length(step)} is longer than the extent {length(longest)}: take a shorter one"
+            f"The step {length(step)} is longer than the extent {length(longest)}: use a shorter one"
         )
     if noise > longest:
         raise ValueError(
-            f"The noise {length(noise)} is larger than the extent {length(longest)}: take a smaller one"
+            f"The noise {length(noise)} is larger than the extent {length(longest)}: use a smaller one"
         )
 
 
@@ -194,9 +194,10 @@ def _reference_point(name, surface, location, extent, step):
 
 def require_fine(spacing, step):
     """Raises ValueError where coordinates are too coarse for the step."""
-    if spacing > MOST_ROUNDING * step:
+    if spacing > STEP_ROUNDING * step:
         raise ValueError(
-            f"Coordinates at the point are {length(spacing)} apart in single precision, too coarse "
+            f"Neighboring coordinates at the point are {length(spacing)} apart in single precision, "
+            "too coarse "
             f"for a step of {length(step)}: move the object nearer to the origin of the world or of its own "
             "mesh"
         )

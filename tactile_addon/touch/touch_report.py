@@ -9,7 +9,7 @@ from ... import core
 
 CURVATURES = ("k1", "k2", "gaussian_curvature", "mean_curvature")
 ENDS = {
-    core.UNEXPLAINED: "where the patch could not be trusted any more",
+    core.UNEXPLAINED: "where the patch could no longer be trusted",
     core.EXTENT: "at the greatest extent allowed",
     core.NO_CONTACT: "at an edge",
     core.CREASE: "at a crease",
@@ -23,7 +23,7 @@ def ends(contours):
     counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
     if len(counts) == 1:
         return f" All half curves end {ENDS[counts[0][0]]}."
-    return f" Of {2 * len(contours)} half curves {_counted(counts)}."
+    return f" {_counted(counts, 2 * len(contours))}."
 
 
 def early_ends(contours):
@@ -32,12 +32,14 @@ def early_ends(contours):
     del counts[core.EXTENT]
     if not counts:
         return ""
-    return f" Of {2 * len(contours)} half curves {_counted(counts.most_common())}, before the extent."
+    return f" {_counted(counts.most_common(), 2 * len(contours))}, before the extent."
 
 
-def _counted(counts):
+def _counted(counts, total):
     (most, first), *others = [(count, ENDS[stop]) for stop, count in counts]
-    return ", ".join([f"{most} end {first}", *(f"{count} {end}" for count, end in others)])
+    return ", ".join(
+        [f"{most} of {total} half curves end {first}", *(f"{count} {end}" for count, end in others)]
+    )
 
 
 def judgment(result, mean, ended, vertices=FEW_VERTICES):
@@ -50,8 +52,8 @@ def judgment(result, mean, ended, vertices=FEW_VERTICES):
     if vertices >= FEW_VERTICES:
         return found
     return found | {
-        "message": f"The patch lies on facets (vertices of the mesh over it: {vertices}): add a Subdivision "
-        f"modifier, if the mesh stands for a smooth shape. {found['message']}"
+        "message": f"The patch lies on coarse facets (mesh vertices over it: {vertices}): add a "
+        f"Subdivision modifier if the mesh stands for a smooth shape. {found['message']}"
     }
 
 
@@ -78,7 +80,7 @@ def measures(result):
 
 def reconstruction_report(result, ended=""):
     """The report of a fit; `ended` is added to its message. Nothing of a mesh is known yet."""
-    d1, d2, n = result.frame.axes.T.tolist()
+    (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
         **judgment(result, 0.0, ended),
         "ended": ended,
@@ -86,11 +88,11 @@ def reconstruction_report(result, ended=""):
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
         "k1": result.patch.k1,
         "k2": result.patch.k2,
-        "gaussian_curvature": float(result.patch.gaussian_curvature(0.0, 0.0)),
-        "mean_curvature": float(result.patch.mean_curvature(0.0, 0.0)),
+        "gaussian_curvature": float(at_point.gaussian_curvature),
+        "mean_curvature": float(at_point.mean_curvature),
         **{f"{name}_std": getattr(result, f"{name}_std") for name in CURVATURES},
-        "shape_index": float(result.patch.shape_index(0.0, 0.0)),
-        "curvedness": float(result.patch.curvedness(0.0, 0.0)),
+        "shape_index": float(at_point.shape_index),
+        "curvedness": float(at_point.curvedness),
         "residual": 0.0 if result.residual is None else result.radius * result.residual.size,
         "coefficients": result.patch.coefficients.tolist(),
         "radius": result.radius,

@@ -71,7 +71,7 @@ def added_planes(report, unit):
     """What more planes have brought, in the unit."""
     added = report["added_planes"]
     if not added:
-        return "No further plane would help much"
+        return "One more plane would not help much"
     before, after = (say(added[i][key], 1, unit) for i, key in ((0, "height_std_before"), (-1, "height_std")))
     azimuths = ", ".join(f"{plane['azimuth']:.0f}°" for plane in added)
     return f"Planes added at {azimuths}: ± {before} has become ± {after}"

@@ -96,6 +96,6 @@ def _touched_by_map(obj, space):
 
 def _require_touchable(obj, matrix):
     if obj.type != "MESH":
-        raise ValueError(f'"{obj.name}" is no mesh: convert it to one first')
+        raise ValueError(f'"{obj.name}" is not a mesh: convert it to one first')
     if matrix != obj.matrix_world:
         raise ValueError(f'This is an instance of "{obj.name}": make it real to touch it')

@@ -10,6 +10,7 @@ from mathutils import Matrix, Vector
 from mathutils.geometry import intersect_line_plane
 
 from ..probes import anchor, probe, touch_again
+from ..touch import units
 from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import plane_axes
@@ -40,7 +41,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         items=[
             (DRAG_TURN, "Turn", "Turn a sampling plane about the normal"),
             (DRAG_TILT, "Tilt", "Lean a sampling plane to the side"),
-            (DRAG_EXTENT, "Extent", "Feel farther or less far"),
+            (DRAG_EXTENT, "Extent", "Change how far to feel"),
             (POINT, "Point", "Slide over the surface"),
         ],
     )
@@ -164,11 +165,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if self.what == POINT:
             words = "Point on " + probe.probe_of(context.object).tactile_probe.target.name
         elif self.what == DRAG_EXTENT:
-            settings = context.scene.unit_settings
-            length = bpy.utils.units.to_string(
-                settings.system, "LENGTH", self._value * settings.scale_length, precision=4
-            )
-            words = f"Extent {length}"
+            words = f"Extent {units.length(self._value)}"
         else:
             angle = "Azimuth" if self.what == DRAG_TURN else "Tilt"
             words = f"{angle} {self.plane + 1}: {math.degrees(self._value):.1f}°"

@@ -3,15 +3,16 @@
 """Pick Reference Point: hover to see how the surface lies, click to have a probe and a patch there."""
 
 import bpy
-from bpy.props import BoolProperty, FloatVectorProperty, StringProperty
+from bpy.props import BoolProperty, FloatVectorProperty
 
 from ..probes import anchor, probe, touch_again
-from ..probes.operators import make_active, report_error, target_object
+from ..probes.number_fields import dragged
+from ..probes.operators import fields_of, is_in_object_mode, make_active, report_error, target_object
 from ..scene import patch_record
 from ..scene.viewports import show_colors
 from ..stability_map.map_object import inputs_of
 from ..touch import units
-from ..touch.settings import NAMES, TouchSettings, draw_all, touch_arguments
+from ..touch.settings import LOCATION, NAMES, TARGET, UNSAVED, TouchSettings, draw_all, touch_arguments
 from ..touch.touch_object import touch
 from ..touch.wording import sentence, verdict
 from . import overlay
@@ -19,7 +20,6 @@ from .below import large_meshes, names_below, point_below, read
 from .mouse import draw_hints
 
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD", "MOUSEROTATE", "MOUSESMARTZOOM", "HOME")
-UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 HINTS = (
     ("MOUSE_LMB", "Touch Here"),
     ("MOUSE_RMB", "Cancel"),
@@ -28,6 +28,7 @@ HINTS = (
 )
 
 
+@dragged
 class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     """Click on a mesh: a probe there feels the surface and keeps a patch of it up to date"""
 
@@ -35,29 +36,19 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     bl_label = "Pick Reference Point"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    target: StringProperty(
-        name="Target",
-        description="Name of the mesh object to touch; empty for the active object",
-        options=UNSAVED,
-    )
-    location: FloatVectorProperty(
-        name="Location",
-        subtype="TRANSLATION",
-        description="Where to touch; the 3D cursor where it is not set",
-        options=UNSAVED,
-    )
+    target: TARGET
+    location: LOCATION
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="To the side to touch from; the surface's own normal where it is not set",
+        description="The direction to touch from; if not set, the surface's own normal",
         options=UNSAVED,
     )
     new: BoolProperty(
         name="New Probe",
-        description="Make another probe instead of moving the active one",
+        description="Make a new probe instead of moving the active one",
         options=UNSAVED,
     )
-
     at_once: BoolProperty(
         name="At Once",
         description="Touch where the mouse is, without asking for a click",
@@ -65,20 +56,17 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     )
     parent: BoolProperty(
         name="Move With Target",
-        description="Make a new probe a child of the object touched, so that it goes where that goes",
+        description="Make a new probe a child of the touched object, so that it moves with the object",
         default=True,
     )
 
     @classmethod
     def poll(cls, context):
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Points are picked in Object Mode: leave this mode first")
-            return False
-        return True
+        return is_in_object_mode(cls, context, "Points are picked")
 
     def invoke(self, context, event):
         if context.area is None or context.area.type != "VIEW_3D":
-            self.report({"ERROR"}, "Points are picked in a 3D viewport: start it there")
+            self.report({"ERROR"}, "Points are picked in a 3D viewport: start the pick there")
             return {"CANCELLED"}
         self._area, self._unread = context.area, large_meshes(context)
         for name in NAMES:  # those of the last pick are remembered, but suited another object
@@ -187,7 +175,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         layout.prop(self, "target")
         layout.prop(self, "location")
         layout.prop(self, "parent")
-        draw_all(layout, self)
+        draw_all(layout, self, fields_of(context, self.target))
 
     def _inherit(self, context):
         """The probe that is to be moved, if any; what is not set becomes what it has, or the active map.

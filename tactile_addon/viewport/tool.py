@@ -11,7 +11,7 @@ class TactileTool(bpy.types.WorkSpaceTool):
     bl_space_type, bl_context_mode = "VIEW_3D", "OBJECT"
     bl_idname = "tactile.tool"
     bl_label = "Tactile Probe"
-    bl_description = "Click on a mesh to have a probe there, or the active probe moved there"
+    bl_description = "Click on a mesh to place a probe there or to move the active probe there"
     bl_icon = "ops.paint.eyedropper_add"
     bl_keymap = (
         (

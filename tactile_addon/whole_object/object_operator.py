@@ -3,20 +3,20 @@
 """Touch All Over: touches that grow over an object by themselves; in slices in a window."""
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import FloatVectorProperty, IntProperty
 
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import make_active, report_error, target_object
+from ..probes.number_fields import dragged
+from ..probes.operators import fields_of, is_in_object_mode, make_active, report_error, target_object
 from ..scene import patch_record
-from ..touch.settings import draw_chosen
+from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
 from . import whole_mesh
 from .object_report import object_summary
 from .object_touches import ObjectTouches
 
-UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 
-
+@dragged
 class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     """Touch an object all over, from one point on, and join the patches to one surface"""
 
@@ -24,47 +24,30 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     bl_label = "Touch All Over"
     bl_options = {"UNDO", "PRESET"}
 
-    target: StringProperty(
-        name="Target",
-        description="Name of the mesh object to touch; empty for the active object",
-        options=UNSAVED,
-    )
+    target: TARGET
     location: FloatVectorProperty(
         name="Location",
         subtype="TRANSLATION",
-        description="Where to begin; the probe's point, or any place that works, where it is not set",
+        description="Where to begin; if not set, the probe's point or any place that works",
         options=UNSAVED,
     )
-    tolerance: FloatProperty(
-        name="Tolerance",
-        description="How well the height of each patch is to be known; 0 for 1/500 of the object's size",
-        subtype="DISTANCE",
-        soft_min=0.0,
+    tolerance: length_property(
+        "Tolerance",
+        "Standard deviation to reach for the height of each patch; 0 uses 1/500 of the object's size",
     )
-    noise: FloatProperty(
-        name="Noise",
-        description="Standard deviation of the simulated sensor",
-        subtype="DISTANCE",
-        soft_min=0.0,
+    noise: NOISE
+    seed: IntProperty(
+        name="Seed", description="Seed of the noise and of the place to begin", default=0, min=0
     )
-    seed: IntProperty(name="Seed", description="Of the noise and of the place to begin", default=0, min=0)
     most: IntProperty(
         name="Most Touches",
-        description="When to end at the latest",
+        description="Number of touches after which to stop",
         default=1000,
         min=1,
         soft_max=10_000,
     )
-    edge: FloatProperty(
-        name="Edge Length",
-        description="Of the surface's triangles; 0 for what its curvature asks",
-        subtype="DISTANCE",
-        soft_min=0.0,
-    )
-    progress: BoolProperty(
-        name="Progress",
-        description="Print progress to stderr where there is no window to show it",
-        options={"HIDDEN", *UNSAVED},
+    edge: length_property(
+        "Edge Length", "Length of the edges of the surface's triangles; 0 chooses it by the curvature"
     )
 
     stop = "Stop Touching and Keep"
@@ -73,10 +56,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Objects are touched in Object Mode: leave this mode first")
-            return False
-        return True
+        return is_in_object_mode(cls, context, "Objects are touched")
 
     def invoke(self, context, event):
         if bpy.app.background:
@@ -89,7 +69,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
     def _go_on(self, context):
-        self._growing = whole_mesh.GrowingPatches(context.scene, self._name, self._touches.surface.origin)
+        self._growing = whole_mesh.GrowingPatches(context.scene, self._touches.surface)
         return super()._go_on(context)
 
     def _begin(self, context):
@@ -97,8 +77,6 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         location = list(self.location) if self.properties.is_property_set("location") else None
         if location is None and found is not None and found.tactile_probe.target == target:
             location = list(found.matrix_world.translation)
-        # No reference to the target: whatever happens to the scene, the touches go on in a snapshot of it.
-        self._name = target.name
         self._touches = ObjectTouches(
             target,
             context.evaluated_depsgraph_get(),
@@ -120,8 +98,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         return self._touches.words, self._touches.share
 
     def _check(self, context):
-        if context.mode != "OBJECT":
-            raise ValueError("The touching was stopped, for Object Mode was left: start it again")
+        self._touches.surface.require_source(context)
 
     def _stopped(self, context):
         """Esc joins what there is so far; once more, and nothing is kept."""
@@ -139,7 +116,8 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
             self._growing = None
 
     def _finish(self, context):
-        made = whole_mesh.insert(context, self._name, self._touches)
+        target = self._touches.surface.require_same(context)
+        made = whole_mesh.insert(context.scene, target.name, self._touches.whole, self._touches.report())
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
         self.report({"INFO"} if record["is_closed"] else {"WARNING"}, object_summary(record))
@@ -149,8 +127,9 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")
-        draw_chosen(layout, self, "tolerance")
-        draw_chosen(layout, self, "edge")
+        fields = fields_of(context, self.target)
+        draw_chosen(layout, self, "tolerance", fields=fields)
+        draw_chosen(layout, self, "edge", fields=fields)
         layout.prop(self, "most")
-        layout.prop(self, "noise")
+        layout.prop(self, fields["noise"])
         layout.prop(self, "seed")

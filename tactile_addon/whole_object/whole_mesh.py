@@ -16,10 +16,11 @@ RINGS, SPOKES = (0.5, 1.0), 24  # of a patch while it is one of many
 class GrowingPatches:
     """The patches that were found so far, as one object, until it is removed."""
 
-    def __init__(self, scene, name, origin):
-        self._mesh = bpy.data.meshes.new(f"{name} Touches")
-        obj = bpy.data.objects.new(self._mesh.name, self._mesh)
-        obj.show_in_front, obj.matrix_world = True, Matrix.Translation(origin)
+    def __init__(self, scene, surface):
+        """`surface` is the DetachedMesh that is touched."""
+        mesh = bpy.data.meshes.new(f"{surface.name} Touches")
+        obj = bpy.data.objects.new(mesh.name, mesh)
+        obj.show_in_front, obj.matrix_world = True, Matrix.Translation(surface.origin)
         scene.collection.objects.link(obj)  # in none of its own, which might be left empty
         obj.data.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
         self._uid, self._patches = obj.session_uid, []
@@ -67,24 +68,25 @@ def _fan():
     )
 
 
-def insert(context, name, touches):
-    """Adds the surface that `touches`, an ObjectTouches, have found to the scene; returns the object."""
+def insert(scene, name, whole, report):
+    """Adds the surface of a WholeSurface, of what has that name, to the scene; returns the object."""
     mesh = bpy.data.meshes.new(f"{name} Touched")
     obj = bpy.data.objects.new(mesh.name, mesh)
-    obj.matrix_world, obj.show_in_front = Matrix.Translation(touches.surface.origin), True
-    patch_object.collection(context.scene).objects.link(obj)
+    obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin), True
+    patch_object.collection(scene).objects.link(obj)
     mesh.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
-    found = touches.mesh
+    found = whole.mesh
     attributes = [
-        *((key, "FLOAT", values) for key, values in touches.curvatures.items()),
+        *((key, "FLOAT", values) for key, values in whole.curvatures.items()),
         ("height_std", "FLOAT", found.std),
-        ("deviation", "FLOAT", touches.deviation),
+        ("deviation", "FLOAT", whole.deviation),
         ("patch", "INT", found.patch.astype(np.int32)),
         (patch_record.COLOR, "FLOAT_COLOR", np.ones((len(found.vertices), 4))),
     ]
     fill(mesh, found.vertices, found.triangles, attributes)
     mesh.shade_smooth()
-    obj[patch_record.ATLAS_RECORD] = touches.report() | {"source": name, "object": obj.name}
+    obj[patch_record.ATLAS_RECORD] = report | {"source": name, "object": obj.name}
+    obj[patch_record.GRAPH] = whole.graph
     patch_object.recolor(obj)
     show_colors()
     return obj

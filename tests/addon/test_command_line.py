@@ -55,6 +55,11 @@ def test_a_whole_object_from_a_file(command, files):
     report = json.loads(line)
     assert report["is_closed"]
     assert report["deviation_mean"] < 0.01
+    graph = report["graph"]
+    assert len(graph["nodes"]) == report["patches"]
+    assert len(graph["edges"]) == report["edges"]
+    origins = np.array([node["frame"]["origin"] for node in graph["nodes"]])
+    assert np.linalg.norm(origins, axis=1) == pytest.approx(2.0, abs=0.01)
     assert b"property float height_std" in output.read_bytes()[:2000]
     code, out, _ = command("object", files / "ball.ply", "--tolerance", "0.01")
     assert code == 0
@@ -151,7 +156,7 @@ def test_strokes_are_fitted_around_a_place(command, empty, tmp_path):
     assert re.search(r"\b\d{2,3} on 0 curves and 1 strokes", out)
     code, _, err = command("fit", path, *place, "--point", "0", "0", "2")
     assert code == 2
-    assert "--location: wanted it or --point, got both" in err
+    assert "--location: expected this or --point, got both" in err
 
 
 def test_the_open_scene_is_touched_without_a_file(command, files):
@@ -170,7 +175,7 @@ def test_the_open_scene_is_touched_without_a_file(command, files):
     ("words", "sentence"),
     [
         (["missing.ply", *PLACE], 'there is no file "missing.ply"'),
-        (["{folder}/ball.txt", *PLACE], "wanted a .blend, .ply, .stl or .obj file"),
+        (["{folder}/ball.txt", *PLACE], "expected a .blend, .ply, .stl or .obj file"),
         (["{folder}/cut.ply", *PLACE], ""),
         (["{folder}/head.ply", *PLACE], "no mesh could be read"),
         (["{folder}/cut.blend", *PLACE], ""),
@@ -205,15 +210,15 @@ def test_what_cannot_be_done_exits_with_1_and_a_sentence(command, files, words, 
         (["reconstruct", "--degree", "9"], "--degree"),
         (["reconstruct", "--method", "magic"], "--method"),
         (["reconstruct", "--location", "1", "2"], "--location"),
-        (["reconstruct", "--azimuths", "0", "60"], "--azimuths: wanted three to six, got 2"),
-        (["fit", "a.csv", "--radius", "-1"], "--radius: wanted a finite number of 0 or more, got -1"),
-        (["fit", "a.csv", "--noise", "inf"], "--noise: wanted a finite number of 0 or more, got inf"),
+        (["reconstruct", "--azimuths", "0", "60"], "--azimuths: expected three to six, got 2"),
+        (["fit", "a.csv", "--radius", "-1"], "--radius: expected a finite number of 0 or more, got -1"),
+        (["fit", "a.csv", "--noise", "inf"], "--noise: expected a finite number of 0 or more, got inf"),
         (
             ["fit", "a.csv", "--normal-std", "nan"],
-            "--normal-std: wanted a finite number of 0",
+            "--normal-std: expected a finite number of 0",
         ),
-        (["reconstruct", "--seed", "-1"], "--seed: wanted a finite number of 0 or more, got -1"),
-        (["reconstruct", "--tilts", "0", "60"], "--tilts: wanted as many as there are planes"),
+        (["reconstruct", "--seed", "-1"], "--seed: expected a finite number of 0 or more, got -1"),
+        (["reconstruct", "--tilts", "0", "60"], "--tilts: expected as many as there are planes"),
         (["reconstruct", "--nonsense"], "--nonsense"),
         (["map", "--spacing", "wide"], "--spacing"),
         (["map", "--location", "1", "2", "3"], "--location"),

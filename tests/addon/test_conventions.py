@@ -60,7 +60,7 @@ def test_what_cannot_run_says_why(empty):
         assert refused(name).startswith("Select a ")
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32)
     empty.ops.tactile.pick(location=(0.0, 0.0, 1.0), plane_count=6)
-    assert refused("add_plane") == "Six planes are the most: remove one first"
+    assert refused("add_plane") == "A patch has six planes at most: remove one first"
     for _ in range(3):
         empty.ops.tactile.remove_plane()
     assert refused("remove_plane") == "A patch needs three planes"

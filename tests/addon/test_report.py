@@ -129,7 +129,7 @@ def test_the_page_of_a_whole_object(command, files, tmp_path):
 def test_what_cannot_be_reported_is_said(empty, command, files, tmp_path):
     code, _, err = command("reconstruct", files / "ball.ply", *PLACE, "--report", tmp_path / "r.txt")
     assert code == 2
-    assert "--report: wanted a file .html" in err
+    assert "--report: expected a file .html" in err
     report = tmp_path / "nowhere" / "r.html"
     assert command("reconstruct", files / "ball.ply", *PLACE, "--report", report)[0] == 1
     empty.ops.wm.read_homefile(use_empty=True)

@@ -116,7 +116,7 @@ def test_a_changed_option_version_or_object_is_refused(command, tmp_path):
     before = rows_of(tmp_path / "set")
     code, _, error = command(*words, "--extent", "5%")
     assert code == 2
-    assert error.startswith("cluster: extent: this data set was begun with auto, and now it is 5%: take that")
+    assert error.startswith("cluster: extent: this data set was begun with auto, and it is now 5%: take that")
     manifest = tmp_path / "set" / "manifest.json"
     kept = manifest.read_text()
     manifest.write_text(kept.replace('"scipy": "', '"scipy": "0.'))
@@ -124,7 +124,7 @@ def test_a_changed_option_version_or_object_is_refused(command, tmp_path):
     assert code == 2 and "scipy: this data set was begun with 0." in error
     manifest.write_text(kept[:40])
     code, _, error = command(*words)
-    assert code == 2 and "is no manifest of a data set: take another folder" in error
+    assert code == 2 and "is not the manifest of a data set: use another folder" in error
     manifest.write_text(kept)
     write_ball(ball, (1.0, 1.0, 1.1))
     code, _, error = command(*words)
@@ -148,16 +148,19 @@ def test_the_same_object_twice_is_touched_once(command, tmp_path):
     ("words", "sentence"),
     [
         (["nowhere.ply"], 'objects: there is no file or folder "nowhere.ply"'),
-        ([__file__], "objects: wanted .ply, .stl, .obj, .blend files, folders or .txt lists, got"),
-        ([".ci"], "objects: wanted .ply, .stl, .obj, .blend files, got folders or lists without any"),
-        (["pebble", "--seed", "-1"], "seed: wanted a number of 0 or more, got -1"),
-        (["pebble", "--touches", "0"], "wanted a number of 1 or more, got 0"),
-        (["pebble", "--limit", "nan"], "wanted a number above 0, got nan"),
-        (["pebble", "--noise", "-1"], "wanted a length, as 0.002, or a share of the object, as 1.5%, got -1"),
-        (["pebble", "--tilts", "5"], "tilts: wanted as many as there are planes, 3, got 1"),
-        (["pebble", "--tilts", "0", "0", "95"], "tilt: wanted less than 90 degrees, got 95"),
+        ([__file__], "objects: expected .ply, .stl, .obj, .blend files, folders or .txt lists, got"),
+        ([".ci"], "objects: expected .ply, .stl, .obj, .blend files, got folders or lists without any"),
+        (["pebble", "--seed", "-1"], "seed: expected a number of 0 or more, got -1"),
+        (["pebble", "--touches", "0"], "expected a number of 1 or more, got 0"),
+        (["pebble", "--limit", "nan"], "expected a number above 0, got nan"),
+        (
+            ["pebble", "--noise", "-1"],
+            "expected a length such as 0.002, or a share of the object such as 1.5%, got -1",
+        ),
+        (["pebble", "--tilts", "5"], "tilts: expected as many as there are planes, 3, got 1"),
+        (["pebble", "--tilts", "0", "0", "95"], "tilt: expected less than 90 degrees, got 95"),
         (["pebble", "--azimuths", "0", "60"], "three curves are needed, got 2: add a sampling plane"),
-        (["pebble", "--azimuths", "0", "0.5", "60"], "curves 1 and 2 run in one direction"),
+        (["pebble", "--azimuths", "0", "0.5", "60"], "curves 1 and 2 run in the same direction"),
     ],
 )
 def test_wrong_words_are_refused_before_anything_is_made(command, objects, tmp_path, words, sentence):

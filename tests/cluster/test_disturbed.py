@@ -109,23 +109,23 @@ def free_port():
         return found.getsockname()[1]
 
 
+def dask(name, *words, path=ROOT):
+    """Dask's scheduler, or a worker, as a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", f"distributed.cli.dask_{name}", *words, "--dashboard-address", "127.0.0.1:0"],
+        env=os.environ | {"PYTHONPATH": str(path)},
+        cwd=path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
 @contextmanager
-def scheduler(port):
-    """A scheduler with one worker, as processes of their own."""
-    address, environment = f"tcp://127.0.0.1:{port}", os.environ | {"PYTHONPATH": str(ROOT)}
-    words = [
-        ["dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--dashboard-address", "127.0.0.1:0"],
-        ["dask_worker", address, "--nthreads", "1", "--dashboard-address", "127.0.0.1:0"],
-    ]
-    running = [
-        subprocess.Popen(
-            [sys.executable, "-m", f"distributed.cli.{name}", *more],
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        for name, *more in words
-    ]
+def scheduler(port, path=ROOT, workers=1):
+    """The address of a scheduler that has workers, and what ends them all."""
+    address = f"tcp://127.0.0.1:{port}"
+    running = [dask("scheduler", "--host", "127.0.0.1", "--port", str(port), path=path)]
+    running += [dask("worker", address, "--nthreads", "1", path=path) for _ in range(workers)]
 
     def end():
         for process in running:
@@ -159,6 +159,26 @@ def test_no_scheduler_there_is_said(command, objects, tmp_path, monkeypatch):
     address = f"tcp://127.0.0.1:{free_port()}"
     code, _, error = command(objects, *FEW, "--output", tmp_path, scheduler=address)
     assert code == 1 and f'no scheduler answers at "{address}"' in error
+
+
+def test_a_scheduler_without_the_checkout_is_said(command, objects, tmp_path):
+    with scheduler(free_port(), path=tmp_path) as (address, _):
+        code, _, error = command(objects, *FEW, "--output", tmp_path / "set", scheduler=address)
+    assert code == 1 and "Traceback" not in error
+    assert "cluster: the scheduler or a worker cannot take orders (" in error
+    assert error.endswith("start them in the same environment, with this checkout on their PYTHONPATH\n")
+
+
+def test_workers_may_come_later(objects, plain, tmp_path):
+    with scheduler(free_port(), workers=0) as (address, _):
+        run = started(objects, *FEW, "--output", tmp_path, "--scheduler", address)
+        assert run.stderr.readline() == "The scheduler has no workers yet: waiting for them\n"
+        worker = dask("worker", address, "--nthreads", "1")
+        _, error = run.communicate(timeout=60)
+        worker.kill()
+        worker.wait()
+    assert run.returncode == 0, error
+    assert rows_of(tmp_path) == rows_of(plain)
 
 
 def test_a_scheduler_that_stays_away_ends_the_run(command, objects, tmp_path, in_the_middle, monkeypatch):
@@ -196,7 +216,7 @@ def test_broken_and_empty_files_and_one_that_blender_dies_of_are_error_rows(comm
         assert (row["touches"], row["error"], row["hash"]) == (3, 3, None)
         assert row["message"] in output
     assert found["crash.ply"]["message"] == "Blender ended by SIGABRT"
-    assert found["half.ply"]["message"] == 'no mesh could be read from "half.ply": is the file whole?'
+    assert found["half.ply"]["message"] == 'no mesh could be read from "half.ply": is the file complete?'
     rows = [row for path in blocks_of(tmp_path / "set") for row in pq.read_table(path).to_pylist()]
     assert len(rows) == 27
     assert {row["touch"] for row in rows if row["object"] == "crash"} == {0, 1, 2}

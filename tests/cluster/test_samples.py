@@ -26,8 +26,11 @@ def test_a_sample_reads_the_data_set(code, plain, tmp_path, monkeypatch, capsys)
     scope = {}
     exec(compile(code, PAGE.name, "exec"), scope)
     if "Touches" in scope:
-        local, curvatures = next(iter(scope["Touches"]()))
+        touches = list(scope["Touches"]())
+        local, curvatures = touches[0]
         assert local.shape[1] == 3 and curvatures[0] <= curvatures[1]
         assert local[:, :2].norm(dim=1).max() == pytest.approx(1.0, abs=1e-6)
+        loader = scope["torch"].utils.data.DataLoader(scope["Touches"](), batch_size=None, num_workers=2)
+        assert len(list(loader)) == len(touches)  # each once
     else:
         assert "pebble" in capsys.readouterr().out

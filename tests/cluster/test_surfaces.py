@@ -97,7 +97,7 @@ def test_objects_have_the_numbers_and_a_broken_file_its_reason(surfaces, rows):
         if row["object"] == "half":
             assert (row["touches"], row["error"], row["hash"], row["is_closed"]) == (1, 1, None, None)
             assert row["message"] == found["message"]
-            assert found["message"] == 'no mesh could be read from "half.ply": is the file whole?'
+            assert found["message"] == 'no mesh could be read from "half.ply": is the file complete?'
             assert found["status"] == "error" and found["vertices"] is None
             continue
         assert row["error"] == 0 and row["seconds"] > 0.0
@@ -138,7 +138,7 @@ def test_a_second_run_does_what_is_missing_and_other_options_are_refused(surface
     assert "of 2 blocks are there already" in said.err and said.out.startswith("3 objects, ")
     assert rows_of(surfaces / "set", "surfaces") == before
     assert whole(surfaces, *address, "--seed", "1") == 2
-    assert "seed: this data set was begun with 0, and now it is 1: take that" in capfd.readouterr().err
+    assert "seed: this data set was begun with 0, and it is now 1: take that" in capfd.readouterr().err
 
 
 def test_touches_are_not_mixed_with_surfaces(command, surfaces):
@@ -150,8 +150,8 @@ def test_touches_are_not_mixed_with_surfaces(command, surfaces):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--noise", "1%"], "tolerance: wanted the noise 1% or more, got 0.4%"),
-        (["--seed", "-1"], "seed: wanted a number of 0 or more, got -1"),
+        (["--noise", "1%"], "tolerance: expected the noise 1% or more, got 0.4%"),
+        (["--seed", "-1"], "seed: expected a number of 0 or more, got -1"),
     ],
 )
 def test_wrong_words_are_refused_before_anything_is_made(tmp_path, capfd, words, sentence):

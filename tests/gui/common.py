@@ -164,3 +164,69 @@ def undo_redo(what, before):
     yield 1
     yield from until(is_complete)
     check(f"{what}: Ctrl Shift Z brings it again", same(state(), after), (state(), after))
+
+
+def activate(name):
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj.name == name)
+    bpy.context.view_layer.objects.active = bpy.data.objects[name]
+
+
+def delete_target():
+    bpy.data.objects.remove(bpy.data.objects["Egg"])
+
+
+def enter_edit_mode():
+    activate("Egg")
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def move_target():
+    bpy.data.objects["Egg"].location.x += 1
+
+
+def change_mesh():
+    bpy.data.objects["Egg"].data.vertices[0].co.x += 0.1
+
+
+def undo():
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+
+
+SAID = {
+    undo: "",
+    delete_target: '"Egg" is gone, so touching was stopped',
+    enter_edit_mode: "The touching was stopped, for Object Mode was left",
+    move_target: "was moved while it was touched: start again",
+    change_mesh: "was changed while it was touched: start again",
+}
+
+
+def disturbed(what, start, is_clean, made, **inputs):
+    """What the user may do while something touches all over a target; it stops, and nothing of it is left.
+
+    start, is_clean, made : start it with inputs; whether it is over without a trace; what it has made
+    """
+    # Undo first: the others leave words below the mouse, which take keys.
+    for disturb, words in SAID.items():
+        name = f"{what}, {disturb.__name__}"
+        bpy.ops.ed.undo_push(message="Before")
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, location=(0, 4, 0))
+        bpy.context.object.name = "Egg"
+        bpy.ops.ed.undo_push(message="Egg")
+        yield 0.5
+        yield from start(target="Egg", **inputs)
+        yield 0.5
+        check(f"{name}: it is under way", not is_clean())
+        disturb()
+        yield 1
+        picture(f"{what}_{disturb.__name__}")
+        yield from until(is_clean, 60)  # whether it was changed is looked at in the end
+        check(f"{name}: it stops", is_clean())
+        if words:
+            check(f"{name}: ... with a sentence", words in last_report(), last_report())
+        check(f"{name}: and leaves nothing", not made(), made())
+        if bpy.context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        if "Egg" in bpy.data.objects:
+            delete_target()

@@ -6,6 +6,7 @@ After each step patch and a fresh touch agree, or the patch says that it is outd
 TACTILE_SEED=... take more steps than the 50 of each run, with other dice.
 """
 
+import faulthandler
 import os
 import random
 import sys
@@ -18,10 +19,11 @@ from bpy.app.handlers import persistent
 sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 import steps_at_random as steps
-from common import ASIDE, FOLDER, check, look, open_tab, until
+from common import ASIDE, FOLDER, check, look, open_tab
 
 STEPS, SEED = int(os.environ.get("TACTILE_STEPS", "50")), int(os.environ.get("TACTILE_SEED", "0"))
 ADDON = "bl_ext.user_default.tactile_patch.tactile_addon"
+faulthandler.enable()  # a crash says where
 dice = random.Random(SEED)
 taken = []
 
@@ -39,8 +41,11 @@ def is_quiet():
 
 
 def settled():
-    yield 0.2
-    yield from until(is_quiet)
+    """Waits until all that a step has left to do is done, a minute at most."""
+    for _ in range(600):
+        yield 0.1
+        if is_quiet():
+            break
 
 
 def drag():

@@ -64,7 +64,7 @@ def check_files(first):
                 check(
                     f"{what}: as on the open scene",
                     same_curvatures(report, first),
-                    f"{curvatures(report)}, wanted {curvatures(first)}",
+                    f"{curvatures(report)}, expected {curvatures(first)}",
                 )
 
 

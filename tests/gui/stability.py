@@ -16,10 +16,12 @@ from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from common import (
+    ASIDE,
     FOLDER,
+    activate,
     check,
     data_blocks,
-    last_report,
+    disturbed,
     look,
     open_tab,
     picture,
@@ -28,7 +30,7 @@ from common import (
 )
 
 # Where they are in a window of 1280 by 800 with the sidebar open.
-MAP_BUTTON, ASIDE = (943, 311), (300, 180)
+MAP_BUTTON = (943, 311)
 SLICES = []  # seconds of each call of the operator's modal
 
 
@@ -46,12 +48,6 @@ def is_clean():
     from bl_ui.space_statusbar import STATUSBAR_HT_header as bar
 
     return not running() and bar.draw.__module__.startswith("bl_ui")
-
-
-def activate(name):
-    for obj in bpy.context.view_layer.objects:
-        obj.select_set(obj.name == name)
-    bpy.context.view_layer.objects.active = bpy.data.objects[name]
 
 
 def start(**inputs):
@@ -149,65 +145,6 @@ def by_escape():
         check("... in one step of undo", data_blocks() == before, data_blocks())
 
 
-def delete_target():
-    bpy.data.objects.remove(bpy.data.objects["Cube"])
-
-
-def enter_edit_mode():
-    activate("Cube")
-    bpy.ops.object.mode_set(mode="EDIT")
-
-
-def move_target():
-    bpy.data.objects["Cube"].location.x += 1
-
-
-def change_mesh():
-    bpy.data.objects["Cube"].data.vertices[0].co.x += 0.1
-
-
-def undo():
-    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
-
-
-SAID = {
-    delete_target: "is gone: the map of it was stopped",
-    enter_edit_mode: "The map was stopped, for Object Mode was left",
-    move_target: "was moved while it was touched: start again",
-    change_mesh: "was changed while it was touched: start again",
-}
-
-
-def meanwhile():
-    """What the user may do while it is going on; it stops, and nothing of it is left."""
-    # Undo first: the others leave words below the mouse, which take keys.
-    for disturb in (undo, delete_target, enter_edit_mode, move_target, change_mesh):
-        bpy.ops.ed.undo_push(message="Before")
-        bpy.ops.mesh.primitive_cube_add(size=2.0, location=(0, 4, 0))
-        bpy.ops.object.mode_set(mode="EDIT")
-        bpy.ops.mesh.subdivide(number_cuts=29)
-        bpy.ops.object.mode_set(mode="OBJECT")
-        bpy.ops.ed.undo_push(message="Cube")
-        yield 0.5
-        yield from start(target="Cube", spacing=0.03)
-        yield 0.5
-        check(f"{disturb.__name__}: it is under way", running())
-        disturb()
-        yield 1
-        picture(f"map_{disturb.__name__}")
-        yield from until(lambda: not running(), 60)  # whether it was changed is looked at in the end
-        check(f"{disturb.__name__}: it stops", is_clean())
-        if disturb in SAID:
-            said = last_report()
-            check(f"{disturb.__name__}: ... with a sentence", SAID[disturb] in said, said)
-        check(f"{disturb.__name__}: and leaves no map", not maps(), maps())
-        if bpy.context.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
-        if "Cube" in bpy.data.objects:
-            delete_target()
-        activate("Suzanne")
-
-
 def load_file():
     """Opening a file ends all timers, this script's too: it goes on in `reopened`."""
 
@@ -264,7 +201,8 @@ def steps():
     measure_slices()
     yield from by_button()
     yield from by_escape()
-    yield from meanwhile()
+    yield from disturbed("map", start, is_clean, maps, spacing=0.03)
+    activate("Suzanne")
     yield from load_file()
 
 

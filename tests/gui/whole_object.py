@@ -14,7 +14,19 @@ import gui
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import ASIDE, FOLDER, check, data_blocks, look, open_tab, picture, picture_of_docs, probe, until
+from common import (
+    ASIDE,
+    FOLDER,
+    check,
+    data_blocks,
+    disturbed,
+    look,
+    open_tab,
+    picture,
+    picture_of_docs,
+    probe,
+    until,
+)
 
 SLICES = []  # seconds of each call of the operator's modal
 MIDDLE = (520, 380)  # of the viewport, where the object is
@@ -148,6 +160,14 @@ def by_escape():
         check(f"{times} Esc: nothing else is left", data_blocks() == before, data_blocks())
 
 
+def is_clean():
+    """It is over, and neither the growing patches nor what is in the status bar are left."""
+    from bl_ui.space_statusbar import STATUSBAR_HT_header as bar
+
+    growing = [obj for obj in bpy.data.objects if obj.name.endswith("Touches")]
+    return not running() and not growing and bar.draw.__module__.startswith("bl_ui")
+
+
 def steps():
     yield from open_tab()
     make_target()
@@ -156,6 +176,7 @@ def steps():
     yield from by_dialog()
     yield from by_click()
     yield from by_escape()
+    yield from disturbed("whole", start, is_clean, surfaces, tolerance=5e-4)
 
 
 gui.play(steps())

@@ -28,7 +28,7 @@ def lose():
     bpy.ops.tactile.export_contacts("EXEC_DEFAULT", filepath=str(FOLDER / "contacts.csv"))
     for obj in [obj for obj in bpy.data.objects if obj.name != "pear"]:
         bpy.data.objects.remove(obj)
-    script = re.search(r"```python\n(.*?)```", DOCS.read_text(), re.DOTALL)[1]
+    script = re.search(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)[1]
     for name in ("contacts.csv", "lost.csv"):
         script = script.replace(f'"{name}"', repr(str(FOLDER / name)))
     exec(script, {})

@@ -1,23 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""As Jia and Tian do it: three upright planes, degree 4, (9) with 9.99/mm^2 at L = 10 mm, and their descent.
+"""The preset of Pick Reference Point; Blender keeps those of each operator apart."""
 
-They do not tell their extents, so these are left to the surface.
-"""
+from pathlib import Path
 
-from math import radians
+from bpy.utils import execfile
 
-import bpy
-
-op = bpy.context.active_operator
-
-op.plane_count = 3
-op.azimuths = [radians(a) for a in (0, 60, 120, 30, 90, 150)]
-op.tilts = [0.0] * 6
-op.extent = 0.0
-op.step = 0.0
-op.noise = 0.0
-op.method = "tagc"
-op.degree = 4
-op.weight = 1000.0
-op.solver = "descent"
+execfile(str(Path(__file__).parents[1] / "tactile.pick" / Path(__file__).name))

@@ -101,7 +101,7 @@ def test_what_cannot_be_registered_gets_a_sentence_and_stays(empty, suzanne):
     empty.context.view_layer.objects.active = patch
     stays = np.array(patch.matrix_world)
     for arguments, sentence in (
-        ({"target": cube.name}, "Vertices: wanted a mesh from"),
+        ({"target": cube.name}, "Vertices: expected a mesh from"),
         ({"target": "Nobody"}, "There is no object"),
     ):
         with pytest.raises(RuntimeError, match=sentence):
@@ -114,7 +114,7 @@ def test_what_cannot_be_registered_gets_a_sentence_and_stays(empty, suzanne):
 def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     place = forehead(suzanne, empty)
     assert empty.ops.tactile.pick(target=suzanne.name, location=place, extent=0.3) == {"FINISHED"}
-    with pytest.raises(RuntimeError, match="is that of its probe: it is known already"):
+    with pytest.raises(RuntimeError, match="is that of its probe, so it is known already"):
         empty.ops.tactile.register(target=suzanne.name)
     patch = extension.tactile_addon.probes.probe.patch_near(empty.context.object)
     registration, report = (
@@ -125,7 +125,7 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
     assert report.registration_summary(found) == 'The contacts are 0.1 m off "A" (root mean square)'
     patch.parent = None
     depsgraph = empty.context.evaluated_depsgraph_get()
-    with pytest.raises(ValueError, match=r"poses on .* take one of them"):
+    with pytest.raises(ValueError, match=r"poses on .* choose one of them"):
         registration.register_patch(patch, suzanne, depsgraph, pose=99)
 
 
@@ -147,7 +147,7 @@ def imported(bpy, suzanne, tmp_path):
 def test_a_patch_of_a_file_asks_for_a_mesh_and_takes_the_one_in_its_field(empty, suzanne, tmp_path, name):
     patch = imported(empty, suzanne, tmp_path)
     operator = getattr(empty.ops.tactile, name)
-    said = "was touched on no mesh of this file: select the mesh, then the patch"
+    said = "was not touched on a mesh of this file: select the mesh, then the patch"
     with pytest.raises(RuntimeError, match=said):
         operator()
     patch.tactile_target = suzanne.name
@@ -177,9 +177,9 @@ def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
         raise MemoryError
 
     monkeypatch.setattr(registration.core, "register", full)
-    with pytest.raises(ValueError, match="is too large to be searched: take away what is far"):
+    with pytest.raises(ValueError, match="is too large to be searched: remove what is far"):
         registration.register_patch(patch, suzanne, depsgraph)
     monkeypatch.undo()
     empty.data.objects.remove(patch)
-    with pytest.raises(ValueError, match="was deleted while its place was looked for"):
+    with pytest.raises(ValueError, match="was deleted while its place was searched for"):
         search.put(1)

@@ -164,7 +164,7 @@ def test_half_covered_and_nothing_below(empty, patch, capfd):
     found = verified(empty, patch, target="Half")
     assert found["overlap"] == pytest.approx(0.5, abs=0.03)
     assert found["vertices"] < patch["tactile"]["vertices"]
-    assert "it covers 5" in capfd.readouterr().out.replace("covers 4", "covers 5")
+    assert "the mesh covers 5" in capfd.readouterr().out.replace("covers 4", "covers 5")
     add_ball(empty, 0.1, "Far")
     activate(empty, patch)
     found = verified(empty, patch, target="Far")
@@ -192,7 +192,7 @@ def test_a_coarse_mesh_has_no_vertices_over_the_patch(empty, capfd):
     assert (found["vertices"], found["overlap"], found["extra_contours"]) == (0, 1.0, 9)
     assert found["extra_fit_error"] == pytest.approx(0.0, abs=1e-5)
     assert "vertex_distance_mean" not in found
-    assert 'No vertex of "Plane" is over the patch, of which it covers 100 %' in capfd.readouterr().out
+    assert 'No vertex of "Plane" is over the patch; the mesh covers 100 % of it' in capfd.readouterr().out
 
 
 def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patch, capfd):
@@ -206,7 +206,7 @@ def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patc
     assert patch["tactile"]["status"] == "uncertain"
     message = patch["tactile"]["message"]
     share = 100.0 * found["vertex_distance_mean"] / patch["tactile"]["radius"]
-    assert message.startswith(f"The mesh is {share:.3g} % of the radius off the patch in the mean")
+    assert message.startswith(f"The mesh is {share:.3g} % of the radius off the patch on average")
     assert f"Warning: {message}" in capfd.readouterr().out
 
 
@@ -269,15 +269,15 @@ def with_no_faces(bpy, patch):
     ("spoil", "sentence"),
     [
         (lambda bpy, patch: {"target": "Nobody"}, 'There is no object "Nobody"'),
-        (no_source, '"Sphere Patch" was touched on no mesh of this file: select the mesh'),
-        (with_empty, '"Nothing" is no mesh'),
+        (no_source, '"Sphere Patch" was not touched on a mesh of this file: select the mesh'),
+        (with_empty, '"Nothing" is not a mesh'),
         (with_no_faces, '"Bare" has no faces'),
         (several, "2 meshes are selected: select one besides the patch"),
-        (of_a_later_version, "cannot be read any more: touch again .version: wanted 2, got 3"),
-        (scaled(1.0, 2.0, 1.0), "is stretched, mirrored or scaled to nothing"),
-        (scaled(-1.0, 1.0, 1.0), "is stretched, mirrored or scaled to nothing"),
-        (scaled(-1.0, -1.0, -1.0), "is stretched, mirrored or scaled to nothing"),
-        (scaled(0.0, 0.0, 0.0), "is stretched, mirrored or scaled to nothing"),
+        (of_a_later_version, "can no longer be read: touch again .version: expected 2, got 3"),
+        (scaled(1.0, 2.0, 1.0), "is stretched, mirrored or has a scale of 0"),
+        (scaled(-1.0, 1.0, 1.0), "is stretched, mirrored or has a scale of 0"),
+        (scaled(-1.0, -1.0, -1.0), "is stretched, mirrored or has a scale of 0"),
+        (scaled(0.0, 0.0, 0.0), "is stretched, mirrored or has a scale of 0"),
     ],
 )
 def test_bad_input_gets_a_sentence_and_changes_nothing(empty, patch, spoil, sentence):

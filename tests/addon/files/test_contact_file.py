@@ -141,34 +141,37 @@ def test_without_a_curve_column_a_file_is_one_curve(read):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ("", '"contacts.csv": wanted a header with the columns curve, x, y, z, got an empty file'),
+        ("", '"contacts.csv": expected a header with the columns curve, x, y, z, got an empty file'),
         ("# nothing\n\n", "got an empty file"),
-        ("curve,x,y,z\n", '"contacts.csv": wanted contacts below the header, got none'),
-        ("1,2,3,4\n1,2,3,4\n", '"contacts.csv", line 1: wanted the column "x", got "1, 2, 3, 4"'),
-        ("#\ncurve,x,y\n", '"contacts.csv", line 2: wanted the column "z"'),
-        ("curve,x,y,z,nx\n", 'line 1: wanted the column "ny"'),
-        ("curve,x,y,x,z\n", 'line 1: wanted one column "x", got two'),
-        ("curve,x_mm,y_cm,z_mm\n", "line 1: wanted x, y and z in one unit, got cm and mm"),
-        ("curve,x [furlong],y,z\n", 'line 1: wanted a unit out of km, m, cm, mm.* got "furlong"'),
-        (PLAIN.replace("3", "three"), '"contacts.csv", line 3, column "z": wanted a number, got "three"'),
-        (TITLE.format(3) + PLAIN, "line 1: wanted version 2 or less, got 3: this was written by a later"),
-        (TITLE.format("x") + PLAIN, "line 1: wanted version 2 or less, got x"),
-        (TITLE.format(2) + "# point 1 2\n" + PLAIN, "line 2: wanted 3 numbers for point, got 2"),
-        (TITLE.format(2) + "# noise few\n" + PLAIN, 'line 2, "noise": wanted a number, got "few"'),
-        (TITLE.format(2) + "# noise -1\n" + PLAIN, 'line 2, "noise": wanted a number of 0 or more, got -1'),
-        (TITLE.format(2) + "# noise 1 2 3\n" + PLAIN, "wanted one noise or 2, one a curve, got 3"),
-        (PLAIN.replace("6.5", "nan"), 'line 4, column "z": wanted a number, got "nan"'),
-        (PLAIN.replace("6.5", "1e999"), 'line 4, column "z": wanted a number'),
-        (PLAIN.replace("6.5", "1_0"), 'line 4, column "z": wanted a number, got "1_0"'),
-        (PLAIN.replace("6.5", "1.000,5"), "line 4: wanted 4 fields, got 5"),
-        (PLAIN.replace("2,3\n", "2\n"), 'line 3, column "z": wanted a number, got ""'),
-        (PLAIN.replace("1,1,2,3", "1,1,5,2,5,3,5"), "line 3: wanted 4 fields, got 7: decimal commas need"),
-        (PLAIN.replace("1,1,2,3", ",1,2,3"), "line 3: wanted a number or a name in the column"),
-        ("curve,x,y,z,nx,ny,nz\n1,0,0,0,0,0,1\n1,0,0,1,,,\n", "line 3: wanted normals all along a curve"),
-        ("curve,x,y,z,nx,ny,nz\n1,0,0,0,0,,1\n", 'line 2, column "ny": wanted a number, got ""'),
-        ("curve,time,x,y,z\n1,,0,0,0\n", 'column "time": wanted a number, got ""'),
-        (b"PK\x03\x04\x00\x00", '"contacts.csv": wanted a text file, got bytes that are none'),
-        (PLAIN.replace("3", "3" * 200_000), "line 3: wanted fields of some letters, got a longer one"),
+        ("curve,x,y,z\n", '"contacts.csv": expected contacts below the header, got none'),
+        ("1,2,3,4\n1,2,3,4\n", '"contacts.csv", line 1: expected the column "x", got "1, 2, 3, 4"'),
+        ("#\ncurve,x,y\n", '"contacts.csv", line 2: expected the column "z"'),
+        ("curve,x,y,z,nx\n", 'line 1: expected the column "ny"'),
+        ("curve,x,y,x,z\n", 'line 1: expected one column "x", got two'),
+        ("curve,x_mm,y_cm,z_mm\n", "line 1: expected x, y and z in one unit, got cm and mm"),
+        ("curve,x [furlong],y,z\n", 'line 1: expected a unit out of km, m, cm, mm.* got "furlong"'),
+        (PLAIN.replace("3", "three"), '"contacts.csv", line 3, column "z": expected a number, got "three"'),
+        (TITLE.format(3) + PLAIN, "line 1: expected version 2 or less, got 3: this was written by a later"),
+        (TITLE.format("x") + PLAIN, "line 1: expected version 2 or less, got x"),
+        (TITLE.format(2) + "# point 1 2\n" + PLAIN, "line 2: expected 3 numbers for point, got 2"),
+        (TITLE.format(2) + "# noise few\n" + PLAIN, 'line 2, "noise": expected a number, got "few"'),
+        (TITLE.format(2) + "# noise -1\n" + PLAIN, 'line 2, "noise": expected a number of 0 or more, got -1'),
+        (TITLE.format(2) + "# noise 1 2 3\n" + PLAIN, "expected one noise or 2, one a curve, got 3"),
+        (PLAIN.replace("6.5", "nan"), 'line 4, column "z": expected a number, got "nan"'),
+        (PLAIN.replace("6.5", "1e999"), 'line 4, column "z": expected a number'),
+        (PLAIN.replace("6.5", "1_0"), 'line 4, column "z": expected a number, got "1_0"'),
+        (PLAIN.replace("6.5", "1.000,5"), "line 4: expected 4 fields, got 5"),
+        (PLAIN.replace("2,3\n", "2\n"), 'line 3, column "z": expected a number, got ""'),
+        (PLAIN.replace("1,1,2,3", "1,1,5,2,5,3,5"), "line 3: expected 4 fields, got 7: decimal commas need"),
+        (PLAIN.replace("1,1,2,3", ",1,2,3"), "line 3: expected a number or a name in the column"),
+        (
+            "curve,x,y,z,nx,ny,nz\n1,0,0,0,0,0,1\n1,0,0,1,,,\n",
+            "line 3: expected normals at all contacts of a curve",
+        ),
+        ("curve,x,y,z,nx,ny,nz\n1,0,0,0,0,,1\n", 'line 2, column "ny": expected a number, got ""'),
+        ("curve,time,x,y,z\n1,,0,0,0\n", 'column "time": expected a number, got ""'),
+        (b"PK\x03\x04\x00\x00", '"contacts.csv": expected a text file, got binary data'),
+        (PLAIN.replace("3", "3" * 200_000), "line 3: expected short fields, got a very long one"),
     ],
 )
 def test_what_cannot_be_read_is_refused_with_its_place(read, data, words):
@@ -179,7 +182,7 @@ def test_what_cannot_be_read_is_refused_with_its_place(read, data, words):
 def test_files_that_are_none(contact_file, read, tmp_path):
     with pytest.raises(OSError, match="there is no file"):
         contact_file.read(tmp_path / "missing.csv")
-    with pytest.raises(OSError, match=r"wanted a \.csv or \.ply file of contacts"):
+    with pytest.raises(OSError, match=r"expected a \.csv or \.ply file of contacts"):
         read(PLAIN, "contacts.xlsx")
 
 
@@ -303,27 +306,27 @@ def test_ply_with_normals_and_times_in_single_precision(read):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", '"contacts.ply": wanted the header of a .ply file'),
-        (b"ply\nformat ascii 1.0\n", "wanted the header"),
-        (b"ply\nformat morse 1.0\nend_header\n", "wanted the header"),
-        (b"ply\nend_header\n", "wanted the header"),
-        (PLAIN.encode(), "wanted the header"),
-        (ply("ascii", properties="property float x\n"), "wanted vertices with the properties x, y and z"),
-        (ply("ascii", properties="property list uchar int x\n"), "wanted vertices with the properties"),
-        (ply("ascii", 0), "wanted vertices with the properties"),
-        (ply("ascii", "many"), 'wanted an element or a property, got "element vertex many"'),
+        (b"", '"contacts.ply": expected the complete header of a .ply file'),
+        (b"ply\nformat ascii 1.0\n", "expected the complete header"),
+        (b"ply\nformat morse 1.0\nend_header\n", "expected the complete header"),
+        (b"ply\nend_header\n", "expected the complete header"),
+        (PLAIN.encode(), "expected the complete header"),
+        (ply("ascii", properties="property float x\n"), "expected vertices with the properties x, y and z"),
+        (ply("ascii", properties="property list uchar int x\n"), "expected vertices with the properties"),
+        (ply("ascii", 0), "expected vertices with the properties"),
+        (ply("ascii", "many"), 'expected an element or a property, got "element vertex many"'),
         (ply("ascii", properties="property half x\n"), 'got "property half x"'),
-        (ply("ascii", properties="property x\n"), "wanted an element or a property"),
-        (ply("ascii") + b"1 2 3 4\n1 2 3\n" * 3, '"contacts.ply", line 11: wanted 4 numbers, got 3'),
-        (ply("ascii") + b"1 2 3 4\n", "wanted 6 contacts, got a file that ends before: is it whole?"),
-        (ply("ascii", 10**15) + b"1 2 3 4\n", "got a file that ends before"),
+        (ply("ascii", properties="property x\n"), "expected an element or a property"),
+        (ply("ascii") + b"1 2 3 4\n1 2 3\n" * 3, '"contacts.ply", line 11: expected 4 numbers, got 3'),
+        (ply("ascii") + b"1 2 3 4\n", "expected 6 contacts, got a file that ends earlier: is it complete?"),
+        (ply("ascii", 10**15) + b"1 2 3 4\n", "got a file that ends earlier"),
         (
             ply("ascii", before="element camera 99999999999\nproperty float x\n"),
-            "got a file that ends before",
+            "got a file that ends earlier",
         ),
-        (ply("ascii") + b"1 2 three 4\n" * 6, 'line 10, "z": wanted a number, got "three"'),
-        (ply("binary_little_endian") + b"1234", "wanted 6 contacts, got a file that ends before"),
-        (ply("binary_little_endian") + packed("<", "dddi", [(np.nan,) * 3 + (1,)] * 6), "wanted finite"),
+        (ply("ascii") + b"1 2 three 4\n" * 6, 'line 10, "z": expected a number, got "three"'),
+        (ply("binary_little_endian") + b"1234", "expected 6 contacts, got a file that ends earlier"),
+        (ply("binary_little_endian") + packed("<", "dddi", [(np.nan,) * 3 + (1,)] * 6), "expected finite"),
     ],
 )
 def test_a_damaged_ply_is_refused_with_a_sentence(read, data, words):
@@ -343,7 +346,7 @@ def test_whatever_happens_to_a_file_it_is_read_or_refused_with_a_sentence(
     try:
         contours = contact_file.read(path).contours
     except ValueError as error:
-        assert ": wanted " in str(error)
+        assert ": expected " in str(error)
     else:
         assert all(np.isfinite(c.points).all() and len(c.points) for c in contours)
 
@@ -356,7 +359,7 @@ def test_a_long_header_is_read_in_one_pass(read, mark, end):
     try:
         read(f"{title},y,z\n1,2,3\n")
     except ValueError as error:
-        assert '"contacts.csv", line 1: wanted ' in str(error)
+        assert '"contacts.csv", line 1: expected ' in str(error)
 
 
 def rows_of(count, digits=17):
@@ -391,7 +394,7 @@ def test_one_bad_row_costs_no_more_than_its_neighbors(read, contact_file, monkey
         contact_file.contact_rows.Rows, "_row", lambda *given: looked.append(1) or row(*given)
     )
     _, text = rows_of(count)
-    with pytest.raises(ValueError, match=f'line {count + 2}, column "y": wanted a number, got "three"'):
+    with pytest.raises(ValueError, match=f'line {count + 2}, column "y": expected a number, got "three"'):
         read("curve,x,y,z\n" + text + "c,2,three,4\n")
     assert len(looked) < 3000
 
@@ -404,7 +407,7 @@ def test_empty_lines_are_not_looked_at_one_by_one(read, contact_file, monkeypatc
         (contour,), _ = read(f"{blank * 300_000}x,y,z\n{blank * 300_000}0,0,0\n#\n{blank * 300_000}1,2,3\n")
         assert contour.points.tolist() == [[0, 0, 0], [1, 2, 3]]
     assert len(seen) < 600_000
-    with pytest.raises(ValueError, match=r'line 700001, column "z": wanted a number, got "c"'):
+    with pytest.raises(ValueError, match=r'line 700001, column "z": expected a number, got "c"'):
         read("\n" * 200_000 + "x,y,z\n" + "\n" * 499_999 + "a,b,c\n".replace("a", "1").replace("b", "2"))
 
 
@@ -414,12 +417,12 @@ def test_empty_lines_are_not_looked_at_one_by_one(read, contact_file, monkeypatc
         (
             "x,y,z\n0,0,0\n1e60,0,1\n",
             "contacts.csv",
-            '"contacts.csv", line 3, column "x": wanted numbers up to',
+            '"contacts.csv", line 3, column "x": expected numbers up to',
         ),
         (
             ply("binary_little_endian") + packed("<", "dddi", [*ROWS[:-1], (1e60, 0, 0, 1)]),
             "contacts.ply",
-            r'"contacts.ply", contact 6: wanted finite coordinates up to 1e\+50',
+            r'"contacts.ply", contact 6: expected finite coordinates up to 1e\+50',
         ),
         (
             ply("binary_little_endian", 2, "".join(f"property float {v}\n" for v in ("x", "y", "z")))
@@ -439,5 +442,5 @@ def test_a_file_beyond_memory_is_a_sentence(read, contact_file, monkeypatch):
         raise MemoryError
 
     monkeypatch.setattr(contact_file.contact_rows, "contours", exhausted)
-    with pytest.raises(ValueError, match=r'"contacts.csv": wanted contacts that fit into memory, got more'):
+    with pytest.raises(ValueError, match=r'"contacts.csv": expected contacts that fit into memory, got more'):
         read(PLAIN)

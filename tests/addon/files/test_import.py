@@ -169,7 +169,7 @@ def test_strokes_that_carry_no_patch_are_refused_with_a_sentence(extension, empt
     before = datablocks(empty)
     with pytest.raises(RuntimeError, match="The strokes run along a line, two lines or a ring"):
         empty.ops.tactile.import_contacts(filepath=str(path))
-    with pytest.raises(RuntimeError, match=r"wanted none with .*which is a method of contours"):
+    with pytest.raises(RuntimeError, match=r"expected none with .*which fits contours only"):
         empty.ops.tactile.import_contacts(filepath=str(path), method="tagc")
     assert datablocks(empty) == before
 
@@ -210,7 +210,7 @@ def test_what_a_file_says_of_its_patch_counts_unless_something_else_is_given(emp
     assert scaled["height_std"] == pytest.approx(0.01 * report["height_std"], rel=1e-9)
     copy = tmp_path / "copy.csv"
     copy.write_text(path.read_text().replace("# point ", "# point 1"))
-    words = "The files name different reference points: import each of them by itself"
+    words = "The files name different reference points: import them one by one"
     with pytest.raises(RuntimeError, match=words):
         imported(empty, str(path), directory=str(tmp_path), files=[{"name": path.name}, {"name": copy.name}])
 
@@ -240,10 +240,10 @@ def test_measured_normals_show_what_curves_hide(empty, measured):
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        ("x,y,z\n0,0,a\n", {}, '"contacts.csv", line 2, column "z": wanted a number'),
-        ("x,y,z\n0,0,1\n", {}, "The common point is where two or more curves meet, got 1"),
+        ("x,y,z\n0,0,a\n", {}, '"contacts.csv", line 2, column "z": expected a number'),
+        ("x,y,z\n0,0,1\n", {}, "The common point needs two or more curves, got 1"),
         ("x,y,z\n0,0,1\n", {"point": (0, 0, 0)}, "Curve 1 has 1 of the 3 contacts it needs"),
-        ("x,y,z\n1e60,0,1\n", {}, "wanted numbers up to"),
+        ("x,y,z\n1e60,0,1\n", {}, "expected numbers up to"),
         (None, {}, "There is no file"),
     ],
 )
@@ -426,9 +426,9 @@ def test_every_option_of_fit_arrives(command, empty, measured):
     ("words", "code", "sentence"),
     [
         (["missing.csv"], 1, 'there is no file "'),
-        (["{folder}/bad.csv"], 1, '"bad.csv", line 2, column "y": wanted a number, got "two"'),
+        (["{folder}/bad.csv"], 1, '"bad.csv", line 2, column "y": expected a number, got "two"'),
         (["{folder}/scan.csv", "--output", "{folder}/no/out.ply"], 1, 'to write "out.ply" to'),
-        (["{folder}/ball.obj"], 1, "wanted a .csv or .ply file of contacts"),
+        (["{folder}/ball.obj"], 1, "expected a .csv or .ply file of contacts"),
         ([], 2, "FILE"),
         (["{folder}/scan.csv", "--unit", "furlong"], 2, "--unit"),
         (["{folder}/scan.csv", "{folder}/no/scan.csv"], 1, "there is no file"),
@@ -467,8 +467,6 @@ def test_contacts_beyond_memory_are_a_sentence(empty, extension, tmp_path, monke
     (tmp_path / "contacts.csv").write_text("x,y,z\n0,0,0\n")
     monkeypatch.setattr(extension.tactile_addon.files.measured.core, "common_point", exhausted)
     before = datablocks(empty)
-    with pytest.raises(
-        RuntimeError, match="There are more contacts than fit into memory: take fewer of them"
-    ):
+    with pytest.raises(RuntimeError, match="There are more contacts than fit into memory: use fewer of them"):
         empty.ops.tactile.import_contacts(filepath=str(tmp_path / "contacts.csv"))
     assert datablocks(empty) == before

@@ -71,7 +71,7 @@ def test_from_the_shell(empty, probes, command, tmp_path):
     assert len(rows_of(path)) == 2
     code, _, err = command("table", blend, "--output", tmp_path / "probes.ply")
     assert code == 2
-    assert "--output: wanted a file .csv" in err
+    assert "--output: expected a file .csv" in err
     empty.ops.wm.read_homefile(use_empty=True)
     code, _, err = command("table", "--output", path)
     assert (code, err) == (1, "tactile: There is no patch to export: pick a reference point first\n")

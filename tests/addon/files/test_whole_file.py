@@ -94,7 +94,7 @@ def test_the_operators_that_export_too(empty, ball, tmp_path):
         with full(3000), pytest.raises(RuntimeError, match=f'annot write "out.{kind}"'):
             operator(filepath=str(out))
         assert out.read_text() == OLD
-        with pytest.raises(RuntimeError, match=r"is no file that could be replaced: choose the name of one"):
+        with pytest.raises(RuntimeError, match=r"is not a file that can be replaced: choose another name"):
             operator(filepath=str(device))
         assert operator(filepath=str(out)) == {"FINISHED"}
         assert out.read_text() != OLD
@@ -125,14 +125,14 @@ def test_a_link_stays_a_link_to_the_new_file(whole_file, tmp_path):
 def test_an_output_of_no_known_kind_is_refused(command, files, action, name):
     code, _, err = command(action, files / "ball.ply", "--output", files / f"out.{name}")
     assert code == 2
-    assert "--output: wanted a file .blend or .ply" in err
+    assert "--output: expected a file .blend or .ply" in err
     assert not (files / f"out.{name}").exists()
 
 
 def test_a_map_is_no_reconstruction(command, files):
     code, _, err = command("map", files / "ball.ply", "--output", files / "out.json")
     assert code == 2
-    assert "--output: wanted a file .blend or .ply, got" in err
+    assert "--output: expected a file .blend or .ply, got" in err
 
 
 @pytest.mark.parametrize("option", ["--json", "--output", "--verify", "--contacts"])
@@ -143,7 +143,7 @@ def test_no_input_is_overwritten(command, files, option, kind):
     spelled = files / ".." / files.name / path.name
     code, _, err = command("reconstruct", path, *PLACE, option, spelled)
     assert code == 2
-    assert f"{option}: wanted another file than one that this reads" in err
+    assert f"{option}: expected a file other than those that this command reads" in err
     assert path.read_bytes() == before
 
 
@@ -151,11 +151,11 @@ def test_no_two_outputs_are_one_file_and_measured_files_and_the_open_scene_are_i
     both = ("--json", files / "a.json", "--output", files / "a.json")
     code, _, err = command("reconstruct", files / "ball.ply", *PLACE, *both)
     assert code == 2
-    assert "--output: wanted another file than one that this writes" in err
+    assert "--output: expected a file other than those that this command writes" in err
     (files / "contacts.csv").write_text("curve,x,y,z\n1,0,0,0\n")
     code, _, err = command("fit", files / "contacts.csv", "--json", files / "contacts.csv")
     assert code == 2
-    assert "--json: wanted another file than one that this reads" in err
+    assert "--json: expected a file other than those that this command reads" in err
     import bpy
 
     bpy.ops.wm.open_mainfile(filepath=str(files / "ball.blend"))
@@ -169,4 +169,4 @@ def test_devices_and_folders_are_refused(command, files, option, device):
     (files / "out.ply").symlink_to(device)
     code, _, err = command("reconstruct", files / "ball.ply", *PLACE, option, files / "out.ply")
     assert code == 2
-    assert f"{option}: wanted the name of a file, got" in err
+    assert f"{option}: expected the name of a file, got" in err

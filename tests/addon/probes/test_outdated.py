@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 
-STALE = "This is the patch of an earlier touch, for the probe or its target has changed since: touch again."
+STALE = "This patch is from an earlier touch, and the probe or its target has changed since: touch again."
 
 
 @pytest.fixture

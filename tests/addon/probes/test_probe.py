@@ -68,12 +68,20 @@ def test_a_target_that_is_no_mesh_and_a_scale_that_is_none_are_messages(empty, b
     probe, patch = pick(empty)
     settings = probe.tactile_probe
     for change, back, message in (
-        (lambda: setattr(settings, "target", probe), lambda: setattr(settings, "target", ball), "is no mesh"),
-        (lambda: setattr(probe, "scale", (0, 1, 1)), lambda: setattr(probe, "scale", (1, 1, 1)), "scaled to"),
+        (
+            lambda: setattr(settings, "target", probe),
+            lambda: setattr(settings, "target", ball),
+            "is not a mesh",
+        ),
+        (
+            lambda: setattr(probe, "scale", (0, 1, 1)),
+            lambda: setattr(probe, "scale", (1, 1, 1)),
+            "a scale of 0",
+        ),
         (
             lambda: setattr(probe, "scale", (1, 1, 3e38)),
             lambda: setattr(probe, "scale", (1, 1, 1)),
-            "scaled to",
+            "a scale of 0",
         ),
     ):
         change()
@@ -428,7 +436,7 @@ def test_a_probe_off_the_surface_says_so_and_keeps_its_patch(empty, ball):
         assert state_but_status(patch) == before
         assert report_of(patch)["status"] == "outdated"
         assert report_of(patch)["message"] == (
-            "This is the patch of an earlier touch, for the last one failed. " + probe.tactile_probe.message
+            "This patch is from an earlier touch, because the last one failed. " + probe.tactile_probe.message
         )
         assert in_world(patch) == pytest.approx(points, abs=1e-5)
         assert list(probe.location) == [0.0, 0.0, height]
@@ -437,7 +445,7 @@ def test_a_probe_off_the_surface_says_so_and_keeps_its_patch(empty, ball):
     assert_touches(probe, patch)
     assert report_of(patch)["status"] == "ok"
     probe.tactile_probe.azimuths[1] = 0.0
-    assert "run in one direction" in probe.tactile_probe.message
+    assert "run in the same direction" in probe.tactile_probe.message
     probe.tactile_probe.azimuths[1] = 1.0
     assert_touches(probe, patch)
 
@@ -657,7 +665,7 @@ def test_undo_and_redo_bring_back_probe_and_patch_together(empty, ball):
         ({"location": (0.0, float("nan"), 0.0)}, "coordinates that are not finite"),
         ({"location": (0.0, 0.0, 9.0), "new": True}, "The location is 7 m away"),
         ({"extent": 50.0}, 'The extent 50 m is longer than "Sphere"'),
-        ({"azimuths": [0.0] * 6}, "run in one direction"),
+        ({"azimuths": [0.0] * 6}, "run in the same direction"),
     ],
 )
 def test_a_failing_pick_gets_a_sentence_and_leaves_all_as_it_was(empty, ball, change, sentence):
@@ -693,7 +701,7 @@ def test_the_suggested_planes_lower_the_deviation(empty, ball):
 def test_a_plane_that_is_not_there_is_not_removed(empty, ball, plane):
     probe, patch = pick(empty, plane_count=4)
     before, azimuths = report_of(patch), probe.tactile_probe.azimuths[:]
-    with pytest.raises(RuntimeError, match="There are 4 planes, 0 to 3: take one of them"):
+    with pytest.raises(RuntimeError, match="There are 4 planes, 0 to 3: choose one of them"):
         empty.ops.tactile.remove_plane(plane=plane)
     assert (report_of(patch), probe.tactile_probe.azimuths[:]) == (before, azimuths)
     assert probe.tactile_probe.plane_count == 4

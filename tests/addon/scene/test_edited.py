@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 
-EDITED = "was edited, and is no whole patch any more: touch again"
+EDITED = "was edited and is no longer a complete patch: touch again"
 EDITS = [
     lambda patch: patch.data.clear_geometry(),
     lambda patch: patch.data.attributes.remove(patch.data.attributes["deviation"]),
@@ -72,7 +72,7 @@ def sphere(radius, center=0.0):
 def test_what_single_precision_does_not_hold_is_refused(empty, tmp_path, radius):
     (tmp_path / "contacts.csv").write_text(sphere(radius))
     before = [list(kind) for kind in (empty.data.objects, empty.data.meshes, empty.data.materials)]
-    with pytest.raises(RuntimeError, match="and Blender's numbers are good from 1e-15 to 1e"):
+    with pytest.raises(RuntimeError, match="and Blender's numbers range from 1e-15 to 1e"):
         empty.ops.tactile.import_contacts(filepath=str(tmp_path / "contacts.csv"))
     assert [list(kind) for kind in (empty.data.objects, empty.data.meshes, empty.data.materials)] == before
 

@@ -53,28 +53,42 @@ def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])
 def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     message = (
-        "Heights are good to 5.3 % of the radius in the mean: take a shorter extent, or add sampling planes."
+        "Heights are accurate to 5.3 % of the radius on average: use a shorter extent or add sampling planes."
         " 3 of 28 coefficients are invisible to these planes. All half curves end at a crease."
     )
     words = wording.verdict(record(status, message), UNIT)
-    assert words == "Doubtful: take a shorter extent, or add sampling planes"
+    assert words == "Doubtful: use a shorter extent or add sampling planes"
 
 
 def test_the_verdict_on_an_earlier_patch_is_none(wording):
     assert wording.verdict(record("outdated"), UNIT) == "Outdated: touch again"
 
 
-@pytest.mark.parametrize("size", [0.065, 2.0, 65.0])
-def test_a_number_is_dragged_by_the_size_of_the_object(empty, extension, size):
-    """What 20 pixels move a number by is a fifth of its step: Blender counts it in hundredths."""
+@pytest.mark.parametrize(
+    "scale, unit", [(1.0, "METERS"), (1.0, "ADAPTIVE"), (0.001, "MILLIMETERS"), (0.01, "NONE")]
+)
+@pytest.mark.parametrize("meters", [0.0065, 0.065, 0.1, 2.0, 65.0])
+def test_a_number_is_dragged_by_the_size_of_the_object(empty, extension, meters, scale, unit):
+    """As far as Blender lets it: between a micrometer and a millimeter a pixel there is nothing."""
+    settings = empty.context.scene.unit_settings
+    settings.scale_length = scale
+    if unit == "NONE":
+        settings.system = "NONE"
+    else:
+        settings.length_unit = unit
+    number_fields, size = extension.tactile_addon.probes.number_fields, meters / scale
+    for name, shown in number_fields.fields(size).items():
+        decade = int(shown.rpartition("_by_")[2].replace("m", "-"))
+        pace = number_fields.pace_of(decade) / (number_fields.PACES[name] * size)
+        assert 1.0 / 40.0 < pace < 40.0, (name, pace)
+
+
+def test_a_number_that_is_left_to_the_surface_shows_what_it_has(empty, extension):
+    size = 0.065
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.5 * size)
     empty.ops.tactile.pick(location=(0.0, 0.0, 0.5 * size))
     settings = empty.context.object.tactile_probe
     fields = extension.tactile_addon.probes.number_fields.fields(max(settings.target.dimensions))
-    moves = {name: 0.2 * settings.bl_rna.properties[shown].step / size for name, shown in fields.items()}
-    assert 0.009 < moves["extent"] < 0.1
-    assert 0.0009 < moves["step"] < 0.01
-    assert 0.00009 < moves["noise"] < 0.001
     (patch,) = empty.context.object.children
     assert getattr(settings, fields["extent"]) == pytest.approx(patch["tactile"]["extent"])  # as found
     assert settings.extent == getattr(settings, fields["noise"]) == 0.0
@@ -161,6 +175,18 @@ class Layout:
         pass
 
     prop_search = prop
+
+
+@pytest.mark.parametrize(
+    "width, line", [(250, ["K", "", "0.00312 ± 0.002 1/mm²"]), (300, ["K", "0.00312 ± 0.002 1/mm²"])]
+)
+def test_a_value_that_has_no_room_beside_its_label_stands_below_it(extension, width, line):
+    context = SimpleNamespace(
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)), region=SimpleNamespace(width=width)
+    )
+    layout, rows = Layout(), [("Shape Index", "0.57"), ("K", "0.00312 ± 0.002 1/mm²")]
+    extension.tactile_addon.sidebar.rows.draw_rows(context, layout, rows)
+    assert [text for text, _ in layout.drawn] == ["Shape Index", "0.57", *line]
 
 
 def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty, ball):

@@ -28,7 +28,7 @@ def report_of(bpy, location, **arguments):
 
 def test_a_patch_of_a_given_extent_says_where_its_curves_ended_before(empty, cube):
     message = report_of(empty, (0.9, 0.2, 1.0), extent=0.5)["message"]
-    assert message.endswith(" Of 6 half curves 3 end at a crease, before the extent.")
+    assert message.endswith(" 3 of 6 half curves end at a crease, before the extent.")
     assert "half curves" not in report_of(empty, (0.1, 0.2, 1.0), extent=0.5)["message"]
 
 
@@ -66,8 +66,8 @@ def monkey(empty):
 def test_a_patch_on_facets_names_them_and_the_modifier(empty, monkey):
     report = made(empty.ops.tactile.reconstruct, target="Suzanne", location=(0.25, -0.55, 0.75))[1]
     assert report["vertices"] < 6
-    assert report["message"].startswith("The patch lies on facets (vertices of the mesh over it: ")
-    assert "): add a Subdivision modifier, if the mesh stands for a smooth shape. " in report["message"]
+    assert report["message"].startswith("The patch lies on coarse facets (mesh vertices over it: ")
+    assert "): add a Subdivision modifier if the mesh stands for a smooth shape. " in report["message"]
     modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
     modifier.levels = 4
     report = made(empty.ops.tactile.reconstruct, target="Suzanne", location=(0.25, -0.55, 0.75))[1]
@@ -77,7 +77,7 @@ def test_a_patch_on_facets_names_them_and_the_modifier(empty, monkey):
 
 def test_a_touch_that_fails_on_facets_names_them_and_the_modifier(empty, monkey):
     corner = monkey.data.vertices[0].co
-    words = r"The facets there are [\d.]+ \w*m long: add a Subdivision modifier, if the mesh stands"
+    words = r"The facets there are [\d.]+ \w*m long: add a Subdivision modifier if the mesh stands"
     with pytest.raises(RuntimeError, match=words):
         empty.ops.tactile.reconstruct(target="Suzanne", location=corner)
 

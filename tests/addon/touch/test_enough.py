@@ -106,7 +106,7 @@ def test_while_a_gesture_goes_on_the_extent_stays(empty, sheet, extension):
     stops = [{stop for pair in report["stops"] for stop in pair} for report in (going, ended)]
     assert stops == [{"extent"}, {"not explained", "no contact"}]
     assert "half curves" not in going["message"]
-    assert re.search(r" Of 6 half curves \d end (at|where) .*, \d (at|where) .*\.$", ended["message"])
+    assert re.search(r" \d of 6 half curves end (at|where) .*, \d (at|where) .*\.$", ended["message"])
 
 
 def test_the_shell_asks_for_planes_too(command, files):

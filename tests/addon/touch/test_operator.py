@@ -278,7 +278,7 @@ def test_degree_0_is_what_the_contacts_show(empty):
     empty.ops.mesh.primitive_plane_add(size=4.0)
     _, report = reconstruct(empty, location=(0.0, 0.0, 0.0), extent=1.0, noise=0.01, degree=0)
     assert (report["degree"], report["coefficients"]) == (2, [])
-    with pytest.raises(RuntimeError, match="Degree: wanted a whole number from 2 to 6"):
+    with pytest.raises(RuntimeError, match="Degree: expected a whole number from 2 to 6"):
         empty.ops.tactile.reconstruct(location=(0.0, 0.0, 0.0), extent=1.0, degree=1)
 
 
@@ -471,10 +471,10 @@ def nothing(bpy):
     ("spoil", "change", "sentence"),
     [
         (nothing, {"target": "Nobody"}, 'There is no object "Nobody"'),
-        (camera, {"target": "Camera"}, '"Camera" is no mesh'),
+        (camera, {"target": "Camera"}, '"Camera" is not a mesh'),
         (no_faces, {}, '"Sphere" has no faces to touch'),
-        (bad_vertex, {}, "vertices at no finite place"),
-        (zero_scale, {}, "scaled to nothing in some direction"),
+        (bad_vertex, {}, "vertices whose coordinates are not finite"),
+        (zero_scale, {}, "a scale of 0 in some direction"),
         (huge, {}, "reaches farther than 1e+15 from the origin"),
         (one_vertex_far_away, {}, "reaches farther than 1e+15 from the origin"),
         (disabled, {}, "disabled in viewports or excluded from the view layer"),
@@ -484,21 +484,21 @@ def nothing(bpy):
         (nothing, {"location": (0.0, 0.0, 9.0)}, "The location is 7 m away"),
         (nothing, {"location": (float("nan"), 0.0, 0.0)}, "coordinates that are not finite"),
         (nothing, {"location": (float("inf"), 0.0, 0.0)}, "too far away to be measured"),
-        (nothing, {"outward": (0.0, 0.0, 0.0)}, "Outward: wanted a vector with a direction"),
-        (nothing, {"outward": (float("nan"), 0.0, 0.0)}, "Outward: wanted finite numbers"),
+        (nothing, {"outward": (0.0, 0.0, 0.0)}, "Outward: expected a vector with a direction"),
+        (nothing, {"outward": (float("nan"), 0.0, 0.0)}, "Outward: expected finite numbers"),
         (nothing, {"extent": 50.0}, 'The extent 50 m is longer than "Sphere"'),
-        (nothing, {"step": 1e-5}, "Step: wanted at least a 10000th of the extent 0.6"),
+        (nothing, {"step": 1e-5}, "Step: expected at least a 10000th of the extent 0.6"),
         (nothing, {"step": 0.9}, "The step 0.9 m is longer than the extent 0.6 m"),
         (nothing, {"extent": -1.0}, "lengths of 0 or more"),
         (nothing, {"step": -0.1}, "lengths of 0 or more"),
         (nothing, {"noise": -0.1}, "lengths of 0 or more"),
         (nothing, {"extent": float("nan")}, "lengths of 0 or more, got nan m"),
         (nothing, {"noise": 1e30}, "The noise 1e+27 km is larger than the extent 0.6 m"),
-        (nothing, {"weight": -1.0}, "Weight: wanted a finite number above 0"),
+        (nothing, {"weight": -1.0}, "Weight: expected a finite number above 0"),
         (nothing, {"step": 0.6}, "Curve 1 has 2 of the 3 contacts"),
-        (nothing, {"azimuths": [0.0] * 6}, "run in one direction"),
-        (nothing, {"azimuths": [0.0, 1.0, 1.001, 0, 0, 0]}, "Curves 2 and 3 run in one direction"),
-        (nothing, {"tilts": [1.6, 0, 0, 0, 0, 0]}, "Tilt: wanted less than 90 degrees"),
+        (nothing, {"azimuths": [0.0] * 6}, "run in the same direction"),
+        (nothing, {"azimuths": [0.0, 1.0, 1.001, 0, 0, 0]}, "Curves 2 and 3 run in the same direction"),
+        (nothing, {"tilts": [1.6, 0, 0, 0, 0, 0]}, "Tilt: expected less than 90 degrees"),
     ],
 )
 def test_bad_input_gets_a_sentence_and_leaves_nothing(empty, ball, spoil, change, sentence):
@@ -548,8 +548,8 @@ def test_a_doubtful_patch_finishes_with_a_warning(empty, capfd):
     empty.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 3
     _, report = reconstruct(empty, location=(0.42, -0.62, 0.78), extent=0.3)
     assert report["status"] == "uncertain"
-    assert "take a shorter extent" in report["message"]
-    assert "Warning: Doubtful: take a shorter extent, or add sampling planes" in capfd.readouterr().out
+    assert "use a shorter extent" in report["message"]
+    assert "Warning: Doubtful: use a shorter extent or add sampling planes" in capfd.readouterr().out
 
 
 def test_a_bump_between_the_curves_is_a_doubt_once_the_mesh_is_compared(empty):

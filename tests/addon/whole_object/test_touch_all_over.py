@@ -72,7 +72,7 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball):
 def test_nothing_begins_at_the_corners_of_a_sheet(empty):
     empty.ops.mesh.primitive_plane_add(size=2.0)
     before = datablocks(empty)
-    with pytest.raises(RuntimeError, match="No touch could begin: choose another location"):
+    with pytest.raises(RuntimeError, match="Touching could not begin: choose another location"):
         empty.ops.tactile.touch_all_over(tolerance=1e-3)  # it has no other vertices
     assert datablocks(empty) == before
 
@@ -83,3 +83,12 @@ def test_a_probe_or_a_place_says_where_to_begin(empty, ball):
     empty.ops.tactile.pick(target=ball.name, location=(0.0, 2.0, 0.0))
     surface, _ = touched(empty, tolerance=0.01, most=1)
     assert np.abs(positions(surface.data)[:, 1]).min() > 0.5
+
+
+def test_an_edited_surface_has_no_report(empty, ball, tmp_path):
+    surface, _ = touched(empty, tolerance=0.02)
+    surface.data.attributes.remove(surface.data.attributes["deviation"])
+    page = tmp_path / "page.html"
+    with pytest.raises(RuntimeError, match="was edited and is no longer a complete surface: touch all over"):
+        empty.ops.tactile.export_report(filepath=str(page))
+    assert not page.exists()

@@ -44,14 +44,14 @@ def test_contours_with_normals_need_no_direction():
 @pytest.mark.parametrize(
     ("given", "outward", "message"),
     [
-        ([np.zeros((3, 3))], (0, 0, 1), "wanted 40 contacts or more, got 3"),
-        (raster(), None, "outward: wanted a direction where contacts have no normals"),
+        ([np.zeros((3, 3))], (0, 0, 1), "expected 40 contacts or more, got 3"),
+        (raster(), None, "outward: expected a direction where contacts have no normals"),
         (
             [np.column_stack([np.linspace(0, 1, 60), np.zeros(60), np.zeros(60)])],
             (0, 0, 1),
-            "around some place",
+            "all around at least one of them",
         ),
-        (7, (0, 0, 1), "contours_or_strokes: wanted a list"),
+        (7, (0, 0, 1), "contours_or_strokes: expected a list"),
     ],
 )
 def test_what_carries_no_atlas_gets_a_sentence(given, outward, message):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches all over exact objects: what is found of them, where it is closed, and how far it is off."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +36,7 @@ def test_a_ball_is_closed_and_as_near_as_asked(ball):
     assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
     assert np.abs(solids.ball().distances(mesh.vertices)).mean() < 1e-3
     assert ball.status == "ok"
-    assert ball.message == "The object was felt wherever a finger could go on."
+    assert ball.message == "The object was felt everywhere a finger could reach."
     assert ball.next_touch() is None
     assert len(ball.patches) < 30
 
@@ -162,9 +163,9 @@ def test_the_same_seed_makes_the_same_touches(ball):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"tolerance": 0.0}, "tolerance: wanted a finite number above 0, got 0"),
-        ({"tolerance": 1e-3, "noise": 2e-3}, "tolerance: wanted the noise 0.002 or more, got 0.001"),
-        ({"most": 0}, "most: wanted a finite number of 1 or more, got 0"),
+        ({"tolerance": 0.0}, "tolerance: expected a finite number above 0, got 0"),
+        ({"tolerance": 1e-3, "noise": 2e-3}, "tolerance: expected the noise 0.002 or more, got 0.001"),
+        ({"most": 0}, "most: expected a finite number of 1 or more, got 0"),
     ],
 )
 def test_bad_arguments_get_a_sentence(options, message):
@@ -173,5 +174,41 @@ def test_bad_arguments_get_a_sentence(options, message):
 
 
 def test_no_start_on_the_surface_gets_a_sentence():
-    with pytest.raises(ValueError, match="wanted one on the surface"):
+    with pytest.raises(ValueError, match="expected one on the surface"):
         core.explore_object(solids.ball(), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), tolerance=1e-2)
+
+
+@pytest.mark.parametrize("most", [4, 1000])
+def test_the_graph_as_data_survives_json_and_is_that_of_the_atlas(most):
+    atlas = explored(solids.ball(), most=most)
+    d = atlas.to_dict()
+    assert json.loads(json.dumps(d, allow_nan=False)) == d
+    assert [d[name] for name in ("version", "status", "message")] == [1, atlas.status, atlas.message]
+    assert len(d["nodes"]) == len(atlas.patches)
+    for node, r in zip(d["nodes"], atlas.patches, strict=True):
+        patch, domain = core.MongePatch(**node["polynomial"]), core.Domain(np.array(node["domain"]))
+        x, y = domain.points_at(np.array([[0.0, 0.5], [0.7, -0.2]])).T
+        assert (patch.height(x, y) == r.patch.height(x, y)).all()
+        frame = core.Frame(**{name: np.array(values) for name, values in node["frame"].items()})
+        world = frame.to_world(np.column_stack([x, y, patch.height(x, y)]))
+        assert np.abs(np.linalg.norm(world, axis=1) - 1.0).max() < 0.01
+        assert node["mean_height_std"] < 4e-3
+    for edge, known in zip(d["edges"], atlas.edges, strict=True):
+        assert edge["nodes"] == list(known.nodes)
+        assert len(edge["curve"]) == len(edge["angle"]) == len(known.curve)
+    if most == 4:
+        assert len(d["uncovered"]) == len(atlas.uncovered) > 0
+        assert np.array_equal(d["next_touch"]["point"], atlas.next_touch().point)
+    else:
+        assert (d["uncovered"], d["next_touch"]) == ([], None)
+
+
+def test_edges_in_steps_are_the_edges(block):
+    again = replace(block)
+    shares = list(again.bounding())
+    assert shares == sorted(shares)
+    assert len(shares) >= len(block.patches)
+    assert shares[-1] == 1.0
+    assert again.edges is again.edges
+    assert [e.nodes for e in again.edges] == [e.nodes for e in block.edges]
+    assert list(again.bounding()) == []

@@ -209,7 +209,7 @@ def test_normals_in_another_frame_than_the_contacts_are_told(std):
             assert (r.status, contradicts(r)) == ("uncertain", True)
             angle = float(r.message.split(" by ")[1].split(" degrees")[0])
             assert angle == pytest.approx(5.0, rel=0.25)
-    assert "check in which frame they were measured, or leave them out" in r.message
+    assert "check the frame they were measured in, or leave them out" in r.message
 
 
 def test_mirrored_normals_are_told_though_they_are_right_in_the_mean():
@@ -251,14 +251,17 @@ def test_too_few_normals_contradict_nothing():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"normal_std": 0.1}, "normal_std: wanted measured normals that it is of, got none"),
-        ({"normal_std": -0.1, "normals": np.ones((3, 3))}, "normal_std: wanted a finite number of 0 or more"),
-        ({"normal_std": np.nan, "normals": np.ones((3, 3))}, "normal_std: wanted a finite number"),
-        ({"normal_std": 0.1, "normals": np.ones((2, 3))}, r"normals: wanted shape \(3, 3\), got \(2, 3\)"),
-        ({"normal_std": 0.1, "normals": np.full((3, 3), np.nan)}, "normals: wanted finite numbers"),
+        ({"normal_std": 0.1}, "normal_std: expected the measured normals that it belongs to, got none"),
+        (
+            {"normal_std": -0.1, "normals": np.ones((3, 3))},
+            "normal_std: expected a finite number of 0 or more",
+        ),
+        ({"normal_std": np.nan, "normals": np.ones((3, 3))}, "normal_std: expected a finite number"),
+        ({"normal_std": 0.1, "normals": np.ones((2, 3))}, r"normals: expected shape \(3, 3\), got \(2, 3\)"),
+        ({"normal_std": 0.1, "normals": np.full((3, 3), np.nan)}, "normals: expected finite numbers"),
         (
             {"normal_std": 0.1, "normals": [[0, 0, 1], [0, 0, 0], [0, 0, 1]]},
-            r"wanted directions .* got \(0, 0, 0\)",
+            r"expected directions .* got \(0, 0, 0\)",
         ),
     ],
 )

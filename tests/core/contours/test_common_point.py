@@ -116,14 +116,14 @@ ACROSS = LINE[:, [1, 0, 2]]
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ([], "the common point is where two or more curves meet, got 0"),
-        ([LINE], "the common point is where two or more curves meet, got 1"),
+        ([], "the common point needs two or more curves, got 0"),
+        ([LINE], "the common point needs two or more curves, got 1"),
         ([LINE, ACROSS[:3]], "curve 2 has 3 contacts, and 4 are needed"),
         ([LINE, ACROSS + 4 * UP], "the curves do not come near each other: curve 1"),
         ([LINE, ACROSS + 30 * RIGHT], "the curves do not come near each other"),
         ([LINE, ACROSS + 30 * AHEAD], "the curves do not come near each other"),
-        ([LINE, LINE + 0.1 * UP], "the curves run in one direction"),
-        ([LINE, LINE + 0.5 * RIGHT], "the curves run in one direction"),
+        ([LINE, LINE + 0.1 * UP], "the curves run in the same direction"),
+        ([LINE, LINE + 0.5 * RIGHT], "the curves run in the same direction"),
         ([LINE, np.ones((9, 3))], "the curves"),
     ],
 )

@@ -161,8 +161,8 @@ def line(angle, contacts=9):
     ("contours", "message"),
     [
         ([line(0), line(1)], "three curves are needed, got 2"),
-        ([line(0), line(1), line(1.001)], "curves 2 and 3 run in one direction"),
-        ([line(0), line(0), line(np.pi)], "leaves 1 distinct ones of the three needed"),
+        ([line(0), line(1), line(1.001)], "curves 2 and 3 run in the same direction"),
+        ([line(0), line(0), line(np.pi)], "leaves 1 of the three directions needed"),
         (
             [line(0), line(1), line(2, 3)],
             "curve 3 has 2 of the 3 contacts it needs besides the reference point",
@@ -171,7 +171,7 @@ def line(angle, contacts=9):
         ([line(0), line(1), Contour(np.empty((0, 3)))], "curve 3 has 0 of the 3 contacts"),
         (
             [line(0), line(1), Contour(np.outer(np.linspace(-1, 1, 9), [0, 0, 1]))],
-            "lie in no plane",
+            "do not lie in one plane",
         ),
     ],
 )
@@ -187,7 +187,7 @@ def test_curves_a_degree_apart_are_distinct(degrees, distinct):
     if distinct:
         assert surface.fit(contours).k1_std > 0.0
     else:
-        with pytest.raises(DegenerateCurvesError, match=r"run in one direction \(0.9 degrees apart\)"):
+        with pytest.raises(DegenerateCurvesError, match=r"run in the same direction \(0.9 degrees apart\)"):
             surface.fit(contours)
 
 

@@ -132,22 +132,22 @@ def test_a_ball_ends_where_one_height_no_longer_describes_it():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"step": -1}, "step: wanted a finite number above 0, got -1"),
-        ({"step": 20}, "step: wanted no more than the extent 10, got 20"),
-        ({"extent": float("nan")}, "extent: wanted a finite number above 0, got nan"),
-        ({"noise": -0.1}, "noise: wanted a finite number of 0 or more, got -0.1"),
-        ({"point": (0, 0)}, r"point: wanted shape \(3\), got \(2,\)"),
-        ({"point": (0, 0, np.inf)}, "point: wanted finite numbers"),
-        ({"point": (0, 0, 3)}, "point: wanted one on the surface"),
-        ({"outward": (0, 0, 0)}, "outward: wanted a vector with a direction"),
-        ({"tangent": (0, 0, 1)}, "tangent: wanted a direction across the normal"),
-        ({"planes": [SamplingPlane(0.0, 1.6)]}, "tilt: wanted less than 90 degrees"),
-        ({"planes": [SamplingPlane(float("nan"))]}, "azimuth: wanted a finite number, got nan"),
-        ({"planes": None}, "planes: wanted a list, got None"),
-        ({"planes": [0.5]}, "planes: wanted a list of SamplingPlane, got 0.5 in it"),
-        ({"step": 1e-7}, "step: wanted at least a 10000th of the extent 10, got 1e-07"),
-        ({"rng": "dice"}, "rng: wanted a Generator or a whole number of 0 or more, got 'dice'"),
-        ({"rng": -1}, "rng: wanted a Generator or a whole number of 0 or more, got -1"),
+        ({"step": -1}, "step: expected a finite number above 0, got -1"),
+        ({"step": 20}, "step: expected no more than the extent 10, got 20"),
+        ({"extent": float("nan")}, "extent: expected a finite number above 0, got nan"),
+        ({"noise": -0.1}, "noise: expected a finite number of 0 or more, got -0.1"),
+        ({"point": (0, 0)}, r"point: expected shape \(3\), got \(2,\)"),
+        ({"point": (0, 0, np.inf)}, "point: expected finite numbers"),
+        ({"point": (0, 0, 3)}, "point: expected one on the surface"),
+        ({"outward": (0, 0, 0)}, "outward: expected a vector with a direction"),
+        ({"tangent": (0, 0, 1)}, "tangent: expected a direction across the normal"),
+        ({"planes": [SamplingPlane(0.0, 1.6)]}, "tilt: expected less than 90 degrees"),
+        ({"planes": [SamplingPlane(float("nan"))]}, "azimuth: expected a finite number, got nan"),
+        ({"planes": None}, "planes: expected a list, got None"),
+        ({"planes": [0.5]}, "planes: expected a list of SamplingPlane, got 0.5 in it"),
+        ({"step": 1e-7}, "step: expected at least a 10000th of the extent 10, got 1e-07"),
+        ({"rng": "dice"}, "rng: expected a Generator or a whole number of 0 or more, got 'dice'"),
+        ({"rng": -1}, "rng: expected a Generator or a whole number of 0 or more, got -1"),
     ],
 )
 def test_bad_arguments_are_named(change, message):
@@ -167,10 +167,10 @@ def test_contours_take_lists_and_refuse_nonsense():
     assert contour.points.dtype == np.float64
     assert np.array_equal(contour.plane_normal, [0, 0, 1])
     for points in ([[0, 0]], [1, 2, 3], [[0, 0, np.nan]], "abc"):
-        with pytest.raises(ValueError, match="points: wanted"):
+        with pytest.raises(ValueError, match="points: expected"):
             Contour(points)
     for stops in (5, ("extent",), (1, 2)):
-        with pytest.raises(ValueError, match="stops: wanted"):
+        with pytest.raises(ValueError, match="stops: expected"):
             Contour([[0, 0, 0]], stops=stops)
 
 
@@ -197,7 +197,7 @@ def test_a_surface_that_answers_nonsense_is_named(hit, message):
                 else super().ray_cast(origin, direction, distance)
             )
 
-    with pytest.raises(ValueError, match=f"surface: wanted .*{message}"):
+    with pytest.raises(ValueError, match=f"surface: expected .*{message}"):
         track(Odd(*FLOOR), (0, 0, 0), (0, 0, 1), [SamplingPlane(0.0)], extent=5, step=1)
 
 
@@ -248,7 +248,7 @@ def test_a_plane_leans_by_less_than_a_right_angle():
         assert u[2] == pytest.approx(np.cos(np.radians(degrees)))
         assert np.cross(t, u) == pytest.approx(across)
     for degrees in (-90.0, 90.0, 100.0):
-        with pytest.raises(ValueError, match="tilt: wanted less than 90 degrees, got"):
+        with pytest.raises(ValueError, match="tilt: expected less than 90 degrees, got"):
             SamplingPlane(0.3, np.radians(degrees)).axes((0, 0, 1))
 
 

@@ -7,7 +7,7 @@ import pytest
 import surfaces
 
 import core
-from core.exploration import growth, one_touch, touches
+from core.exploration import growth, one_touch, side_by_side
 from core.exploration.one_touch import NOTICEABLE, is_enough
 from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
@@ -95,7 +95,7 @@ def short_waves():
 
 def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     asked = []
-    monkeypatch.setattr(touches, "fitted", lambda *given: asked.append(1) or fitted(*given))
+    monkeypatch.setattr(side_by_side, "fitted", lambda *given: asked.append(1) or fitted(*given))
     found, few = explore(short_waves()), len(asked)
     monkeypatch.setattr(growth, "TOO_ROUGH", np.inf)
     assert explore(short_waves()).extent == found.extent
@@ -247,7 +247,7 @@ def test_of_many_one_may_be_no_touch():
     points = np.array([ball.point, ball.point + 5.0 * ball.normal])
     one, other = core.explore_many(ball, points, [ball.normal] * 2, PLANES, farthest=30.0)
     assert one.result.status == "ok"
-    assert str(other).startswith("point: wanted one on the surface")
+    assert str(other).startswith("point: expected one on the surface")
     assert core.explore_many(ball, np.empty((0, 3)), np.empty((0, 3)), PLANES, farthest=30.0) == []
 
 
@@ -306,13 +306,13 @@ def test_nothing_is_felt_twice():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"tolerance": -1.0}, "tolerance: wanted a finite number of 0 or more, got -1"),
-        ({"most_planes": 2}, "most_planes: wanted a finite number of 3 or more, got 2"),
-        ({"extent": "far"}, "extent: wanted a finite number above 0, got 'far'"),
-        ({"step": -1.0}, "step: wanted a finite number above 0, got -1"),
-        ({"farthest": 0.0}, "farthest: wanted a finite number above 0, got 0"),
-        ({"step": 40.0}, "step: wanted no more than the extent 30, got 40"),
-        ({"method": "magic", "extent": 8.0}, "method: wanted one of .*, got 'magic'"),
+        ({"tolerance": -1.0}, "tolerance: expected a finite number of 0 or more, got -1"),
+        ({"most_planes": 2}, "most_planes: expected a finite number of 3 or more, got 2"),
+        ({"extent": "far"}, "extent: expected a finite number above 0, got 'far'"),
+        ({"step": -1.0}, "step: expected a finite number above 0, got -1"),
+        ({"farthest": 0.0}, "farthest: expected a finite number above 0, got 0"),
+        ({"step": 40.0}, "step: expected no more than the extent 30, got 40"),
+        ({"method": "magic", "extent": 8.0}, "method: expected one of .*, got 'magic'"),
     ],
 )
 def test_bad_arguments_are_named(more, message):
@@ -362,7 +362,8 @@ def test_how_far_to_feel_is_found_where_curves_end_by_themselves():
 
 
 def test_a_surface_without_an_end_asks_how_far_to_feel():
-    with pytest.raises(ValueError, match="The curves do not end by themselves: say how far to feel at most"):
+    said = "The curves do not end by themselves: set farthest, the greatest length"
+    with pytest.raises(ValueError, match=said):
         core.explore(surfaces.plane(), (0.0, 0.0, 0.0), UP)
 
 
@@ -377,7 +378,7 @@ def test_planes_may_be_a_number_of_evenly_laid_out_ones(count):
 
 @pytest.mark.parametrize("planes", [2, 25, 0])
 def test_too_few_or_too_many_planes_are_refused(planes):
-    with pytest.raises(ValueError, match="planes: wanted 3 to 24, or sampling planes, got"):
+    with pytest.raises(ValueError, match="planes: expected 3 to 24, or sampling planes, got"):
         explore(surfaces.plane(), planes=planes)
 
 
@@ -399,5 +400,5 @@ def test_a_deviation_that_is_large_enough_ends_growth():
     )
     assert narrow.extent < wide.extent
     assert narrow.result.mean_height_std < wide.result.mean_height_std
-    with pytest.raises(ValueError, match="largest_std: wanted a finite number above 0"):
+    with pytest.raises(ValueError, match="largest_std: expected a finite number above 0"):
         core.explore(place, place.point, place.normal, largest_std=0.0)

@@ -106,7 +106,7 @@ def test_a_curve_that_ends_at_the_point_is_no_end():
 
 def test_fewer_than_three_ends_bound_nothing():
     for ends in (circle([0, 180]), circle([0, 0, 180, 180]), [[0, 0], [0, 0], [1, 0]]):
-        with pytest.raises(ValueError, match="ends: wanted three or more apart"):
+        with pytest.raises(ValueError, match="ends: expected three or more apart"):
             closed_spline_domain(ends, 1.0)
 
 
@@ -133,7 +133,7 @@ def test_the_domain_of_scattered_contacts_is_their_hull():
     domain = hull_domain(points, 2.0)
     assert domain.area == pytest.approx(4.0 * np.pi, rel=0.01)
     assert np.hypot(*domain.boundary(100).T) == pytest.approx(2.0, rel=0.01)
-    with pytest.raises(ValueError, match="points: wanted the origin among them"):
+    with pytest.raises(ValueError, match="points: expected the origin among them"):
         hull_domain(points + np.array([1.95, 0.0]), 2.0)
 
 

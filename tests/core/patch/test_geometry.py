@@ -84,7 +84,7 @@ def test_the_reference_point_stays_on_its_curves_far_from_the_origin():
 def test_what_is_no_similarity_is_refused(matrix):
     r = touched()
     for moved in (r.moved, r.geometry.moved):
-        with pytest.raises(ValueError, match="matrix: wanted"):
+        with pytest.raises(ValueError, match="matrix: expected"):
             moved(matrix)
 
 

@@ -101,7 +101,7 @@ def is_sentence(error):
         return known and len(words) < 400 and "nan" not in words
     return (
         type(error) is ValueError
-        and any(words.startswith(f"{n}: wanted ") for n in NAMES.split("|"))
+        and any(words.startswith(f"{n}: expected ") for n in NAMES.split("|"))
         and (", got " in words and "\n" not in words and len(words) < 300)
     )
 

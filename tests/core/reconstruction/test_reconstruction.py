@@ -178,26 +178,26 @@ GOOD = track(
     [
         (
             {"method": "magic"},
-            "method: wanted one of bayes, tagc, quadratic-variation, least-squares, got 'magic'",
+            "method: expected one of bayes, tagc, quadratic-variation, least-squares, got 'magic'",
         ),
-        ({"solver": "slow"}, "solver: wanted one of fast, descent, got 'slow'"),
-        ({"degree": 7}, 'degree: wanted a whole number from 2 to 6 or "auto", got 7'),
-        ({"degree": 3.5}, 'degree: wanted a whole number from 2 to 6 or "auto", got 3.5'),
-        ({"degree": "high"}, 'degree: wanted a whole number from 2 to 6 or "auto", got .high'),
-        ({"weight": 0}, "weight: wanted a finite number above 0, got 0"),
-        ({"noise": -1}, "noise: wanted a finite number of 0 or more, got -1"),
-        ({"outward": (0, 0, 0)}, "outward: wanted a vector with a direction"),
-        ({"point": (np.nan, 0, 0)}, "point: wanted finite numbers"),
-        ({"point": (0, 0, 1e60)}, r"point: wanted numbers up to 1e\+50, got larger ones"),
-        ({"point": (0, 0, 10**400)}, "point: wanted numbers of shape"),
-        ({"point": np.array([1j, 0, 0])}, "point: wanted numbers of shape"),
-        ({"method": np.array(["bayes", "tagc"])}, "method: wanted one of"),
-        ({"degree": np.array([4, 5])}, "degree: wanted a whole number"),
-        ({"weight": np.array([1.0])}, r"weight: wanted a finite number above 0, got array\(\[1.\]\)"),
-        ({"weight": 10**400}, "weight: wanted a finite number above 0, got 1000"),
-        ({"weight": 1e60}, r"weight: wanted a number up to 1e\+50, got 1e\+60"),
-        ({"contours": None}, "contours: wanted a list, got None"),
-        ({"contours": [GOOD[0].points]}, "contours: wanted a list of Contour, got array"),
+        ({"solver": "slow"}, "solver: expected one of fast, descent, got 'slow'"),
+        ({"degree": 7}, 'degree: expected a whole number from 2 to 6 or "auto", got 7'),
+        ({"degree": 3.5}, 'degree: expected a whole number from 2 to 6 or "auto", got 3.5'),
+        ({"degree": "high"}, 'degree: expected a whole number from 2 to 6 or "auto", got .high'),
+        ({"weight": 0}, "weight: expected a finite number above 0, got 0"),
+        ({"noise": -1}, "noise: expected a finite number of 0 or more, got -1"),
+        ({"outward": (0, 0, 0)}, "outward: expected a vector with a direction"),
+        ({"point": (np.nan, 0, 0)}, "point: expected finite numbers"),
+        ({"point": (0, 0, 1e60)}, r"point: expected numbers up to 1e\+50, got larger ones"),
+        ({"point": (0, 0, 10**400)}, "point: expected numbers of shape"),
+        ({"point": np.array([1j, 0, 0])}, "point: expected numbers of shape"),
+        ({"method": np.array(["bayes", "tagc"])}, "method: expected one of"),
+        ({"degree": np.array([4, 5])}, "degree: expected a whole number"),
+        ({"weight": np.array([1.0])}, r"weight: expected a finite number above 0, got array\(\[1.\]\)"),
+        ({"weight": 10**400}, "weight: expected a finite number above 0, got 1000"),
+        ({"weight": 1e60}, r"weight: expected a number up to 1e\+50, got 1e\+60"),
+        ({"contours": None}, "contours: expected a list, got None"),
+        ({"contours": [GOOD[0].points]}, "contours: expected a list of Contour, got array"),
     ],
 )
 def test_bad_arguments_are_named(change, message):
@@ -303,13 +303,13 @@ def test_a_touch_that_carries_nothing_does_not_spoil_the_others():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"points": [(0, 0, 0)] * 2}, "contours_list: wanted 2 lists of contours, got 1"),
-        ({"points": (0, 0, 0)}, r"points: wanted shape \(n, 3\), got \(3,\)"),
-        ({"outward": (0, 0, 1)}, r"outward: wanted shape \(1, 3\), got \(3,\)"),
-        ({"outward": [(0, 0, 0)]}, "outward: wanted a vector with a direction"),
-        ({"contours_list": 5}, "contours_list: wanted a list, got 5"),
-        ({"contours_list": [[GOOD[0].points]]}, "contours: wanted a list of Contour, got array"),
-        ({"degree": 9}, "degree: wanted a whole number"),
+        ({"points": [(0, 0, 0)] * 2}, "contours_list: expected 2 lists of contours, got 1"),
+        ({"points": (0, 0, 0)}, r"points: expected shape \(n, 3\), got \(3,\)"),
+        ({"outward": (0, 0, 1)}, r"outward: expected shape \(1, 3\), got \(3,\)"),
+        ({"outward": [(0, 0, 0)]}, "outward: expected a vector with a direction"),
+        ({"contours_list": 5}, "contours_list: expected a list, got 5"),
+        ({"contours_list": [[GOOD[0].points]]}, "contours: expected a list of Contour, got array"),
+        ({"degree": 9}, "degree: expected a whole number"),
     ],
 )
 def test_bad_arguments_of_many_are_named(change, message):
@@ -321,7 +321,7 @@ def test_bad_arguments_of_many_are_named(change, message):
 def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():
     s = np.linspace(0.1, 1.0, 9)
     curves = [Contour(np.column_stack([s, bend * s * (1.0 - s), 0.0 * s])) for bend in (-0.1, 0.0, 0.1)]
-    with pytest.raises(DegenerateCurvesError, match="fewer than three places apart"):
+    with pytest.raises(DegenerateCurvesError, match="fewer than three separate places"):
         reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
 
 
@@ -369,7 +369,7 @@ def test_masked_contacts_are_refused():
     points = np.ma.masked_array(np.arange(12.0).reshape(4, 3), mask=False)
     assert Contour(points).points.shape == (4, 3)
     points[1] = np.ma.masked
-    with pytest.raises(ValueError, match="points: wanted numbers, got masked ones among them: take them out"):
+    with pytest.raises(ValueError, match="points: expected numbers, got masked ones among them: remove them"):
         Contour(points)
 
 

@@ -87,29 +87,29 @@ KEYS = sorted(set(to_dict(RESULTS[0])) - {"status", "message"})
 def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
     if key == "converged" and value is not None:
         return
-    with pytest.raises(ValueError, match=r": wanted "):
+    with pytest.raises(ValueError, match=r": expected "):
         from_dict(damaged([key], value))
 
 
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
-        (["version"], 3, "version: wanted 2, got 3: this was written by another release"),
-        (["geometry", "radius"], None, "radius: wanted it in the dict of a reconstruction, got none"),
-        (["geometry", "radius"], 1e-300, "radius: wanted a finite number of 1e-50 or more"),
-        (["method"], "magic", "method: wanted one of bayes"),
-        (["geometry", "frame", "axes"], np.diag([1, 1, -1]).tolist(), "axes: wanted a right-handed frame"),
-        (["geometry", "frame", "axes"], np.diag([2, 2, 2]).tolist(), "axes: wanted a right-handed frame"),
-        (["geometry", "frame", "origin"], [0, 0], "origin: wanted shape"),
-        (["geometry", "polynomial", "k1"], "flat", "k1: wanted a finite number"),
-        (["patch", "coefficients"], [1.0, 2.0], "coefficients: wanted 0, 4, 9, 15, 22 of them, got 2"),
+        (["version"], 3, "version: expected 2, got 3: this was written by another release"),
+        (["geometry", "radius"], None, "radius: expected it in the dict of a reconstruction, got none"),
+        (["geometry", "radius"], 1e-300, "radius: expected a finite number of 1e-50 or more"),
+        (["method"], "magic", "method: expected one of bayes"),
+        (["geometry", "frame", "axes"], np.diag([1, 1, -1]).tolist(), "axes: expected a right-handed frame"),
+        (["geometry", "frame", "axes"], np.diag([2, 2, 2]).tolist(), "axes: expected a right-handed frame"),
+        (["geometry", "frame", "origin"], [0, 0], "origin: expected shape"),
+        (["geometry", "polynomial", "k1"], "flat", "k1: expected a finite number"),
+        (["patch", "coefficients"], [1.0, 2.0], "coefficients: expected 0, 4, 9, 15, 22 of them, got 2"),
         (["geometry", "domain"], [[0, 0], [1, 1]], "three or more"),
-        (["contours"], [], "contours: wanted a list of some"),
-        (["contours", 0, "points"], [1, 2], "points: wanted shape"),
-        (["contours", 0, "noise"], -1.0, "noise: wanted a finite number of 0 or more"),
-        (["geometry", "residual"], {"places": 3}, "places: wanted shape"),
-        (["posterior", "covariance"], [[1.0]], "covariance: wanted shape"),
-        (["posterior", "mean"], None, "mean: wanted it in the dict"),
+        (["contours"], [], "contours: expected a list of some"),
+        (["contours", 0, "points"], [1, 2], "points: expected shape"),
+        (["contours", 0, "noise"], -1.0, "noise: expected a finite number of 0 or more"),
+        (["geometry", "residual"], {"places": 3}, "places: expected shape"),
+        (["posterior", "covariance"], [[1.0]], "covariance: expected shape"),
+        (["posterior", "mean"], None, "mean: expected it in the dict"),
     ],
 )
 def test_what_is_wrong_is_named(path, value, words):
@@ -119,7 +119,7 @@ def test_what_is_wrong_is_named(path, value, words):
 
 @pytest.mark.parametrize("value", [None, 3, "{}", [1, 2]])
 def test_what_is_no_dict_is_refused(value):
-    with pytest.raises(ValueError, match="version: wanted it in a dict"):
+    with pytest.raises(ValueError, match="version: expected it in a dict"):
         from_dict(value)
 
 
@@ -136,7 +136,7 @@ def test_what_is_no_dict_is_refused(value):
 def test_a_covariance_that_is_none_is_refused(change):
     d = to_dict(touched(noise=0.0))
     d["posterior"]["covariance"] = change(np.array(d["posterior"]["covariance"])).tolist()
-    with pytest.raises(ValueError, match="covariance: wanted a symmetric matrix without negative"):
+    with pytest.raises(ValueError, match="covariance: expected a symmetric matrix without negative"):
         from_dict(d)
 
 
@@ -161,14 +161,14 @@ def rough():
 @pytest.mark.parametrize(
     ("key", "change", "words"),
     [
-        ("variances", lambda v: v * [-1.0, 1.0], "residual: wanted variances and noise above 0"),
-        ("variances", lambda v: 0.0 * v, "residual: wanted variances and noise above 0"),
-        ("noise", lambda v: -v, "residual: wanted variances and noise above 0"),
-        ("places", lambda v: 1e300 * v, "residual: wanted .* places on the unit disk"),
-        ("factor", lambda v: 0.0 * v, "factor: wanted a lower triangle"),
-        ("factor", lambda v: v - np.diag(v.diagonal()), "factor: wanted a lower triangle"),
-        ("factor", lambda v: v + 1e-3, "factor: wanted a lower triangle"),
-        ("factor", lambda v: v[:-1], "factor: wanted shape"),
+        ("variances", lambda v: v * [-1.0, 1.0], "residual: expected variances and noise above 0"),
+        ("variances", lambda v: 0.0 * v, "residual: expected variances and noise above 0"),
+        ("noise", lambda v: -v, "residual: expected variances and noise above 0"),
+        ("places", lambda v: 1e300 * v, "residual: expected .* places on the unit disk"),
+        ("factor", lambda v: 0.0 * v, "factor: expected a lower triangle"),
+        ("factor", lambda v: v - np.diag(v.diagonal()), "factor: expected a lower triangle"),
+        ("factor", lambda v: v + 1e-3, "factor: expected a lower triangle"),
+        ("factor", lambda v: v[:-1], "factor: expected shape"),
     ],
 )
 def test_a_damaged_residual_is_refused(key, change, words):

@@ -40,8 +40,8 @@ def test_heights_that_are_good_to_little():
     s = surfaces.pear()
     r = s.fit(contours_of(s, noise=1.5))
     assert r.status == "uncertain"
-    assert f"Heights are good to {100 * r.mean_height_std / r.radius:.1f} % of the radius" in r.message
-    assert "shorter extent, or add sampling planes" in r.message
+    assert f"Heights are accurate to {100 * r.mean_height_std / r.radius:.1f} % of the radius" in r.message
+    assert "shorter extent or add sampling planes" in r.message
 
 
 def test_contacts_that_are_missed_by_more_than_their_noise_explains():
@@ -54,10 +54,7 @@ def test_contacts_that_are_missed_by_more_than_their_noise_explains():
         assert 1.0 < missed < 2.5
         assert r.status == "uncertain"
         assert r.message.startswith(f"Half of the contacts are off the patch by more than {missed:.1f} %")
-        assert (
-            "which their noise does not explain: take a shorter extent, or say how noisy they are"
-            in r.message
-        )
+        assert "which their noise does not explain: use a shorter extent or give their noise" in r.message
         assert "Half of the contacts" not in s.fit(noisy, degree=2).message
 
 
@@ -88,7 +85,7 @@ def test_a_descent_that_has_not_come_to_an_end():
     s = surfaces.pear()
     r = replace(s.fit(contours_of(s), method="tagc"), converged=False)
     assert r.status == "not_converged"
-    assert "use the fast solver, or a smaller weight" in r.message
+    assert "use the fast solver or a smaller weight" in r.message
 
 
 def test_a_curve_that_misses_the_point_is_named_with_its_distance():
@@ -126,7 +123,7 @@ def test_principal_directions_that_may_be_far_off():
         r = s.fit(contours_of(s, degrees=(13, 33, 53), noise=0.1, seed=seed))
         if "principal directions may" in r.message:
             assert r.status == "uncertain"
-            assert "take a longer extent, or add sampling planes" in r.message
+            assert "use a longer extent or add sampling planes" in r.message
             turned.append(seed)
     assert len(turned) > 10
 
@@ -146,7 +143,7 @@ def test_the_frame_is_hardly_ever_off_by_more_than_the_angle_that_is_told():
 @pytest.mark.parametrize("surface", [surfaces.pear(), surfaces.ellipsoid(30, 28, 27, 0.4, 0.5)])
 @pytest.mark.parametrize("degrees", [(13, 73, 133), (13, 33, 53)])
 def test_the_angle_told_is_a_quantile_of_the_posterior(surface, degrees):
-    r = surface.fit(contours_of(surface, degrees=degrees, noise=0.1))
+    r = surface.fit(contours_of(surface, degrees=degrees, noise=0.15))
     mean, covariance = r.posterior.mean[:5], r.posterior.covariance[:5, :5]
     drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, 40_000)
     x, y, xx, xy, yy = drawn.T
@@ -183,10 +180,10 @@ def test_a_curve_shorter_than_a_quarter_of_the_radius_leaves_doubt():
         r = s.fit(cut_short(contours, s.point))
         assert r.status == "uncertain"  # whichever doubt comes first
         if (
-            f"Curvatures are good to {r.posterior.curvature_std() / r.radius:.2g} in the direction"
+            f"Curvatures are accurate to only {r.posterior.curvature_std() / r.radius:.2g} in the least"
             in r.message
         ):
-            assert "known least: take a longer extent, or add sampling planes" in r.message
+            assert "known direction: use a longer extent or add sampling planes" in r.message
             open_curvature += 1
     assert open_curvature > 2
 
@@ -272,7 +269,7 @@ def test_heights_may_be_good_to_two_percent_of_the_radius(share, doubt):
 
 
 @pytest.mark.parametrize(
-    ("degrees", "std", "doubt"), [(9.9, 0.099, ""), (10.1, 0.0, "principal"), (0.0, 0.101, "known least")]
+    ("degrees", "std", "doubt"), [(9.9, 0.099, ""), (10.1, 0.0, "principal"), (0.0, 0.101, "least known")]
 )
 def test_the_frame_may_be_ten_degrees_off_and_curvatures_a_tenth_of_one_over_the_radius(
     monkeypatch, degrees, std, doubt

@@ -186,9 +186,9 @@ def test_the_radius_limits_the_contacts_of_strokes_alone():
     r = alone("saddle", points, radius=6.0)
     assert 5.0 < r.radius <= 6.0
     assert np.linalg.norm(r.strokes - SURFACES["saddle"].point, axis=1).max() <= 6.0
-    with pytest.raises(ValueError, match="radius: wanted a finite number above 0"):
+    with pytest.raises(ValueError, match="radius: expected a finite number above 0"):
         alone("saddle", points, radius=0.0)
-    with pytest.raises(ValueError, match="radius: wanted none beside contours, which say how far"):
+    with pytest.raises(ValueError, match="radius: expected none beside contours, which say how far"):
         SURFACES["pear"].fit(crossed("pear"), radius=5.0)
 
 
@@ -286,7 +286,7 @@ def test_many_give_what_each_gives():
         assert r.strokes == pytest.approx(one.strokes, abs=1e-9)
         assert r.posterior.mean == pytest.approx(one.posterior.mean, abs=1e-7)
         assert r.mean_height_std == pytest.approx(one.mean_height_std, rel=1e-6)
-    with pytest.raises(ValueError, match="strokes_list: wanted 1 lists of strokes, got 2"):
+    with pytest.raises(ValueError, match="strokes_list: expected 1 lists of strokes, got 2"):
         reconstruct_many(points[:1], contours[:1], outward=outward[:1], strokes_list=strokes[:2])
 
 
@@ -408,14 +408,14 @@ def test_coarse_coordinates_and_bad_arguments_are_refused_with_a_sentence():
     with pytest.raises(DegenerateCurvesError, match="apart in double precision, too coarse"):
         reconstruct(surface.point + 1e15, [], outward=surface.normal, strokes=[points + 1e15])
     for strokes, words in (
-        (3.0, "strokes: wanted a list, got 3.0"),
-        (points, r"strokes: wanted shape \(n, 3\), got \(3,\)"),
-        ([points[:, :2]], r"strokes: wanted shape \(n, 3\), got \(\d+, 2\)"),
-        ([points * np.nan], "strokes: wanted finite numbers"),
+        (3.0, "strokes: expected a list, got 3.0"),
+        (points, r"strokes: expected shape \(n, 3\), got \(3,\)"),
+        ([points[:, :2]], r"strokes: expected shape \(n, 3\), got \(\d+, 2\)"),
+        ([points * np.nan], "strokes: expected finite numbers"),
     ):
         with pytest.raises(ValueError, match=words):
             surface.fit([], strokes=strokes)
-    with pytest.raises(ValueError, match='strokes: wanted none with "tagc", which is a method of contours'):
+    with pytest.raises(ValueError, match='strokes: expected none with "tagc", which fits contours only'):
         surface.fit(crossed("pear"), strokes=[points], method="tagc")
 
 

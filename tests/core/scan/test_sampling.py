@@ -54,5 +54,5 @@ def test_scattered_points_are_even_by_area_and_on_their_faces():
 
 def test_nothing_is_scattered_on_what_has_no_area():
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    with pytest.raises(ValueError, match="triangles: wanted some with an area, got none"):
+    with pytest.raises(ValueError, match="triangles: expected some with an area, got none"):
         core.scattered(points, np.array([[0, 1, 2]]), 5, np.random.default_rng(0))

@@ -239,7 +239,7 @@ def test_bad_vertices_are_refused():
     surface = SURFACES["plane"]
     r = touched(surface)
     for vertices in (np.zeros((3, 2)), [[np.nan] * 3], "mesh"):
-        with pytest.raises(ValueError, match="vertices: wanted"):
+        with pytest.raises(ValueError, match="vertices: expected"):
             verify(r, surface, vertices)
 
 

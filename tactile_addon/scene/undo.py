@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What handlers and timers add to the scene after an undo step was stored, and that is in no step.
+
+Undo keeps in memory each datablock that two steps have in common, with its pointers, and frees what is
+not in the step that it goes to. A collection that holds a patch made by a handler would then point to
+freed memory. So all of that is unlinked before undo, and linked again afterward if it is still there.
+"""
+
+from contextlib import contextmanager
+
+import bpy
+
+_is_late = False
+_added = set()  # session_uids of objects and collections that were added
+_replaced = {}  # those of meshes, by those of the copies that have taken their place
+_links = []  # what was taken out: a function that puts it back, and session_uids
+
+
+@contextmanager
+def after_step():
+    """What is added within may be in no step of undo."""
+    global _is_late
+    outer, _is_late = _is_late, True
+    try:
+        yield
+    finally:
+        _is_late = outer
+
+
+def note_added(datablock):
+    """To be called for a new object or collection that is linked to what was there before."""
+    if _is_late:
+        _added.add(datablock.session_uid)
+
+
+def note_copied(obj, mesh):
+    """To be called for an object that got a copy of `mesh` in its place."""
+    if _is_late:
+        _replaced[obj.data.session_uid] = mesh.session_uid
+
+
+def take_out():
+    """To be called before undo and redo."""
+    _links.clear()
+    if not (_added or _replaced):
+        return
+    added = [obj for obj in bpy.data.objects if obj.session_uid in _added]
+    for obj in added:
+        for child in obj.children:
+            _links.append((_set_parent, child.session_uid, obj.session_uid))
+            child.parent = None
+    for number, above in _collections().items():
+        for obj in [obj for obj in above.objects if obj.session_uid in _added]:
+            _links.append((_link_object, obj.session_uid, number))
+            above.objects.unlink(obj)
+        for collection in [child for child in above.children if child.session_uid in _added]:
+            _links.append((_link_collection, collection.session_uid, number))
+            above.children.unlink(collection)
+    _give_back_meshes()
+
+
+def _give_back_meshes():
+    there = {mesh.session_uid: mesh for mesh in bpy.data.meshes} if _replaced else {}
+    for obj in bpy.data.objects if there else ():
+        before = obj.type == "MESH" and there.get(_replaced.get(obj.data.session_uid))
+        if before:
+            _links.append((_set_mesh, obj.session_uid, obj.data.session_uid, before.session_uid))
+            obj.data = before
+
+
+def put_back():
+    """To be called after undo and redo, and where another file was opened."""
+    for function, *numbers in reversed(_links):
+        function(*numbers)
+    _links.clear()
+    _added.clear()
+    _replaced.clear()
+
+
+def _set_mesh(obj, copy, before):
+    obj, copy = _object(obj), _found(bpy.data.meshes, copy)
+    if obj is not None and copy is not None and obj.data.session_uid == before:
+        obj.data = copy
+
+
+def _set_parent(child, parent):
+    child, parent = _object(child), _object(parent)
+    if child is not None and parent is not None and child.parent is None:
+        child.parent = parent
+
+
+def _link_object(obj, collection):
+    obj, collection = _object(obj), _collections().get(collection)
+    if obj is not None and collection is not None and not obj.users_collection:
+        collection.objects.link(obj)
+
+
+def _link_collection(collection, above):
+    collection, above = _collections().get(collection), _collections().get(above)
+    if collection is not None and above is not None and collection.name not in above.children:
+        above.children.link(collection)
+
+
+def _object(number):
+    return _found(bpy.data.objects, number)
+
+
+def _found(datablocks, number):
+    return next((block for block in datablocks if block.session_uid == number), None)
+
+
+def _collections():
+    """All of them by their session_uids, and those of scenes by these scenes'."""
+    found = {collection.session_uid: collection for collection in bpy.data.collections}
+    return found | {scene.session_uid: scene.collection for scene in bpy.data.scenes}

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is touched in slices notices what becomes of its target meanwhile; maps and whole objects alike.
+
+What an operator does then is in tests/gui/stability.py and tests/gui/whole_object.py.
+"""
+
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+
+
+@pytest.fixture
+def taken(empty, ball, extension):
+    """The ball as it was."""
+    mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh
+    return mesh(ball, empty.context.evaluated_depsgraph_get())
+
+
+def test_a_target_that_stays_is_found_by_whatever_name(empty, ball, taken):
+    ball.name = "Another"
+    empty.context.view_layer.update()
+    assert taken.require_source(empty.context) == ball
+    assert taken.require_same(empty.context) == ball
+
+
+def move(bpy, obj):
+    obj.location.x += 1e-3
+
+
+def delete(bpy, obj):
+    bpy.data.objects.remove(obj)
+
+
+def unlink(bpy, obj):
+    bpy.context.scene.collection.objects.unlink(obj)
+
+
+def edit(bpy, obj):
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+@pytest.mark.parametrize(
+    ("disturb", "message"),
+    [
+        (move, '"Sphere" was moved while it was touched: start again'),
+        (delete, '"Sphere" is gone, so touching was stopped'),
+        (unlink, '"Sphere" is gone, so touching was stopped'),
+        (edit, "Touching was stopped because Object Mode was left: start it again"),
+    ],
+)
+def test_a_target_that_does_not_stay_is_told_at_once(empty, ball, taken, disturb, message):
+    disturb(empty, ball)
+    empty.context.view_layer.update()
+    for require in (taken.require_source, taken.require_same):
+        with pytest.raises(ValueError, match=message):
+            require(empty.context)
+
+
+@pytest.mark.parametrize("how", ["vertex", "modifier"])
+def test_another_shape_is_told_in_the_end(empty, ball, taken, how):
+    if how == "vertex":
+        ball.data.vertices[0].co.x += 1e-3
+        ball.data.update()
+    else:
+        ball.modifiers.new("Subdivision", "SUBSURF")
+    empty.context.view_layer.update()
+    assert taken.require_source(empty.context) == ball
+    with pytest.raises(ValueError, match='"Sphere" was changed while it was touched: start again'):
+        taken.require_same(empty.context)
