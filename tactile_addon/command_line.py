@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c tactile reconstruct|fit|object|map|table FILE`: patches, objects and maps from the shell."""
+"""`blender -c tactile reconstruct|fit|object|join|map|table FILE`: patches and more from the shell."""
 
 import argparse
 import sys
@@ -22,6 +22,7 @@ NOT_OF_ALL = (
     "azimuths",
     "tilts",
 )
+SURFACE = "save the scene with the surface as .blend, or the surface alone as .ply"
 VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
 
@@ -50,6 +51,7 @@ def _parser():
         ("reconstruct", _add_reconstruct, "touch a mesh and rebuild the patch around a point"),
         ("fit", _add_fit, "rebuild the patch from measured contacts"),
         ("object", _add_object, "touch a whole object and join the patches to one surface"),
+        ("join", _add_join, "join measured contacts of a whole object to one surface"),
         ("map", _add_map, "touch a mesh all over and paint a copy by how well touches go"),
         ("table", _add_table, "write the results of a scene's patches as a table, one row each"),
     ):
@@ -71,8 +73,7 @@ def _add_reconstruct(command):
 
 def _add_fit(command):
     add = command.add_argument
-    add("files", nargs="+", type=Path, metavar="FILE", help=".csv or .ply with the curves of one patch")
-    add("--unit", choices=list(contact_file.UNIT_METERS), help="unit of the numbers (the file's)")
+    _add_contacts(add, ".csv or .ply with the curves of one patch")
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
     help = "a place among strokes; all curves are then strokes (default for strokes alone: their mean)"
     add("--location", **VECTOR, help=help)
@@ -81,9 +82,6 @@ def _add_fit(command):
         type=float,
         help="for strokes alone: use contacts up to this distance from the place (all)",
     )
-    add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
-    add("--flip", action="store_true", default=None, help="use the other side as the outer one")
-    add("--noise", type=float, help="least standard deviation of a contact")
     add(
         "--normal-std",
         type=float,
@@ -94,6 +92,22 @@ def _add_fit(command):
     add("--onto", type=Path, metavar="MESH", help=help)
     _add_method(add)
     _add_verify(add)
+
+
+def _add_contacts(add, help):
+    """What was measured, and on which side."""
+    add("files", nargs="+", type=Path, metavar="FILE", help=help)
+    add("--unit", choices=list(contact_file.UNIT_METERS), help="unit of the numbers (the file's)")
+    add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
+    add("--flip", action="store_true", default=None, help="use the other side as the outer one")
+    add("--noise", type=float, help="least standard deviation of a contact")
+
+
+def _add_join(command):
+    add = command.add_argument
+    _add_contacts(add, ".csv or .ply with curves all over an object")
+    add("--tolerance", type=float, help="standard deviation to reach for heights (1.2 %% of each patch)")
+    _add_output(add, SURFACE)
 
 
 def _add_map(command):
@@ -111,7 +125,7 @@ def _add_object(command):
     add("--edge", type=float, help="length of the triangles' edges (chosen by the curvature)")
     add("--most", type=int, help="number of touches after which to stop (1000)")
     _add_sensor(add)
-    _add_output(add, "save the scene with the surface as .blend, or the surface alone as .ply")
+    _add_output(add, SURFACE)
 
 
 def _add_table(command):

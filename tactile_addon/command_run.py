@@ -45,6 +45,7 @@ COMMANDS = {
     "fit": Command("import_contacts", patch_record.RECORD, readable, {}),
     "table": Command("", "", lambda report: f"{report['rows']} rows written", {}),
     "object": Command("touch_all_over", patch_record.ATLAS_RECORD, object_readable, {"progress": True}),
+    "join": Command("import_contacts", patch_record.ATLAS_RECORD, object_readable, {"whole": True}),
     "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
 }
 # What the operators take as it is given.
@@ -58,7 +59,7 @@ NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
 PATCH_FILES = (".blend", ".ply", ".json")
 MESH_FILES = (".blend", ".ply")
 KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
-KINDS |= {"object": MESH_FILES, "map": MESH_FILES}
+KINDS |= dict.fromkeys(("object", "join", "map"), MESH_FILES)
 
 
 def _require_numbers(options):
@@ -113,6 +114,8 @@ def run(options):
     if command.record == patch_record.RECORD:
         _compare(made, options)
     report = made[command.record].to_dict()
+    if patch_record.GRAPH in made:
+        report["graph"] = json.loads(made[patch_record.GRAPH])
     if options.contacts is not None:
         r = patch_record.reconstruction_of(made)
         contact_file.write(options.contacts, contact_file.contacts_of(r))
@@ -162,7 +165,7 @@ def _open_contacts(options):
     """The files as arguments; where no .blend is open, in an empty scene of their unit, so numbers stay."""
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
-        unit = measured.read(options.files, options.unit or "FILE", 1.0).unit
+        unit = measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit
         settings = bpy.context.scene.unit_settings
         name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
         settings.system = "METRIC" if unit else "NONE"

@@ -58,7 +58,7 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
     parts, count = [], len(charts.radii)
     for node in range(count):
         parts.append(_crossings(charts, node))
-        yield (node + 1) / count
+        yield 0.9 * (node + 1) / count
     found = _Crossing(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     pairs: dict[tuple[int, int], list[int]] = {}
     for i, pair in enumerate(zip(found.node.tolist(), found.other.tolist(), strict=True)):
@@ -68,6 +68,7 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
         which = max(pairs.get(pair, []), pairs.get(pair[::-1], []), key=len)
         which = _in_turn(which, found.ray)
         edges.append(Edge(pair, found.point[which], found.angle[which]))
+        yield 1.0
     return edges
 
 

@@ -9,7 +9,7 @@ down, back and up, each from where the last one ended: so it bumps into walls an
 
 import heapq
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -92,8 +92,11 @@ class Frontier:
         """What was touched: its place is looked at again."""
         self.push(replace(touch.place, tries=touch.place.tries + 1), touch.gain)
 
-    def take(self, count: int) -> list[Next]:
-        """The touches that bring most, at most so many, far from each other; none where all is covered."""
+    def taking(self, count: int) -> Generator[None, None, list[Next]]:
+        """The touches that bring most, at most so many, far from each other; none where all is covered.
+
+        Yields before each place that is looked at.
+        """
         self._forget_covered()
         found: list[Next] = []
         aside: list[tuple[float, int, Place]] = []
@@ -103,6 +106,7 @@ class Frontier:
             if any(_is_near(place, other) for other in found):
                 aside.append(entry)
                 continue
+            yield
             touch = self.beyond(place)
             if touch is None:
                 continue

@@ -22,7 +22,7 @@ LAYER = 0.15  # of the radius, that a neighbor's contact is off the patch at mos
 FACING = 0.34  # cosine of the angle between its normal and the patch's, at least
 SURE, DEVIATIONS = 0.8, 1.2816  # quantile of |dz|, and how many standard deviations that is
 BETWEEN = 2.0  # times that between the contacts, for at them the fit has taken some of it; benchmarks.atlas
-AT_ONCE = 6  # patches in a step
+AT_ONCE, LOOK = 6, 1500  # patches, and contacts of all, in a step
 
 Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
 Joining = Generator[float, None, tuple[list[Reconstruction], Charts]]
@@ -32,7 +32,7 @@ def joined(
     contours: Sequence[list[Contour]], results: Sequence[Reconstruction], charts: Charts, noise: float
 ) -> Joining:
     """The patches fitted again, and their charts; yields the share that is done."""
-    strokes = neighbors_contacts(contours, charts)
+    strokes = yield from neighbors_contacts(contours, charts)
     found: list[Reconstruction] = []
     tables: list[Table] = []
     for start in range(0, len(results), AT_ONCE):
@@ -61,17 +61,25 @@ def unexplained(r: Reconstruction, strokes: Array, noise: float) -> float:
     return BETWEEN * float(np.sqrt(max(off**2 - noise**2, 0.0)))
 
 
-def neighbors_contacts(contours: Sequence[list[Contour]], charts: Charts) -> list[Array]:
-    """For each patch the contacts (m, 3) that others have inside its domain, on its wall."""
+def neighbors_contacts(
+    contours: Sequence[list[Contour]], charts: Charts
+) -> Generator[float, None, list[Array]]:
+    """For each patch the contacts (m, 3) that others have inside its domain, on its wall; yields 0."""
     points, normals, owner = _contacts(contours)
-    pairs = charts.pairs(points)
-    on = (pairs.share <= 1.0) & (pairs.node != owner[pairs.place])
-    on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
-    on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
-    order = np.argsort(pairs.node[on], kind="stable")
-    bounds = np.searchsorted(pairs.node[on][order], np.arange(len(charts.radii) + 1))
-    place = pairs.place[on][order]
-    return [points[place[a:b]] for a, b in pairwise(bounds)]
+    nodes, places = [], []
+    for start in range(0, len(points), LOOK):
+        pairs = charts.pairs(points[start : start + LOOK])
+        place = start + pairs.place
+        on = (pairs.share <= 1.0) & (pairs.node != owner[place])
+        on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
+        on &= np.einsum("mi,mi->m", pairs.normal, normals[place]) > FACING
+        nodes.append(pairs.node[on])
+        places.append(place[on])
+        yield 0.0
+    node, place = np.concatenate(nodes), np.concatenate(places)
+    order = np.argsort(node, kind="stable")
+    bounds = np.searchsorted(node[order], np.arange(len(charts.radii) + 1))
+    return [points[place[order[a:b]]] for a, b in pairwise(bounds)]
 
 
 def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[np.intp]]:

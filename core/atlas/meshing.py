@@ -26,7 +26,7 @@ ROOM = 1.2  # cubes, that patches reach at least
 STEEP = 1.8  # slope of the field beyond which it jumps, from wall to wall, and has no surface
 SPECK = 40  # triangles that a piece of the mesh has at least, beside the largest
 SMOOTHINGS, EVEN = 3, 0.6  # passes, and share of the way to the mean of its neighbors
-AT_ONCE = 8000  # places of the field in a step
+AT_ONCE = 3000  # places of the field in a step
 MOST_CELLS = 20_000_000
 SMALLEST = 1e-300  # that a vector is divided by
 FACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])  # corners of a face, from its center
@@ -52,15 +52,18 @@ class Mesh(NamedTuple):
     def is_closed(self) -> bool:
         """Whether each edge of a triangle belongs to another triangle too."""
         edges = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        counts = np.unique(edges, axis=0, return_counts=True)[1]
+        keys = edges[:, 0] * len(self.vertices) + edges[:, 1]
+        counts = np.unique(keys, return_counts=True)[1]
         return bool((counts == 2).all())
 
 
 def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
     """The mesh; yields the share that is done."""
     size = CELL * edge
-    cells = _cells(charts, size)
+    cells = yield from _cells(charts, size)
+    yield 0.0
     lattice, tetrahedra = _tetrahedra(cells)
+    yield 0.0
     points = 0.5 * size * lattice.astype(np.float64)
     values, known = np.zeros(len(points)), np.zeros(len(points), dtype=bool)
     for start in range(0, len(points), AT_ONCE):
@@ -69,12 +72,14 @@ def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
         values[some], known[some] = field.distance, field.node >= 0
         yield 0.5 * start / len(points)
     ends, triangles = _cut(tetrahedra, values, known, size)
+    yield 0.5
     a, b = ends.T
     share = np.clip(values[a] / (values[a] - values[b]), CLIP, 1.0 - CLIP)[:, None]
     vertices = (1.0 - share) * points[a] + share * points[b]
     for done in range(SMOOTHINGS + 1):
         if done:
             vertices = _evened(vertices, field.normal, triangles)
+            yield 0.5 + 0.5 * done / (SMOOTHINGS + 1)
         parts = []
         for start in range(0, max(len(vertices), 1), AT_ONCE):
             some = slice(start, start + AT_ONCE)
@@ -99,8 +104,8 @@ def _felt(vertices: Array, triangles: Indices, field: Blend) -> Mesh:
     return Mesh(vertices[used], index.reshape(-1, 3), field.std[used], field.node[used])
 
 
-def _cells(charts: Charts, size: float) -> Indices:
-    """The cubes that patches pass through, and those beside them, (n, 3)."""
+def _cells(charts: Charts, size: float) -> Generator[float, None, Indices]:
+    """The cubes that patches pass through, and those beside them, (n, 3); yields 0 after each patch."""
     found = []
     for node in range(len(charts.radii)):
         half = MARGIN * charts.rims[node].max()
@@ -115,6 +120,7 @@ def _cells(charts: Charts, size: float) -> Indices:
         inside = charts.shares(x, y, each) < MARGIN
         points, _ = charts.world(each[inside], x[inside], y[inside])
         found.append(_unique(np.floor(points / size).astype(np.intp)))
+        yield 0.0
     cells = _unique(np.vstack(found))
     beside = np.vstack([np.zeros((1, 3), dtype=np.intp), np.eye(3, dtype=np.intp), -np.eye(3, dtype=np.intp)])
     return _unique((cells[:, None] + beside).reshape(-1, 3))

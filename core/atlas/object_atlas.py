@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number
+from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, edges_of, node_dict
@@ -170,12 +171,18 @@ class Atlas:
         return float(np.median(np.minimum(chords, 0.5 * radii)))
 
     def curvatures(self, mesh: Mesh) -> dict[str, Array]:
-        """Gaussian and mean curvature, shape index and curvedness (n,) at the vertices of its mesh, by name.
+        """Those of `curvatures_at` at the vertices of its mesh."""
+        return self.curvatures_at(mesh.vertices, mesh.normals)
+
+    def curvatures_at(self, points: Array, normals: Array) -> dict[str, Array]:
+        """Gaussian and mean curvature, shape index and curvedness (n,) at points of the surface, by name.
+
+        points, normals : (n, 3)
 
         K and H are means over the patches there, each with its weight in the blended surface; the others
         follow from these. Where there is no patch, all are 0.
         """
-        gauss, mean = _blended_curvatures(self, mesh)
+        gauss, mean = _blended_curvatures(self, points, normals)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # of the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,
@@ -208,29 +215,20 @@ class Atlas:
         }
 
 
-def result_of(steps: Generator[Any, None, Any]) -> Any:
-    """What steps return once they are done."""
-    try:
-        while True:
-            next(steps)
-    except StopIteration as end:
-        return end.value
-
-
-def _blended_curvatures(atlas: Atlas, mesh: Mesh) -> tuple[Array, Array]:
-    """Means of K and H (n,) at the vertices, over the patches of the vertices' own wall."""
+def _blended_curvatures(atlas: Atlas, points: Array, normals: Array) -> tuple[Array, Array]:
+    """Means of K and H (n,) at points, over the patches of their own wall."""
     charts = atlas.charts
-    pairs = charts.pairs(mesh.vertices)
-    facing = np.einsum("mi,mi->m", pairs.normal, mesh.normals[pairs.place])
+    pairs = charts.pairs(points)
+    facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
     weights = node_weights(charts, pairs) * np.clip((facing - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
     radii = charts.radii[pairs.node]
     weights *= np.abs(pairs.distance) < LAYER * radii
-    x, y = charts.local(mesh.vertices, pairs.place, pairs.node)[:, :2].T * radii
+    x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T * radii
     curvatures, order = np.zeros((2, len(x))), np.argsort(pairs.node, kind="stable")
     for at in np.split(order, np.flatnonzero(np.diff(pairs.node[order])) + 1):
         d = atlas.patches[pairs.node[at[0]]].patch.derivatives(x[at], y[at])
         curvatures[:, at] = d.gaussian_curvature, d.mean_curvature
-    count = len(mesh.vertices)
+    count = len(points)
     total = np.maximum(np.bincount(pairs.place, weights, count), SMALLEST)
     gauss, mean = (np.bincount(pairs.place, weights * each, count) / total for each in curvatures)
     return gauss, mean

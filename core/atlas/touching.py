@@ -3,7 +3,7 @@
 """Touches that grow over a whole object by themselves (paper, VI), and the surface of all of them."""
 
 from collections.abc import Callable, Generator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,8 @@ from ..arguments import LARGEST, finite_array, number, unit_vector
 from ..contours.finger import Surface
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
-from ..exploration.touches import explore, explore_many
+from ..exploration.side_by_side import exploring
+from ..exploration.touches import explore
 from .frontier import Frontier, Next, side_of
 from .join import joined
 from .object_atlas import Atlas
@@ -60,36 +61,51 @@ def touch_all_over(
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
     if tolerance < noise:
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
-    wanted = {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance}
-    found = [explore(surface, p, up, farthest=FIRST * tolerance, **wanted)]  # type: ignore[arg-type]
+    wanted: dict[str, Any] = {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance}
+    found = [explore(surface, p, up, farthest=FIRST * tolerance, **wanted)]
     frontier = Frontier(surface, side_of(surface, p, up, found[0].step))
     frontier.add(found[0].result)
     more = yield Progress(1, len(frontier.queue), tuple(found))
     done = 1
     while more is not False and done < most:
-        chosen = frontier.take(min(SIDE_BY_SIDE, most - done))
-        if not chosen:
+        now = Progress(done, len(frontier.queue))
+        chosen, more = yield from _told(frontier.taking(min(SIDE_BY_SIDE, most - done)), now)
+        if not chosen or not more:
             break
         done += len(chosen)
-        new = _touched(surface, frontier, chosen, LEAST * tolerance, wanted)
+        new, more = yield from _told(_touched(surface, frontier, chosen, LEAST * tolerance, wanted), now)
         found += new
-        more = yield Progress(done, len(frontier.queue), tuple(new))
+        more = (yield Progress(done, len(frontier.queue), tuple(new))) is not False and more
     return (yield from _joined(found, done, frontier, tolerance, noise))
 
 
+def _told(
+    steps: Generator[None, None, Any], progress: Progress
+) -> Generator[Progress, bool | None, tuple[Any, bool]]:
+    """What steps return, and whether nobody has sent False; tells the same progress after each of them."""
+    more = True
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value, more
+        more = (yield progress) is not False and more
+
+
 def _touched(
-    surface: Surface, frontier: Frontier, chosen: list[Next], least: float, wanted: dict[str, object]
-) -> list[Exploration]:
+    surface: Surface, frontier: Frontier, chosen: list[Next], least: float, wanted: dict[str, Any]
+) -> Generator[None, None, list[Exploration]]:
     """Touches at the places chosen, where there can be one; their rims are the frontier's."""
     points, outward = np.array([n.point for n in chosen]), np.array([n.outward for n in chosen])
     farthest = LARGER * max(n.place.radius for n in chosen)
-    results = explore_many(surface, points, outward, farthest=farthest, **wanted)  # type: ignore[arg-type]
+    results = yield from exploring(surface, points, outward, farthest=farthest, **wanted)
     found = []
     for touch, result in zip(chosen, results, strict=True):
         if isinstance(result, Exploration) and result.result.radius >= least:
             frontier.add(result.result)
             found.append(result)
         frontier.tried(touch)
+        yield
     return found
 
 
@@ -97,6 +113,7 @@ def _joined(found: list[Exploration], done: int, frontier: Frontier, tolerance: 
     assert frontier.charts is not None
     steps = joined([e.contours for e in found], [e.result for e in found], frontier.charts, noise)
     uncovered = tuple(frontier.uncovered())
+    yield Progress(done, len(uncovered), joining=0.0)
     while True:
         try:
             yield Progress(done, len(uncovered), joining=next(steps))
@@ -129,9 +146,11 @@ def explore_object(
     """
     steps = touch_all_over(surface, point, outward, tolerance=tolerance, noise=noise, most=most, rng=rng)
     try:
-        state = next(steps)
+        state, told = next(steps), 0
         while True:
-            more = progress(state.done, state.uncovered) if progress and state.joining is None else None
+            more = None
+            if progress and state.joining is None and state.done > told:
+                more, told = progress(state.done, state.uncovered), state.done
             state = steps.send(False if more is False else None)
     except StopIteration as end:
         atlas: Atlas = end.value

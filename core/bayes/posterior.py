@@ -3,6 +3,7 @@
 """What contacts say of a surface and what they leave open: a Gaussian over polynomials of degree 6."""
 
 import math
+from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -94,9 +95,9 @@ class Posterior(NamedTuple):
         added: Array = self.level[0] + (at_p + at_q) @ self.level[1:]
         return added
 
-    def height_covariances(self, p: Array, q: Array) -> tuple[Array, Array]:
-        """Covariances of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
-        return self.height_covariance(p, q), self.height_covariance(p, p)
+    def covariances_with(self, q: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """Of points (..., n, 2): covariances of the heights with those at q, (m, 2), and with each other."""
+        return lambda p: (self.height_covariance(p, q), self.height_covariance(p, p))
 
     def height(self, x: Array, y: Array) -> Array:
         """The mean height at n points, (n,)."""

@@ -198,12 +198,12 @@ def is_enough(r: Reconstruction) -> bool:
     else:
         some = r.residual.places
     over, m = points / r.radius, len(some)
-    shared, seen = r.uncertainty.height_covariances(some, over)
+    shared, seen = r.uncertainty.covariances_with(over)(some)
     # A patch by another method departs from the posterior's mean, of which no contact takes anything off.
     own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
     variance = own**2
     seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
     told = solved(cholesky(seen), shared)
-    lost = np.einsum("in,in->n", told, told)
+    lost = r.geometry.widening(*points.T) ** 2 * np.einsum("in,in->n", told, told)
     then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
     return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))

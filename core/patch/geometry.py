@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The geometry of a patch: a surface over a part of the tangent plane, and where that is in the world."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,8 @@ from .residual import Residual
 from .triangulation import patch_mesh
 
 EVEN = 1e-4  # A similarity in single precision may be off by so much.
+
+NEAR_POINT = 0.6  # of a residual's deviation, that is left at the point (benchmarks.real)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +53,36 @@ class Geometry(HeightField):
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """z(x, y), local."""
-        z = self.polynomial.height(x, y)
         if self.residual is None:
-            return z
-        return z + self.radius * self.residual.height(*self.in_unit_radius(x, y)).reshape(z.shape)
+            return self.polynomial.height(x, y)
+        z = self._whole.height(*self.in_unit_radius(x, y))
+        return self.radius * z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
+
+    @cached_property
+    def _whole(self) -> Residual:
+        """The residual with the polynomial among its terms, in unit radius."""
+        assert self.residual is not None
+        mean, first = self.residual.mean.copy(), self.polynomial.scaled(1.0 / self.radius)
+        mean[2:5:2] += 0.5 * first.k1, 0.5 * first.k2
+        mean[5 : 5 + len(first.coefficients)] += first.coefficients
+        return replace(self.residual, mean=mean)
 
     def in_unit_radius(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """x and y, (n,) each, in units of L."""
         x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         return x_array.ravel() / self.radius, y_array.ravel() / self.radius
+
+    def widening(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """What the residual's deviations are multiplied with at local (x, y), (n,).
+
+        Where curves run together a real surface is smoother than its covariance has it, and rougher at the
+        rim. The mean over the domain is 1.
+        """
+        points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
+        if self.residual is None:
+            return np.ones(len(points))
+        outward = np.linalg.norm(self.domain.places(points), axis=1)
+        return NEAR_POINT + 1.5 * (1.0 - NEAR_POINT) * outward
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether each local (x, y) lies in the domain or on its boundary; in the shape of x and y."""

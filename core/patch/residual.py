@@ -16,6 +16,7 @@ and one c for each place; and what no place tells adds k(p, p) - k(p, u)' k(u, u
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -58,10 +59,9 @@ class Residual:
 
     def height(self, x: Array, y: Array) -> Array:
         """What it adds to the Posterior's mean height at n points, (n,)."""
-        terms = monomials(x, y, TERMS) @ self.mean[: len(TERMS)]
-        return terms + weighted_kernel(
-            np.column_stack([x, y]), self.places, self.variances, self.mean[len(TERMS) :]
-        )
+        terms, weights = self.mean[: len(TERMS)], self.mean[len(TERMS) :]
+        p = np.column_stack([x, y])
+        return monomials(x, y, TERMS) @ terms + weighted_kernel(p, self.places, self.variances, weights)
 
     def derivatives(self, x: Array, y: Array) -> Derivatives:
         """The kernel with its slopes and second derivatives."""
@@ -81,20 +81,25 @@ class Residual:
         """Covariances of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
         return self._covariance(p, self.signed(p), q, self.signed(q))
 
-    def height_covariances(self, p: Array, q: Array) -> tuple[Array, Array]:
-        """Covariances of the heights at points (..., n, 2) with those at (..., m, 2), and with each other."""
-        if p is self.places:  # at which the places tell all of k
-            terms = monomials(p[:, 0], p[:, 1], TERMS).T
-            left = solved(self.factor, np.vstack([terms, self.places_factor.T]))
-            return left.T @ self.whitened(q)[1], left.T @ left
-        at_p = self.signed(p)
-        return self._covariance(p, at_p, q, self.signed(q)), self._covariance(p, at_p, p, at_p)
+    def covariances_with(self, q: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """Of points (..., n, 2): covariances of the heights with those at q, (m, 2), and with each other."""
+        at_q = self.signed(q)
+
+        def covariances(p: Array) -> tuple[Array, Array]:
+            if p is self.places:  # at which the places tell all of k
+                terms = monomials(p[:, 0], p[:, 1], TERMS).T
+                left = solved(self.factor, np.vstack([terms, self.places_factor.T])).T
+                return left @ at_q[:, len(p) :].T, left @ left.T
+            at_p = self.signed(p)
+            return self._covariance(p, at_p, q, at_q), self._covariance(p, at_p, p, at_p)
+
+        return covariances
 
     def _covariance(self, p: Array, at_p: Array, q: Array, at_q: Array) -> Array:
         """By what `signed` gives of the points."""
-        covariance = kernel(p, q, self.variances)
-        for told, add in ((slice(len(self.places)), np.subtract), (slice(len(self.places), None), np.add)):
-            add(covariance, at_p[..., told] @ np.swapaxes(at_q[..., told], -1, -2), out=covariance)
+        covariance, told = kernel(p, q, self.variances), at_p.copy()
+        told[..., : len(self.places)] *= -1.0
+        covariance += told @ np.swapaxes(at_q, -1, -2)
         return covariance
 
     def signed(self, p: Array) -> Array:

@@ -3,9 +3,10 @@
 """Where to touch next: the sampling plane whose contour would tell most."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, unit_vector
 from ..contours.contour import SamplingPlane
@@ -14,7 +15,8 @@ from .result import Reconstruction
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))  # 1.5 degrees off, a plane ends a 38th of the radius aside.
 COARSE_STRIDE = 4  # So many azimuths lie between those that are tried first.
 MOST_CONTACTS = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
-FEW_CONTACTS = 12  # of those that are tried first
+FEW_CONTACTS = 12  # of those that are compared
+NEARBY = np.arange(1 - COARSE_STRIDE, COARSE_STRIDE)  # azimuths beside the best of those tried first
 
 
 def suggest_plane(
@@ -31,33 +33,38 @@ def suggest_plane(
     effect depends on where it runs, not on the heights found there.
     """
     points, weights = r.domain.nodes
-    over = points / r.radius
-    first = int(np.argmax(_lost(r, over, AZIMUTHS[::COARSE_STRIDE], FEW_CONTACTS) @ weights))
-    # The best of them, and those beside it.
-    near = (COARSE_STRIDE * first + np.arange(1 - COARSE_STRIDE, COARSE_STRIDE)) % len(AZIMUTHS)
-    lost = _lost(r, over, AZIMUTHS[near], MOST_CONTACTS)
-    best = int(np.argmax(lost @ weights))
-    variance = np.maximum((r.node_stds / r.radius) ** 2 - lost[best], 0.0)
-    plane = SamplingPlane(float(AZIMUTHS[near[best]]))
+    wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
+    covariances = r.uncertainty.covariances_with(points / r.radius)
+    widening = r.geometry.widening(*points.T) ** 2
+
+    def lost(azimuths: NDArray[np.intp], most: int) -> Array:
+        """What a contour at each of these takes off the variances at the points, (k, n), in unit radius."""
+        count = min(wanted, most)
+        noise = float(r.uncertainty.noise) ** 2 * count / wanted
+        return widening * _lost(covariances, AZIMUTHS[azimuths % len(AZIMUTHS)], count, noise)
+
+    tried = np.arange(0, len(AZIMUTHS), COARSE_STRIDE)
+    near = tried[[np.argmax(lost(tried, FEW_CONTACTS) @ weights)]] + NEARBY
+    best = near[[np.argmax(lost(near, FEW_CONTACTS) @ weights)]] % len(AZIMUTHS)
+    variance = np.maximum((r.node_stds / r.radius) ** 2 - lost(best, MOST_CONTACTS)[0], 0.0)
+    plane = SamplingPlane(float(AZIMUTHS[best[0]]))
     if outward is not None:
         d1, _, n = r.frame.axes.T
         plane = SamplingPlane(azimuth_of(plane.axes(n, d1)[:, 0], outward, tangent))
     return plane, r.radius * float(weights @ np.sqrt(variance))
 
 
-def _lost(r: Reconstruction, over: Array, azimuths: Array, most: int) -> Array:
-    """What contours at azimuths (k,) of at most so many contacts take off the variances at points (n, 2).
+def _lost(
+    covariances: Callable[[Array], tuple[Array, Array]], azimuths: Array, count: int, noise: float
+) -> Array:
+    """What contours at azimuths (k,), of so many contacts of that noise^2, take off variances, (k, n).
 
-    (k, n), in unit radius.
-    A contour's heights have the covariance `seen`, and `shared` with those at the points, off whose variance
-    it takes the diagonal of shared' seen^-1 shared.
+    A contour's heights have the covariance `seen`, and `shared` with those at the n points, off whose
+    variance it takes the diagonal of shared' seen^-1 shared.
     """
-    wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
-    count, surface = min(wanted, most), r.uncertainty
     directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
-    contours = np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None]
-    shared, seen = surface.height_covariances(contours, over)
-    seen += surface.noise**2 * count / wanted * np.eye(count)
+    shared, seen = covariances(np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None])
+    seen += noise * np.eye(count)
     lost: Array = np.einsum("kin,kin->kn", shared, np.linalg.solve(seen, shared))
     return lost
 

@@ -15,11 +15,13 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper
 
-from ..probes.operators import is_in_object_mode, make_active, report_error
+from ..probes.operators import is_in_object_mode, make_active, report_error, waiting
 from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_solver, length_property
 from ..touch.units import length
 from ..touch.wording import fit_summary
+from ..whole_object import whole_mesh
+from ..whole_object.object_report import object_summary
 from . import contact_file, measured
 
 UNITS = [
@@ -34,7 +36,7 @@ UNITS = [
 
 
 class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
-    """Rebuild the surface patch that measured contours and strokes show"""
+    """Rebuild the surface patch, or the whole surface, that measured contours and strokes show"""
 
     bl_idname = "tactile.import_contacts"
     bl_label = "Import Contact Data"
@@ -44,6 +46,17 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
     unit: EnumProperty(name="Unit", description="Unit of the numbers in the file", items=UNITS)
+    whole: BoolProperty(
+        name="Whole Object",
+        description="Cover all contacts with patches, and join these to one surface",
+        options={"SKIP_PRESET"},
+    )
+    tolerance: length_property(
+        "Tolerance",
+        "Standard deviation to reach for heights of a whole object, in the scene's unit; 0 uses 1.2 "
+        "% of each patch",
+        precision=4,
+    )
     point: FloatVectorProperty(
         name="Reference Point",
         subtype="TRANSLATION",
@@ -65,7 +78,7 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="A direction that points to the outer side of the surface; for scripts",
+        description="A direction that points to the outer side of the surface, if no normals were measured",
         options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
     )
     flip: BoolProperty(name="Flip", description="Use the other side of the surface as its outer side")
@@ -93,7 +106,10 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     def execute(self, context):
         paths = [str(Path(self.directory) / file.name) for file in self.files if file.name] or [self.filepath]
         try:
-            contacts = measured.read(paths, self.unit, context.scene.unit_settings.scale_length)
+            scale = context.scene.unit_settings.scale_length
+            contacts = measured.read(paths, self.unit, scale, self.whole)
+            if self.whole:
+                return self._joined(context, paths, contacts)
             touched = measured.fit(
                 Path(paths[0]).name,
                 contacts,
@@ -119,15 +135,34 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
+    def _joined(self, context, paths, contacts):
+        """Adds the surface of all contacts, as that of a whole object."""
+        more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+        with waiting(context):
+            whole, report = measured.whole_of(
+                contacts,
+                outward=self._given("outward"),
+                flip=self.flip,
+                tolerance=self.tolerance,
+                noise=self.noise,
+            )
+        made = whole_mesh.insert(context.scene, Path(paths[0]).name + more, whole, report)
+        make_active(context, made)
+        self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, object_summary(report))
+        return {"FINISHED"}
+
     def _given(self, name):
         return list(getattr(self, name)) if self.properties.is_property_set(name) else None
 
     def draw(self, context):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        for name in ("unit", "point", "strokes", "radius", "flip", "noise", "normal_std"):
+        of_patch = "point", "strokes", "radius", "flip", "noise", "normal_std"
+        of_object = "outward", "flip", "tolerance", "noise"
+        for name in ("unit", "whole", *(of_object if self.whole else of_patch)):
             layout.prop(self, name)
-        draw_solver(layout, self)
+        if not self.whole:
+            draw_solver(layout, self)
 
 
 class TACTILE_FH_contacts(bpy.types.FileHandler):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured contacts, from files to a reconstruction and its report; nothing in the scene changes."""
+"""Measured contacts, from files to a patch or a whole surface and its report, with no scene changed."""
 
 import math
 from dataclasses import replace
@@ -13,16 +13,18 @@ from ... import core
 from ..touch.single_precision import require_single
 from ..touch.touch_object import Touched, reference_axes
 from ..touch.touch_report import measures, reconstruction_report, suggestion_report
+from ..whole_object.whole_surface import WholeSurface
 from . import contact_file
 
 FLAT = 0.02  # Least |k1 + k2| in unit radius: a surface with less bulges to no side.
 
 
-def read(paths, unit, meters):
+def read(paths, unit, meters, whole=False):
     """The contact_file.Contacts of files whose curves belong together, in a world of so many meters a unit.
 
     unit : of the numbers, as in contact_file.UNIT_METERS; "FILE" for what each file names; "NONE" to take
         them as they are, as those of a file that names none are taken.
+    whole : whether they are of one object and not of one patch, so that each may have a point of its own
 
     Raises ValueError where files name different reference points, and what contact_file.read raises.
     """
@@ -39,10 +41,47 @@ def read(paths, unit, meters):
         points += [] if point is None else [[factor * x for x in point]]
         directions += [] if outward is None else [outward]
         found = named or found
-    if any(not np.allclose(point, points[0], rtol=1e-12, atol=0.0) for point in points):
+    if not whole and any(not np.allclose(point, points[0], rtol=1e-12, atol=0.0) for point in points):
         raise ValueError("The files name different reference points: import them one by one")
+    if any(np.dot(direction, directions[0]) <= 0.0 for direction in directions):
+        directions = []  # they are of other sides of one object
     point, outward = (given[0] if given else None for given in (points, directions))
     return contact_file.Contacts(contours, found, point, outward, tuple(strokes))
+
+
+def whole_of(contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
+    """The WholeSurface of contact_file.Contacts, its steps done, and its report.
+
+    outward : on the outer side of all contacts; None for the normals that were measured, or for that of the
+        files; `flip` takes the other side
+    tolerance, noise : in the contours' unit; 0 for a choice by core.atlas_of, and for those of the files
+
+    Raises ValueError with a sentence for the user.
+    """
+    felt = [*contacts.contours, *contacts.strokes]
+    if outward is None and any(contour.normals is None for contour in felt):
+        outward = contacts.outward
+        if outward is None:
+            raise ValueError(
+                "Some contacts have no normals, and nothing tells their outer side: set outward, a direction "
+                "on the outer side of all contacts"
+            )
+    sign, origin = -1.0 if flip else 1.0, np.mean(np.vstack([c.points for c in felt]), axis=0)
+    placed = [
+        replace(c, points=c.points - origin, normals=None if c.normals is None else sign * c.normals)
+        for c in felt
+    ]
+    atlas = core.atlas_of(
+        placed,
+        outward=None if outward is None else sign * np.array(outward),
+        tolerance=tolerance or None,
+        noise=noise or None,
+    )
+    found = WholeSurface(atlas, origin)
+    for _ in found.steps(0.0):
+        pass
+    count = sum(len(contour.points) for contour in felt)
+    return found, {"contacts": count, **found.report(), "tolerance": tolerance, "noise": noise}
 
 
 def _scaled(curve, factor):

@@ -9,22 +9,39 @@ from ..whole_object.object_report import object_summary, object_table_rows, unit
 from . import drawing, page, parts, views
 
 TOLERANCES = (0.5, 1.0, 2.0, 5.0)
+WORDS = {
+    "deviation": "deviation, red outside of the mesh",
+    "height_std": "standard deviation of the surface, which is above 0",
+}
 
 
 def object_page(obj):
-    """The page of the surface of a whole object."""
+    """The page of the surface of a whole object; raises ValueError where it was edited."""
+    patch_record.require_colored(obj)
     record = obj[patch_record.ATLAS_RECORD].to_dict()
-    unit, off = unit_of(record), values(obj.data, "deviation").astype(float)
-    areas = parts.vertex_areas(values(obj.data, "position").astype(float), parts.corners(obj.data))
-    limit = symmetric_range(off, parts.LEAST_RANGE)
-    scale = page.figure(drawing.scale(limit, parts.label(1, unit)), "deviation, red outside of the mesh")
-    reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
-    words = "Shares of the area by its distance from the mesh. The outermost bars count all beyond."
+    was_touched = "touches" in record
     sections = [
-        page.verdict(object_summary(record), record["is_closed"]),
-        page.section("Pictures", *views.three_sides(obj.data, shades(off, limit)), scale),
-        page.section("Deviations", parts.spread(off, areas, unit, words)),
-        page.section("Tolerance bands", parts.bands(off, areas, record["height_std"], unit, reaches)),
+        page.verdict(f"{object_summary(record)}. {record['message']}", record["is_closed"]),
+        _pictures(obj.data, unit_of(record), "deviation" if was_touched else "height_std"),
+        *(_deviations(obj.data, record) if was_touched else ()),
         *parts.ending(object_table_rows(record), record),
     ]
     return page.page(f"{obj.name}: the surface of {record['source']}", sections)
+
+
+def _pictures(mesh, unit, shown):
+    shown_values = values(mesh, shown).astype(float)
+    limit = symmetric_range(shown_values, parts.LEAST_RANGE)
+    scale = page.figure(drawing.scale(limit, parts.label(1, unit)), WORDS[shown])
+    return page.section("Pictures", *views.three_sides(mesh, shades(shown_values, limit)), scale)
+
+
+def _deviations(mesh, record):
+    unit, off = unit_of(record), values(mesh, "deviation").astype(float)
+    areas = parts.vertex_areas(values(mesh, "position").astype(float), parts.corners(mesh))
+    reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
+    words = "Shares of the area by its distance from the mesh. The outermost bars count all beyond."
+    return [
+        page.section("Deviations", parts.spread(off, areas, unit, words)),
+        page.section("Tolerance bands", parts.bands(off, areas, record["height_std"], unit, reaches)),
+    ]

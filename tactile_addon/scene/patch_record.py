@@ -17,6 +17,7 @@ COLOR = "curvature_color"
 RANGE = "tactile_color_range"  # and the one with the range of its colors, where that is given
 MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
 ATLAS_RECORD = "tactile_object"  # The one of a whole object that holds the report of its touches.
+GRAPH = "tactile_graph"  # and the one with its patches and their boundaries, core.Atlas.to_dict as JSON
 CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
 QUANTITIES = [
@@ -71,6 +72,12 @@ def is_colored(obj):
     """Whether it is a patch or a whole object that can show its colors, as nobody has edited it."""
     is_one = ATLAS_RECORD in obj or (RECORD in obj and report_of(obj) is not None)
     return is_one and obj.type == "MESH" and _is_whole(obj.data)
+
+
+def require_colored(obj):
+    """Raises ValueError where the whole object has been edited into what is none."""
+    if not is_colored(obj):
+        raise ValueError(f'"{obj.name}" was edited and is no longer a complete surface: touch all over again')
 
 
 def touched_record(obj):

@@ -156,8 +156,10 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER").new = True
+        record = obj[patch_record.ATLAS_RECORD]
+        draw_sentence(context, layout, record["message"], ICONS.get(record["status"], "ERROR"))
         _draw_colors(context, layout, obj, "tactile_colors")
-        draw_rows(context, layout.box(), object_rows(obj[patch_record.ATLAS_RECORD]))
+        draw_rows(context, layout.box(), object_rows(record))
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):

@@ -117,7 +117,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     def _finish(self, context):
         target = self._touches.surface.require_same(context)
-        made = whole_mesh.insert(context.scene, target.name, self._touches)
+        made = whole_mesh.insert(context.scene, target.name, self._touches.whole, self._touches.report())
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
         self.report({"INFO"} if record["is_closed"] else {"WARNING"}, object_summary(record))

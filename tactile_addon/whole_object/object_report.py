@@ -10,7 +10,7 @@ from ..touch.wording import table
 
 def unit_of(record):
     """The unit for what there is to say: lengths from below the tolerance to far above."""
-    return units.unit_of(bpy.context.scene, 10.0 * record["tolerance"])
+    return units.unit_of(bpy.context.scene, 10.0 * (record["tolerance"] or record["height_std"]))
 
 
 def object_readable(record):
@@ -20,49 +20,65 @@ def object_readable(record):
 
 def object_table_rows(record):
     """(label, value) of all that a whole object has to say."""
-    unit = unit_of(record)
-    return [
-        ("touched", f"{record['source']}, {record['touches']} times"),
+    unit, off = unit_of(record), _off(record, "mean")
+    how = f"{record['touches']} times" if "touches" in record else f"{record['contacts']} contacts"
+    return _known(
+        ("touched" if "touches" in record else "measured", f"{record['source']}, {how}"),
         ("surface", _surface(record)),
+        ("message", record["message"]),
         ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
-        ("edges of their graph", str(record["edges"])),
-        ("tolerance", units.say(record["tolerance"], 1, unit)),
+        ("edges of their graph", record["edges"]),
+        ("tolerance", _tolerance(record)),
         ("height std", units.say(record["height_std"], 1, unit)),
-        ("off the mesh", f"mean {_off(record, 'mean', unit)}; max {_off(record, 'max', unit)}"),
+        ("off the mesh", off and f"mean {off}; max {_off(record, 'max')}"),
         ("mesh", f"{record['vertices']} vertices, {record['triangles']} triangles"),
-    ]
+    )
 
 
 def object_summary(record):
-    """What touches all over an object have found, in a sentence."""
-    unit = unit_of(record)
-    return f"{record['touches']} touches; {_surface(record)}; {_off(record, 'mean', unit)} off on average"
+    """What is found of a whole object, in a sentence."""
+    std = units.say(record["height_std"], 1, unit_of(record))
+    if "touches" in record:
+        return f"{record['touches']} touches; {_surface(record)}; {_off(record, 'mean')} off on average"
+    return f"{record['patches']} patches of {record['contacts']} contacts; {_surface(record)}; ± {std}"
 
 
 def object_rows(record):
     """(label, value) for the panel."""
-    unit = unit_of(record)
-    return [
-        ("Touches", str(record["touches"])),
+    return _known(
+        ("Touches", record.get("touches")),
+        ("Contacts", record.get("contacts")),
         ("Surface", "Closed" if record["is_closed"] else "Open"),
-        ("Rims Left", str(record["uncovered"])),
-        ("Tolerance", units.say(record["tolerance"], 1, unit)),
-        ("Height", f"± {units.say(record['height_std'], 1, unit)}"),
-        ("Off Mesh", _off(record, "mean", unit)),
-        ("Farthest", _off(record, "max", unit)),
-        ("Patches", str(record["patches"])),
-        ("… in Doubt", str(record["in_doubt"])),
-        ("Vertices", str(record["vertices"])),
-    ]
+        ("Rims Left", record.get("uncovered")),
+        ("Tolerance", _tolerance(record)),
+        ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
+        ("Off Mesh", _off(record, "mean")),
+        ("Farthest", _off(record, "max")),
+        ("Patches", record["patches"]),
+        ("… in Doubt", record["in_doubt"]),
+        ("Vertices", record["vertices"]),
+    )
+
+
+def _known(*rows):
+    """Rows in words, without those whose value is None."""
+    return [(label, str(value)) for label, value in rows if value is not None]
 
 
 def _surface(record):
     if record["is_closed"]:
         return "closed all round"
-    if record["uncovered"]:
+    if record.get("uncovered"):
         return f"open, with {record['uncovered']} places from which it could go on"
-    return "open where no patch could be felt"
+    return "open where nothing was felt"
 
 
-def _off(record, what, unit):
-    return units.say(record[f"deviation_{what}"], 1, unit)
+def _tolerance(record):
+    """None where measured contacts have chosen it."""
+    return units.say(record["tolerance"], 1, unit_of(record)) if record["tolerance"] else None
+
+
+def _off(record, what):
+    """None where there was no mesh."""
+    off = record.get(f"deviation_{what}")
+    return None if off is None else units.say(off, 1, unit_of(record))

@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Touches that grow over an object, step by step, with nothing changed in the scene: its atlas and mesh."""
+"""Touches that grow over an object, step by step, with nothing changed in the scene."""
 
 import numpy as np
 
 from ... import core
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.units import length
+from .whole_surface import WholeSurface
 
 TOLERANCE_SHARE = 1.0 / 500.0  # of the object's size, where no tolerance is given
 STARTS = 20  # places that are tried where no place to begin is given
@@ -18,10 +19,10 @@ class ObjectTouches:
     """Touches of an evaluated mesh that begin at one place; all is in the directions of the world.
 
     surface : the mesh as it was, from its object's origin
-    found : core.Reconstructions of the touches so far; uncovered : places known to be uncovered
+    found : core.Reconstructions of the touches so far
+    done, uncovered : how many touches that took, some of which gave no patch; places known to be uncovered
     words, share : what is going on, and the share of it that is done, None where nobody knows
-    atlas, mesh : core.Atlas and core.Mesh, once the steps are done
-    curvatures, deviation : as of Atlas.curvatures; signed distances (n,) of the mesh's vertices to the target
+    whole : the WholeSurface, once the steps are done
     """
 
     def __init__(self, obj, depsgraph, *, location, tolerance, noise, seed, most, edge):
@@ -43,7 +44,7 @@ class ObjectTouches:
                 f"The tolerance {length(tolerance)} is below the noise {length(noise)}: use a larger one"
             )
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
-        self.found, self.uncovered = [], 0
+        self.found, self.done, self.uncovered = [], 0, 0
         self.words, self.share = "Looking for a place to begin", None
         self.is_stopped = False
         self._location = location
@@ -57,9 +58,9 @@ class ObjectTouches:
             try:
                 state = steps.send(False if self.is_stopped else None)
             except StopIteration as end:
-                self.atlas = end.value
+                self.whole = WholeSurface(end.value, self.surface.origin)
                 break
-        yield from self._meshed()
+        yield from self._shown()
 
     def _started(self):
         """The steps of core and what the first of them said; raises ValueError where none can begin."""
@@ -91,30 +92,24 @@ class ObjectTouches:
 
     def _note(self, state):
         self.found += [exploration.result for exploration in state.found]
-        self.uncovered = state.uncovered
+        self.done, self.uncovered = state.done, state.uncovered
         self.words = f"{state.done} touches, {state.uncovered} places to go on from"
         if state.joining is not None:
-            self.words, self.share = f"Joining {state.done} patches", 0.5 * state.joining
+            self.words, self.share = f"Joining {len(self.found)} patches", 0.5 * state.joining
 
-    def _meshed(self):
+    def _shown(self):
         self.words = "Meshing"
-        steps = self.atlas.meshing(self.edge or self.atlas.suggested_edge())
-        while True:
-            try:
-                self.share = 0.5 + 0.4 * next(steps)
-            except StopIteration as end:
-                self.mesh = end.value
-                break
+        for share in self.whole.steps(self.edge):
+            self.share = 0.5 + 0.4 * share
             yield
-        self.curvatures = self.atlas.curvatures(self.mesh)
-        yield
-        self.deviation, normals = np.zeros(len(self.mesh.vertices)), self.mesh.normals
-        for start in range(0, len(self.deviation), AT_ONCE):
+        mesh, deviation = self.whole.mesh, self.whole.deviation
+        normals = mesh.normals
+        for start in range(0, len(deviation), AT_ONCE):
             some = slice(start, start + AT_ONCE)
-            self.deviation[some] = self.surface.deviations(
-                self.mesh.vertices[some], normals[some], REACH * self.surface.size
+            deviation[some] = self.surface.deviations(
+                mesh.vertices[some], normals[some], REACH * self.surface.size
             )
-            self.share = 0.9 + 0.1 * start / len(self.deviation)
+            self.share = 0.9 + 0.1 * start / len(deviation)
             yield
 
     def stop(self):
@@ -123,21 +118,13 @@ class ObjectTouches:
 
     def report(self):
         """What there is to say, a dict of plain values."""
-        atlas, mesh = self.atlas, self.mesh
-        off = np.abs(self.deviation)
+        off = np.abs(self.whole.deviation)
         return {
-            "touches": len(self.found),
-            "patches": len(atlas.patches),
-            "in_doubt": sum(r.status != "ok" for r in atlas.patches),
-            "uncovered": len(atlas.uncovered),
-            "edges": len(atlas.edges),
-            "is_closed": mesh.is_closed,
-            "vertices": len(mesh.vertices),
-            "triangles": len(mesh.triangles),
-            "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # where it was felt
+            "touches": self.done,
+            "uncovered": len(self.whole.atlas.uncovered),
+            **self.whole.report(),
             "deviation_mean": float(off.mean()),
             "deviation_max": float(off.max()),
-            "radius": float(np.median([r.radius for r in atlas.patches])),
             "size": self.surface.size,
             "tolerance": self.tolerance,
             "noise": self.noise,

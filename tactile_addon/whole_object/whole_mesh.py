@@ -68,24 +68,25 @@ def _fan():
     )
 
 
-def insert(scene, name, touches):
-    """Adds the surface that `touches`, an ObjectTouches, have found to the scene; returns the object."""
+def insert(scene, name, whole, report):
+    """Adds the surface of a WholeSurface, of what has that name, to the scene; returns the object."""
     mesh = bpy.data.meshes.new(f"{name} Touched")
     obj = bpy.data.objects.new(mesh.name, mesh)
-    obj.matrix_world, obj.show_in_front = Matrix.Translation(touches.surface.origin), True
+    obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin), True
     patch_object.collection(scene).objects.link(obj)
     mesh.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
-    found = touches.mesh
+    found = whole.mesh
     attributes = [
-        *((key, "FLOAT", values) for key, values in touches.curvatures.items()),
+        *((key, "FLOAT", values) for key, values in whole.curvatures.items()),
         ("height_std", "FLOAT", found.std),
-        ("deviation", "FLOAT", touches.deviation),
+        ("deviation", "FLOAT", whole.deviation),
         ("patch", "INT", found.patch.astype(np.int32)),
         (patch_record.COLOR, "FLOAT_COLOR", np.ones((len(found.vertices), 4))),
     ]
     fill(mesh, found.vertices, found.triangles, attributes)
     mesh.shade_smooth()
-    obj[patch_record.ATLAS_RECORD] = touches.report() | {"source": name, "object": obj.name}
+    obj[patch_record.ATLAS_RECORD] = report | {"source": name, "object": obj.name}
+    obj[patch_record.GRAPH] = whole.graph
     patch_object.recolor(obj)
     show_colors()
     return obj

@@ -55,6 +55,11 @@ def test_a_whole_object_from_a_file(command, files):
     report = json.loads(line)
     assert report["is_closed"]
     assert report["deviation_mean"] < 0.01
+    graph = report["graph"]
+    assert len(graph["nodes"]) == report["patches"]
+    assert len(graph["edges"]) == report["edges"]
+    origins = np.array([node["frame"]["origin"] for node in graph["nodes"]])
+    assert np.linalg.norm(origins, axis=1) == pytest.approx(2.0, abs=0.01)
     assert b"property float height_std" in output.read_bytes()[:2000]
     code, out, _ = command("object", files / "ball.ply", "--tolerance", "0.01")
     assert code == 0

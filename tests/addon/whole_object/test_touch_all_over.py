@@ -83,3 +83,12 @@ def test_a_probe_or_a_place_says_where_to_begin(empty, ball):
     empty.ops.tactile.pick(target=ball.name, location=(0.0, 2.0, 0.0))
     surface, _ = touched(empty, tolerance=0.01, most=1)
     assert np.abs(positions(surface.data)[:, 1]).min() > 0.5
+
+
+def test_an_edited_surface_has_no_report(empty, ball, tmp_path):
+    surface, _ = touched(empty, tolerance=0.02)
+    surface.data.attributes.remove(surface.data.attributes["deviation"])
+    page = tmp_path / "page.html"
+    with pytest.raises(RuntimeError, match="was edited and is no longer a complete surface: touch all over"):
+        empty.ops.tactile.export_report(filepath=str(page))
+    assert not page.exists()

@@ -49,7 +49,7 @@ def test_contours_with_normals_need_no_direction():
         (
             [np.column_stack([np.linspace(0, 1, 60), np.zeros(60), np.zeros(60)])],
             (0, 0, 1),
-            "around some place",
+            "all around at least one of them",
         ),
         (7, (0, 0, 1), "contours_or_strokes: expected a list"),
     ],

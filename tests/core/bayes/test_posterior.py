@@ -31,6 +31,19 @@ def test_turning_coefficients_about_the_normal_turns_the_surface():
     assert turned == pytest.approx(monomials(x, y, posterior.TERMS) @ b, rel=1e-9)
 
 
+@pytest.mark.parametrize(("count", "freedom"), [(65, 60.0), (9, 5.0)])
+def test_intervals_count_in_that_waviness_and_noise_are_estimates(count, freedom):
+    flat = np.random.default_rng(0).uniform(-0.7, 0.7, (2, count))
+    contacts = np.array([*flat, 0.1 * flat[0] ** 2]).T[None]
+    expected, weights = linear_system.prior_mean(np.array([0.2]), np.zeros(1)), np.ones((1, count))
+    system = linear_system.linear_system(contacts, weights, expected, contacts[:, :0])
+    data = evidence.restricted(system.equations)
+    hyper = linear_system.hyperparameters(system, data, np.array([2e-3]))
+    found = linear_system.posterior(expected, system, data, hyper, weights).covariance[0]
+    alone = np.linalg.inv(linear_system._precision(system, hyper.variances, hyper.noise)[0])
+    assert found == pytest.approx(freedom / (freedom - 2.0) * alone, rel=1e-6)
+
+
 def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
     rng = np.random.default_rng(2)
     mean = np.concatenate([[0.0, 0.0, 0.2, 0.0, 0.3], rng.normal(size=22)])

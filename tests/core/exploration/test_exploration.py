@@ -7,7 +7,7 @@ import pytest
 import surfaces
 
 import core
-from core.exploration import growth, one_touch, touches
+from core.exploration import growth, one_touch, side_by_side
 from core.exploration.one_touch import NOTICEABLE, is_enough
 from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
@@ -95,7 +95,7 @@ def short_waves():
 
 def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     asked = []
-    monkeypatch.setattr(touches, "fitted", lambda *given: asked.append(1) or fitted(*given))
+    monkeypatch.setattr(side_by_side, "fitted", lambda *given: asked.append(1) or fitted(*given))
     found, few = explore(short_waves()), len(asked)
     monkeypatch.setattr(growth, "TOO_ROUGH", np.inf)
     assert explore(short_waves()).extent == found.extent
@@ -362,7 +362,8 @@ def test_how_far_to_feel_is_found_where_curves_end_by_themselves():
 
 
 def test_a_surface_without_an_end_asks_how_far_to_feel():
-    with pytest.raises(ValueError, match="The curves do not end by themselves: say how far to feel at most"):
+    said = "The curves do not end by themselves: set farthest, the greatest length"
+    with pytest.raises(ValueError, match=said):
         core.explore(surfaces.plane(), (0.0, 0.0, 0.0), UP)
 
 

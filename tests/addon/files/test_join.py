@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured contacts of several files as one whole object, by the operator and from the shell."""
+
+import json
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from scenes import datablocks, made, positions, values
+
+from core import Contour, atlas_of
+
+CENTER, RADIUS = np.array([40.0, -3.0, 7.0]), 2.0
+GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+
+
+def ball(count=3000):
+    """Contacts all over a ball, and their normals."""
+    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turn, out = GOLDEN * np.arange(count), np.sqrt(1.0 - z**2)
+    normals = np.column_stack([out * np.cos(turn), out * np.sin(turn), z])
+    return CENTER + RADIUS * normals, normals
+
+
+def raster(rows):
+    """Rows of a bump that faces +z, without normals."""
+    x = np.linspace(-1.0, 1.0, 60)
+    for y in rows:
+        yield np.column_stack([x, np.full(60, y), 0.3 * np.exp(-(x**2 + y**2) / 0.3)])
+
+
+ROWS = np.linspace(-1.0, 1.0, 17)
+
+
+@pytest.fixture
+def write(extension, empty, tmp_path):
+    """Writes strokes as a file of that name; the path."""
+
+    def write(name, strokes, **told):
+        contact_file = extension.tactile_addon.files.contact_file
+        contact_file.write(tmp_path / name, contact_file.Contacts([], "", strokes=tuple(strokes), **told))
+        return tmp_path / name
+
+    return write
+
+
+@pytest.fixture
+def three_files(write):
+    """A ball in thirds, each by a point of its own."""
+    points, normals = ball()
+    thirds = np.array_split(np.random.default_rng(0).permutation(len(points)), 3)
+    return [
+        write(f"part{i}.csv", [Contour(points[some], normals=normals[some])], point=points[some[0]].tolist())
+        for i, some in enumerate(thirds)
+    ]
+
+
+@pytest.fixture
+def two_halves(write):
+    return [
+        write(f"half{i}.csv", [Contour(row) for row in raster(some)])
+        for i, some in enumerate((ROWS[::2], ROWS[1::2]))
+    ]
+
+
+def joined(bpy, paths, **options):
+    files = [{"name": path.name} for path in paths]
+    place = {"filepath": str(paths[0]), "directory": str(paths[0].parent), "files": files}
+    return made(bpy.ops.tactile.import_contacts, "tactile_object", **place, whole=True, **options)
+
+
+def test_contacts_of_three_files_become_one_closed_surface(empty, three_files):
+    surface, record = joined(empty, three_files, tolerance=0.02)
+    assert surface.name == "part0.csv and 2 more Touched"
+    assert (record["source"], record["contacts"]) == ("part0.csv and 2 more", 3000)
+    assert empty.context.view_layer.objects.active == surface
+    assert record["is_closed"]
+    assert "deviation_mean" not in record
+    place = np.array(surface.matrix_world)[:3, 3]
+    off = np.linalg.norm(positions(surface.data) + place - CENTER, axis=1) - RADIUS
+    assert np.abs(off).max() < 0.02
+    assert values(surface.data, "gaussian_curvature") == pytest.approx(0.25, abs=0.06)
+    assert not values(surface.data, "deviation").any()
+    graph = json.loads(surface["tactile_graph"])
+    assert len(graph["nodes"]) == record["patches"]
+    assert len(graph["edges"]) == record["edges"] > 0
+    curves = np.vstack([edge["curve"] for edge in graph["edges"]])
+    assert np.abs(np.linalg.norm(curves - CENTER, axis=1) - RADIUS).max() < 0.03
+
+
+def test_one_patch_of_files_with_points_of_their_own_is_still_refused(empty, three_files):
+    files = [{"name": path.name} for path in three_files]
+    with pytest.raises(RuntimeError, match="The files name different reference points"):
+        empty.ops.tactile.import_contacts(directory=str(three_files[0].parent), files=files)
+
+
+def test_where_no_normals_were_measured_the_outer_side_is_asked_for(empty, two_halves):
+    before = datablocks(empty)
+    with pytest.raises(RuntimeError, match="Some contacts have no normals, and nothing tells their outer"):
+        joined(empty, two_halves)
+    assert datablocks(empty) == before
+    for outward, flip in (((0, 0, 1), False), ((0, 0, -1), True)):
+        surface, record = joined(empty, two_halves, outward=outward, flip=flip, tolerance=4e-3)
+        assert not record["is_closed"]
+        normals = np.empty(3 * len(surface.data.vertices), dtype=np.float32)
+        surface.data.vertices.foreach_get("normal", normals)
+        assert (normals.reshape(-1, 3)[:, 2] > 0.2).all()
+
+
+def test_files_may_tell_the_outer_side_unless_they_contradict_each_other(empty, write):
+    up = write("up.csv", [Contour(row) for row in raster(ROWS)], outward=[0.0, 0.0, 1.0])
+    assert joined(empty, [up])[1]["patches"] > 1
+    down = write("down.csv", [Contour(row) for row in raster(ROWS)], outward=[0.0, 0.0, -1.0])
+    with pytest.raises(RuntimeError, match="nothing tells their outer side"):
+        joined(empty, [up, down])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"tolerance": -1.0}, "Tolerance: expected a finite number above 0, got -1"),
+        ({"outward": (0, 0, 0)}, "Outward: expected"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_nothing_is_left(empty, two_halves, options, message):
+    before = datablocks(empty)
+    with pytest.raises(RuntimeError, match=message):
+        joined(empty, two_halves, **{"outward": (0, 0, 1)} | options)
+    assert datablocks(empty) == before
+
+
+def test_too_few_contacts_get_a_sentence(empty, write):
+    few = write("few.csv", [Contour(next(raster([0.0]))[:12])])
+    with pytest.raises(RuntimeError, match="expected 40 contacts or more, got 12"):
+        joined(empty, [few], outward=(0, 0, 1))
+
+
+def test_the_shell_joins_them_too(command, two_halves, tmp_path):
+    paths = tmp_path / "out.json", tmp_path / "out.ply", tmp_path / "out.html"
+    outputs = [word for pair in zip(("--json", "--output", "--report"), paths, strict=True) for word in pair]
+    given = [*two_halves, "--outward", 0, 0, 1, "--tolerance", 4e-3]
+    code, out, _ = command("join", *given, *outputs)
+    assert code == 0
+    assert "measured              half0.csv and 1 more, 1020 contacts" in out
+    report = json.loads(paths[0].read_text())
+    points = [*raster(ROWS[::2]), *raster(ROWS[1::2])]
+    same = atlas_of(points, outward=(0, 0, 1), tolerance=4e-3)
+    assert report["patches"] == len(report["graph"]["nodes"]) == len(same.patches)
+    assert paths[1].stat().st_size > 10_000
+    assert "Deviations" not in paths[2].read_text()
+    code, _, err = command("join", *two_halves)
+    assert code == 1
+    assert "set outward" in err
