@@ -368,12 +368,18 @@ def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
     for azimuths in ((0, 60, 120), (0, 35, 80), (10, 20, 60), (0, 45, 100), (5, 50, 140), (0, 70, 110)):
         r = touched(surface, surfaces.planes(azimuths), noise=0.03)
         points, weights = r.domain.nodes
-        lost = next_plane._lost(r, points / r.radius, next_plane.AZIMUTHS) @ weights
+        covariances = r.uncertainty.covariances_with(points / r.radius)
+        count, noise = len(r.contacts) / 3, r.uncertainty.noise**2
+
+        def lost_at_all(most, c=covariances, weights=weights, count=count, noise=noise):
+            return next_plane._lost(c, next_plane.AZIMUTHS, most, noise * most / count) @ weights
+
+        lost, few = lost_at_all(round(count)), lost_at_all(next_plane.FEW_CONTACTS)
         plane, _ = suggest_plane(r)
         chosen = np.argmin(np.abs(next_plane.AZIMUTHS - plane.azimuth))
         assert next_plane.AZIMUTHS[chosen] == pytest.approx(plane.azimuth)
         assert lost[chosen] > 0.97 * lost.max()
-        assert lost[chosen] >= (1.0 - 1e-12) * lost[(chosen + np.arange(-1, 2)) % len(lost)].max()
+        assert few[chosen] >= (1.0 - 1e-12) * few[(chosen + np.arange(-1, 2)) % len(few)].max()
 
 
 @pytest.mark.parametrize("planes", [THREE, surfaces.planes((0, 25, 70))], ids=["even", "uneven"])

@@ -303,7 +303,12 @@ def test_the_suggested_plane_keeps_what_it_promises():
 def test_the_suggested_plane_tells_as_much_as_any_of_all(seed):
     r = touched(seed, azimuths=(0, 50, 130))[1]
     points, weights = r.domain.nodes
-    told = _lost(r, points / r.radius, AZIMUTHS) @ weights
+    covariances = r.uncertainty.covariances_with(points / r.radius)
+    told = (
+        r.geometry.widening(*points.T) ** 2
+        * _lost(covariances, AZIMUTHS, 24, r.uncertainty.noise**2)
+        @ weights
+    )
     chosen = np.argmin(np.abs(AZIMUTHS - suggest_plane(r)[0].azimuth))
     assert told[chosen] >= 0.97 * told.max()
 
