@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smoothing splines: what they reproduce, what outlying contacts and wrong normals do to them, their deviations."""
+"""Smoothing splines: what they reproduce, what outlying contacts and wrong normals do, their deviations."""
 
 import numpy as np
 import pytest
