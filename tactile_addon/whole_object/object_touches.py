@@ -128,12 +128,11 @@ class ObjectTouches:
     def _note(self, state):
         self.found += [exploration.result for exploration in state.found]
         self.done, self.uncovered = state.done, state.uncovered
-        self.words = f"{many(state.done, 'touch', 'touches')}, {many(state.uncovered, 'place', 'places')} to go on from"
+        touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
+        self.words = f"{touches}, {places} to go on from"
         if state.joining is not None:
-            self.words, self.share = (
-                f"Joining {many(len(self.found), 'patch', 'patches')}",
-                0.5 * state.joining,
-            )
+            self.words = f"Joining {many(len(self.found), 'patch', 'patches')}"
+            self.is_stopped, self.share = True, 0.5 * state.joining
 
     def _shown(self):
         self.words = "Meshing"

@@ -29,6 +29,7 @@ from common import (
 )
 
 SLICES = []  # seconds of work in each call of the operator's modal
+WORDS = []  # what the status bar said after it
 MIDDLE = (520, 380)  # of the viewport, where the object is
 
 
@@ -66,6 +67,7 @@ def measure_slices():
             return inner(self, context, event)
         finally:
             SLICES.append(thread_time() - begin)
+            WORDS.append(self._done()[0])
 
     operator.modal = modal
 
@@ -171,6 +173,58 @@ def by_escape():
         check(f"{times} Esc: nothing else is left", data_blocks() == before, data_blocks())
 
 
+def while_it_joins():
+    """Esc has nothing left to keep then: it drops it."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
+    before = data_blocks()
+    yield from start(target="Target")
+    for _ in range(1200):
+        yield 0.05
+        if WORDS[-1].startswith("Joining"):
+            break
+    check("while it joins: it is under way", running(), WORDS[-1])
+    picture("whole_joining")
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.1, "key", "Escape")
+    yield from until(lambda: not running(), 20)
+    check("while it joins, Esc drops it", is_clean() and data_blocks() == before, data_blocks())
+
+
+def afterwards():
+    """What becomes of the surface: renamed, saved and opened, deleted, and its target too."""
+    yield from start(target="Target", most=6)
+    yield from until(lambda: not running(), 60)
+    (surface,) = surfaces()
+    record, name = surface["tactile_object"].to_dict(), surface.name
+    surface.name = "Mine"
+    surface.tactile_colors = "height_std"
+    check("renamed: it shows its colors", surface["tactile_object"]["color_limit"] != record["color_limit"])
+    bpy.context.view_layer.objects.active = surface
+    yield 1
+    picture("whole_renamed")
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "whole.blend"), copy=True)
+    with bpy.data.libraries.load(str(FOLDER / "whole.blend")) as (_, into):
+        into.objects = ["Mine"]
+    (again,) = into.objects
+    check("saved and read: the record is whole", again["tactile_object"].to_dict()["source"] == "Target")
+    check("... and the graph", again["tactile_graph"] == surface["tactile_graph"])
+    bpy.data.objects.remove(again)
+    bpy.data.objects.remove(bpy.data.objects["Target"])
+    yield 1
+    picture("whole_without_target")
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.pick("INVOKE_DEFAULT", True, new=True)
+    yield 1
+    gui.click(*MIDDLE)
+    yield 1
+    check("without its target a click makes no probe", probe() is None)
+    gui.xdo("key", "Escape")
+    yield 1
+    bpy.data.objects.remove(bpy.data.objects["Mine"])
+    yield 1
+    check("deleted: nothing of it is left", not surfaces() and is_clean(), name)
+
+
 def is_clean():
     """It is over, and neither the growing patches nor what is in the status bar are left."""
     from bl_ui.space_statusbar import STATUSBAR_HT_header as bar
@@ -187,7 +241,9 @@ def steps():
     yield from by_dialog()
     yield from by_click()
     yield from by_escape()
+    yield from while_it_joins()
     yield from disturbed("whole", start, is_clean, surfaces, tolerance=5e-4)
+    yield from afterwards()
 
 
 gui.play(steps())
