@@ -33,7 +33,7 @@ import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
 from core.bayes import residual_evidence, rough_fit
-from core.patch import residual
+from core.patch import geometry, residual
 from core.patch.monge import exponents, monomials
 from tools import blender
 
@@ -125,7 +125,9 @@ class Score(NamedTuple):
 def constants(**values):
     """The residual's, for a while."""
     modules = [
-        m for m in (residual, residual_evidence, rough_fit) if any(hasattr(m, name) for name in values)
+        m
+        for m in (geometry, residual, residual_evidence, rough_fit)
+        if any(hasattr(m, name) for name in values)
     ]
     before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
     try:
@@ -141,9 +143,15 @@ def constants(**values):
 
 
 def ours(touch, **values):
-    with constants(**values):
-        r = reconstruct(touch.point, touch.contours, outward=touch.axes[:, 2])
-    return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
+    def within(function):
+        def called(*arguments, **options):
+            with constants(**values):
+                return function(*arguments, **options)
+
+        return called if values else function
+
+    r = within(reconstruct)(touch.point, touch.contours, outward=touch.axes[:, 2])
+    return Fit(r.frame.axes, within(r.height), (r.patch.k1, r.patch.k2), within(r.height_std))
 
 
 OURS, ALONE, PROCESS = "bayes", "without residual", "Matérn process on a quadric"
@@ -336,12 +344,13 @@ def automatic_table(rows):
 
 
 SETTINGS = {
-    f"lengths {lengths}, amplitudes {amplitudes}": {
+    f"lengths {lengths}, tempered to {temper}, {near} near the point": {
         "LENGTHS": np.array(lengths),
-        "AMPLITUDES": np.array(amplitudes),
+        "TEMPER": temper,
+        "NEAR_POINT": near,
     }
-    for lengths in ((0.3, 1.2), (0.4, 0.8), (0.4, 1.6))
-    for amplitudes in ((0.004, 0.022, 0.12), (0.004, 0.022, 0.12, 0.4), (0.003, 0.01, 0.04, 0.14, 0.5))
+    for lengths in ((0.4, 1.6), (0.3, 1.2), (0.4, 2.4))
+    for temper, near in ((0.15, 1.0), (0.1, 0.6))
 }
 
 

@@ -29,7 +29,7 @@ CALM = {
 }
 AHEAD = 3  # orders that are out at once, for each thread of a worker
 LEAST_AHEAD = 16
-EVERY = 5.0  # seconds between looks at how many threads there are
+LOOK_EVERY = 5.0  # seconds between looks at how many threads there are
 GONE = "The worker was lost with it again and again"
 CONNECT = 60.0  # seconds in which a scheduler that was restarted may come back
 
@@ -145,7 +145,7 @@ class Engine:
 
     def _room(self) -> int:
         """How many orders may be out at once."""
-        if monotonic() - self._looked > EVERY:
+        if monotonic() - self._looked > LOOK_EVERY:
             self._looked = monotonic()
             self._require_scheduler()
             with suppress(OSError, TimeoutError):

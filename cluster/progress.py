@@ -5,7 +5,7 @@
 import sys
 from time import monotonic
 
-EVERY = {True: 0.5, False: 10.0}  # seconds between lines, by whether they go to a terminal
+SAY_EVERY = {True: 0.5, False: 10.0}  # seconds between lines, by whether they go to a terminal
 
 
 class Progress:
@@ -29,7 +29,7 @@ class Progress:
     def add(self, done: int, errors: int, workers: int) -> None:
         """Notes that more are done, and says so where it is time."""
         self.done, self.errors = self.done + done, self.errors + errors
-        if monotonic() - self._said >= EVERY[self._is_terminal] or self.done == self.total:
+        if monotonic() - self._said >= SAY_EVERY[self._is_terminal] or self.done == self.total:
             self._said = monotonic()
             self._say(self.line(workers))
 

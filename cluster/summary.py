@@ -6,7 +6,7 @@ from typing import Any
 
 from .data_set.columns import COUNTS
 
-MOST = 10  # objects with errors that are named
+MOST_NAMED = 10  # objects with errors that are named
 
 
 def summary(rows: list[dict[str, Any]], run: Any) -> str:
@@ -17,8 +17,8 @@ def summary(rows: list[dict[str, Any]], run: Any) -> str:
     if run.progress.done:
         lines.append(f"{run.progress.done:,} {run.progress.noun} now, {run.progress.rate:.3g} a second")
     wrong = [row for row in rows if row["error"]]
-    for row in wrong[:MOST]:
+    for row in wrong[:MOST_NAMED]:
         lines.append(f"{row['object']} ({row['file']}): {row['error']:,} errors: {row['message']}")
-    if len(wrong) > MOST:
-        lines.append(f"and {len(wrong) - MOST:,} objects more with errors, see {run.data_set.objects}")
+    if len(wrong) > MOST_NAMED:
+        lines.append(f"and {len(wrong) - MOST_NAMED:,} objects more with errors, see {run.data_set.objects}")
     return "\n".join([*lines, f"Data set: {run.data_set.folder}"])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-ROUNDING = 4e-16  # Rounding of a unit vector's length.
+UNIT_ROUNDING = 4e-16  # Rounding of a unit vector's length.
 LARGEST, SMALLEST = 1e50, 1e-50  # lengths whose sixth powers are numbers
 
 
@@ -73,7 +73,7 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 def unit_vector(name: str, value: ArrayLike) -> Array:
     """`value` (3,) scaled to length 1. Raises ValueError where it has no direction."""
     x, y, z = finite_array(name, value, (3,)).tolist()
-    if abs(math.hypot(x, y, z) - 1.0) <= ROUNDING:  # once is enough: twice would change its last bit
+    if abs(math.hypot(x, y, z) - 1.0) <= UNIT_ROUNDING:  # once is enough: twice would change its last bit
         return np.array([x, y, z])
     largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:

@@ -71,7 +71,30 @@ def block(a=1.0, b=0.7, c=0.5):
         u, v, w = abs(x) - a, abs(y) - b, abs(z) - c
         return math.hypot(max(u, 0.0), max(v, 0.0), max(w, 0.0)) + min(max(u, v, w), 0.0)
 
-    return Solid(distance, (0.05, 0.03, c), (0.0, 0.0, 1.0))
+    return Block(distance, (0.05, 0.03, c), (0.0, 0.0, 1.0), (a, b, c))
+
+
+@dataclass(frozen=True)
+class Block(Solid):
+    """A block, whose faces answer rays at once: walking along a face takes many steps."""
+
+    half: tuple
+
+    def ray_cast(self, origin, direction, distance):
+        enters, leaves = (-math.inf, 0), (math.inf, 0)
+        for axis, (o, d, half) in enumerate(zip(origin, direction, self.half, strict=True)):
+            if d == 0.0:
+                if abs(o) > half:
+                    return None
+                continue
+            enters = max(enters, ((-math.copysign(half, d) - o) / d, axis))
+            leaves = min(leaves, ((math.copysign(half, d) - o) / d, axis))
+        gone, axis = enters if enters[0] > 0.0 else leaves
+        if enters[0] > leaves[0] or not 0.0 < gone <= distance:
+            return None
+        side = direction[axis] if enters[0] <= 0.0 else -direction[axis]
+        normal = tuple(math.copysign(1.0, side) if i == axis else 0.0 for i in range(3))
+        return tuple(o + gone * d for o, d in zip(origin, direction, strict=True)), normal
 
 
 def egg(across=0.6, along=1.0):

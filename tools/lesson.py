@@ -56,7 +56,7 @@ def one():
     axes.text(0.06, 0.5, "normal", color=RED)
     axes.text(-0.5, 0.3, "the surface, cut by the plane", color=BLACK, ha="right")
     axes.annotate("", (-0.75, -0.24), (-1.0, 0.26), arrowprops={"arrowstyle": "-", "color": GRAY})
-    words = "the circle that fits best: κ = −1/r, because it bends away from the normal"
+    words = "the circle that fits best: κ = −1/r"
     axes.text(0.12, -1.1, words, color=BLUE)
     axes.set(xlim=(-2.4, 3.2), ylim=(-1.25, 0.85), aspect="equal")
     axes.axis("off")

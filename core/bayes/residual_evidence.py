@@ -39,7 +39,7 @@ MOST_PLACES = 150  # At most so many contacts carry a residual and tell how larg
 ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
 NEGLIGIBLE = 160.0  # -2 log likelihood beside the best, at which no other noise is tried
 FREE_VARIANCE = 0.06  # of slopes and second derivatives: where curves end early, of 100 they run away
-TEMPER = 0.15  # of the log likelihood: contacts side by side tell of waves between the curves no more
+TEMPER = 0.1  # of the log likelihood: contacts side by side tell of waves between the curves no more
 
 
 class Observations(NamedTuple):

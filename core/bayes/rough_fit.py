@@ -32,7 +32,7 @@ from .residual_evidence import (
     system_of,
 )
 
-UNEXPLAINED = 1.3  # times their accuracy, that contacts are off a sextic (benchmarks.real)
+UNEXPLAINED_MISFIT = 1.3  # times their accuracy, that contacts are off a sextic (benchmarks.real)
 QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's (benchmarks.real).
 
 
@@ -114,7 +114,7 @@ def _misfit(contacts: Array, weights: Array, posterior: Posterior) -> _Misfit:
 
 def _asking(rms: Array, accuracy: Array) -> NDArray[np.intp]:
     """Which of b touches have contacts that their sextics do not describe to an accuracy (b,)."""
-    return np.flatnonzero(rms > UNEXPLAINED * np.maximum(accuracy, ROUGH_MISFIT))
+    return np.flatnonzero(rms > UNEXPLAINED_MISFIT * np.maximum(accuracy, ROUGH_MISFIT))
 
 
 def _is_texture(off: Array, accuracy: float) -> bool:
@@ -122,7 +122,7 @@ def _is_texture(off: Array, accuracy: float) -> bool:
 
     White noise beside the sextic, or outliers, would not do there: its deviation would not know of them.
     """
-    return 1.4826 * float(np.median(off)) > max(UNEXPLAINED * accuracy, MISFIT)
+    return 1.4826 * float(np.median(off)) > max(UNEXPLAINED_MISFIT * accuracy, MISFIT)
 
 
 def _settle(

@@ -23,8 +23,8 @@ from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 MOST_APART = 0.1  # Share of a curve's size that it may miss the point by.
 GAP = 0.25  # Share of a curve's size, around the point, in which it may have no contacts.
 NEWTON_STEPS = 50  # of Gauss-Newton; five are the rule
-STARTS = 3  # curves may come near each other in several places
-MOST_CONTACTS = 1000  # contacts of a curve, and
+MOST_STARTS = 3  # curves may come near each other in several places
+MOST_SEARCHED = 1000  # contacts of a curve, and
 QUERIES = 10**6  # distances of a contact to a curve, that a start is looked for among
 CONTACTS_AROUND = 4 * WINDOW  # contacts of a curve that are looked at around a point
 
@@ -83,7 +83,7 @@ def _starts(contours: Sequence[Contour]) -> Array:
     """
     from scipy.spatial import cKDTree
 
-    thinned = [contour.points[:: -(-len(contour.points) // MOST_CONTACTS)] for contour in contours]
+    thinned = [contour.points[:: -(-len(contour.points) // MOST_SEARCHED)] for contour in contours]
     contacts = np.vstack(thinned)
     contacts = contacts[:: -(-len(contacts) * len(thinned) // QUERIES)]
     squares = np.zeros(len(contacts))
@@ -91,7 +91,7 @@ def _starts(contours: Sequence[Contour]) -> Array:
         squares += cKDTree(points).query(contacts)[0] ** 2
     apart, starts = MOST_APART * min(map(_size, contours)), np.empty((0, 3))
     left = squares <= 4.0 * squares.min() + len(contours) * apart**2
-    while len(starts) < STARTS and left.any():
+    while len(starts) < MOST_STARTS and left.any():
         best = contacts[np.argmin(np.where(left, squares, np.inf))]
         starts = np.vstack([starts, best])
         left &= np.linalg.norm(contacts - best, axis=1) > 2.0 * apart

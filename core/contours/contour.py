@@ -20,7 +20,7 @@ from ..arguments import (
 )
 
 # Share of a curve's size: coordinates that are rounded by more say nothing about curvature.
-MOST_ROUNDING = 0.01
+CURVE_ROUNDING = 0.01
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 UNEXPLAINED = "not explained"
 BRINKS = (NO_CONTACT, CREASE)  # stops where the surface ends
@@ -83,7 +83,7 @@ class Contour:
         single = getattr(self.points, "dtype", None) == np.float32
         if single and len(points):
             spacing = float(np.spacing(np.abs(points).max().astype(np.float32)))
-            if spacing > MOST_ROUNDING * np.ptp(points, axis=0).max() > 0.0:
+            if spacing > CURVE_ROUNDING * np.ptp(points, axis=0).max() > 0.0:
                 raise ValueError(
                     f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
                     "of this size: expected coordinates relative to a nearby point, or double precision"

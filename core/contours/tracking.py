@@ -13,7 +13,7 @@ from ..arguments import LARGEST, Array, finite_array, list_of, number, shown, un
 from .contour import EXTENT, Contour, SamplingPlane, Vector, dot, tangent_of, vector_of
 from .finger import LEAST_IN_PLANE, Surface, contacts, first_contact, section
 
-MOST_CONTACTS = 10_000  # on half a contour
+MOST_IN_HALF = 10_000  # on half a contour
 
 
 def track(
@@ -82,10 +82,8 @@ def _count(extent: float, step: float) -> int:
     """The contacts of half a contour."""
     if extent < step:
         raise ValueError(f"step: expected no more than the extent {extent:g}, got {step:g}")
-    if extent / step > MOST_CONTACTS:
-        raise ValueError(
-            f"step: expected at least a {MOST_CONTACTS}th of the extent {extent:g}, got {step:g}"
-        )
+    if extent / step > MOST_IN_HALF:
+        raise ValueError(f"step: expected at least a {MOST_IN_HALF}th of the extent {extent:g}, got {step:g}")
     return math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
 
 

@@ -58,6 +58,7 @@ def explore(
     If a contour was not followed any farther, its `stops` are UNEXPLAINED. Raises what `track` and
     `reconstruct` raise, and ValueError where curves do not end and `farthest` is None.
 
+    >>> import math
     >>> class Ball:
     ...     def ray_cast(self, origin, direction, distance):
     ...         o, d = np.array(origin), np.array(direction)

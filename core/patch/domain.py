@@ -16,10 +16,10 @@ from ..arguments import Array
 
 GRID = 600  # Points of the grid (8) over a domain.
 BOUNDARY_SAMPLES = 1024  # Samples of the boundary, whose radius is then good to 1e-5.
-AROUND = 32  # places on the hull of contacts that bound a domain
-INSIDE = 0.05  # of the radius, that the origin is inside such a hull at least
+HULL_PLACES = 32  # places on the hull of contacts that bound a domain
+INSIDE_HULL = 0.05  # of the radius, that the origin is inside such a hull at least
 QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])  # turns rows counterclockwise
-APART = 1e-3  # of the radius: ends that are nearer to each other, or to the origin, are one, or none
+SAME_END = 1e-3  # of the radius: ends that are nearer to each other, or to the origin, are one, or none
 BRINK = 0.01  # of the radius: where the surface ends at the origin, the domain ends as near
 GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
 
@@ -39,11 +39,10 @@ class Domain:
         """The domain with every length multiplied by factor."""
         return Domain(factor * self.ends, self.brinks)
 
-    @cached_property
-    def _straight(self) -> NDArray[np.bool_]:
-        """Which pieces of the boundary, each from one end to the next, are straight, (m,)."""
-        none = np.zeros(len(self.ends), dtype=bool)
-        return none if self.brinks is None else self.brinks | np.roll(self.brinks, -1)
+    @property
+    def _straight(self) -> NDArray[np.bool_] | None:
+        """Which pieces of the boundary, each from one end to the next, are straight, (m,); None for none."""
+        return None if self.brinks is None else self.brinks | np.roll(self.brinks, -1)
 
     @cached_property
     def _boundary(self) -> tuple[Array, Array]:
@@ -62,14 +61,17 @@ class Domain:
         system[rows, rows] = 2.0 * (lengths + before)
         system[rows, last], system[rows, following] = lengths, before
         right = 3.0 * (over * rise[last] + before[:, None] * rise)
-        beside = self._straight | self._straight[last]
-        system[beside], right[beside] = np.eye(len(rows))[beside], self.ends[beside] @ QUARTER
-        right[beside] /= np.linalg.norm(self.ends[beside], axis=1, keepdims=True)
+        straight = self._straight
+        if straight is not None:
+            beside = straight | straight[last]
+            system[beside], right[beside] = np.eye(len(rows))[beside], self.ends[beside] @ QUARTER
+            right[beside] /= np.linalg.norm(self.ends[beside], axis=1, keepdims=True)
         slopes = np.linalg.solve(system, right)
         bend = (slopes + slopes[following] - 2.0 * rise) / over
         pieces = np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
-        pieces[1, self._straight] = rise[self._straight]
-        pieces[2:, self._straight] = 0.0
+        if straight is not None:
+            pieces[1, straight] = rise[straight]
+            pieces[2:, straight] = 0.0
         return lengths, pieces
 
     @cached_property
@@ -180,16 +182,16 @@ def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
 def closed_spline_domain(ends: ArrayLike, radius: float, brinks: ArrayLike | None = None) -> Domain:
     """The domain through projected curve ends (m, 2), in any order; `brinks` as in Domain.
 
-    Ends within APART of the origin (a curve that runs to one side only) or of another end do not count.
+    Ends within SAME_END of the origin (a curve that runs to one side only) or of another end do not count.
     Raises ValueError where fewer than three are left.
     """
     x, y = np.asarray(ends, dtype=float).T
     is_brink = np.zeros(len(x), dtype=bool) if brinks is None else np.asarray(brinks, dtype=bool)
-    out = np.flatnonzero(x * x + y * y > (APART * radius) ** 2)
+    out = np.flatnonzero(x * x + y * y > (SAME_END * radius) ** 2)
     order = out[np.argsort(np.arctan2(y[out], x[out]), kind="stable")]
     x, y, is_brink = x[order], y[order], is_brink[order]
     before = np.arange(-1, len(x) - 1)
-    apart = (x - x[before]) ** 2 + (y - y[before]) ** 2 > (APART * radius) ** 2
+    apart = (x - x[before]) ** 2 + (y - y[before]) ** 2 > (SAME_END * radius) ** 2
     count = np.count_nonzero(apart)
     if count < 3:
         raise ValueError(f"ends: expected three or more apart from each other, got {count}")
@@ -201,10 +203,10 @@ def hull_domain(points: ArrayLike, radius: float) -> Domain:
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(np.asarray(points, dtype=float)).equations  # outward normals, and less their distances
-    turns = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    turns = 2.0 * np.pi * np.arange(HULL_PLACES) / HULL_PLACES
     rays = np.array([np.cos(turns), np.sin(turns)])
     ahead = hull[:, :2] @ rays
-    if hull[:, 2].max() > -INSIDE * radius:
+    if hull[:, 2].max() > -INSIDE_HULL * radius:
         raise ValueError("points: expected the origin among them, got it beside them or at their rim")
     reach = np.where(ahead > 0.0, -hull[:, 2:] / np.maximum(ahead, 1e-300), np.inf).min(axis=0)
     return closed_spline_domain((reach * rays).T, radius)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The geometry of a patch: a surface over a part of the tangent plane, and where that is in the world."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,11 +12,13 @@ from ..arguments import Array, finite_array
 from ..contours.local_geometry import Frame
 from .differential_geometry import Derivatives
 from .domain import GRID, Domain
-from .monge import TERMS, HeightField, MongePatch, monomials
+from .monge import HeightField, MongePatch
 from .residual import Residual
 from .triangulation import patch_mesh
 
 EVEN = 1e-4  # A similarity in single precision may be off by so much.
+
+NEAR_POINT = 0.6  # of a residual's deviation, that is left at the point (benchmarks.real)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,23 +55,34 @@ class Geometry(HeightField):
         """z(x, y), local."""
         if self.residual is None:
             return self.polynomial.height(x, y)
-        u, v = self.in_unit_radius(x, y)
-        z = monomials(u, v, TERMS) @ self._terms + self.residual.beside_terms(u, v)
+        z = self._whole.height(*self.in_unit_radius(x, y))
         return self.radius * z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
 
     @cached_property
-    def _terms(self) -> Array:
-        """Coefficients (27,) of the polynomial and of the residual's, in unit radius."""
+    def _whole(self) -> Residual:
+        """The residual with the polynomial among its terms, in unit radius."""
         assert self.residual is not None
-        first, terms = self.polynomial.scaled(1.0 / self.radius), self.residual.mean[: len(TERMS)].copy()
-        terms[2:5:2] += 0.5 * first.k1, 0.5 * first.k2
-        terms[5:] += first.coefficients
-        return terms
+        mean, first = self.residual.mean.copy(), self.polynomial.scaled(1.0 / self.radius)
+        mean[2:5:2] += 0.5 * first.k1, 0.5 * first.k2
+        mean[5 : 5 + len(first.coefficients)] += first.coefficients
+        return replace(self.residual, mean=mean)
 
     def in_unit_radius(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """x and y, (n,) each, in units of L."""
         x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         return x_array.ravel() / self.radius, y_array.ravel() / self.radius
+
+    def widening(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """What the residual's deviations are multiplied with at local (x, y), (n,).
+
+        Where curves run together a real surface is smoother than its covariance has it, and rougher at the
+        rim. The mean over the domain is 1.
+        """
+        points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
+        if self.residual is None:
+            return np.ones(len(points))
+        outward = np.linalg.norm(self.domain.places(points), axis=1)
+        return NEAR_POINT + 1.5 * (1.0 - NEAR_POINT) * outward
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether each local (x, y) lies in the domain or on its boundary; in the shape of x and y."""

@@ -59,12 +59,9 @@ class Residual:
 
     def height(self, x: Array, y: Array) -> Array:
         """What it adds to the Posterior's mean height at n points, (n,)."""
-        return monomials(x, y, TERMS) @ self.mean[: len(TERMS)] + self.beside_terms(x, y)
-
-    def beside_terms(self, x: Array, y: Array) -> Array:
-        """The part of it that k(p, places) is, (n,)."""
-        c = self.mean[len(TERMS) :]
-        return weighted_kernel(np.column_stack([x, y]), self.places, self.variances, c)
+        terms, weights = self.mean[: len(TERMS)], self.mean[len(TERMS) :]
+        p = np.column_stack([x, y])
+        return monomials(x, y, TERMS) @ terms + weighted_kernel(p, self.places, self.variances, weights)
 
     def derivatives(self, x: Array, y: Array) -> Derivatives:
         """The kernel with its slopes and second derivatives."""

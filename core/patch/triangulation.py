@@ -22,7 +22,7 @@ from .monge import HeightField
 CHORD = 4.6  # side^2 = CHORD tolerance / curvature; 8 for equilateral triangles
 COARSEST_EDGE, FINEST_EDGE = 0.25, 0.02  # of neighbors, in mean radii: colors are drawn by them too
 VISIBLE = 1e-3  # Share of the mean radius: a rim that is farther off shows its corners.
-AROUND, MOST_RIM_EDGES = 128, 256  # samples of the boundary; edges of the rim, at most
+RIM_SAMPLES, MOST_RIM_EDGES = 128, 256  # samples of the boundary; edges of the rim, at most
 RIM_SPACING = 0.65  # Share of the distance wanted inside, along the rim, where the lattice does not fit.
 EDGE_GROWTH = 0.5  # Growth of the distance of neighbors with the distance from the rim.
 CLEAR = 0.6  # Distance of the lattice from the rim, in edges of the rim.
@@ -72,7 +72,7 @@ def _bend(surface: HeightField, points: Array) -> Array:
 
 def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
     """Points on the boundary, as far apart along it from each other; and the least size in the domain."""
-    closed = domain.boundary(8 * AROUND)[np.arange(8 * AROUND + 1) % (8 * AROUND)]
+    closed = domain.boundary(8 * RIM_SAMPLES)[np.arange(8 * RIM_SAMPLES + 1) % (8 * RIM_SAMPLES)]
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
 
     def around(count: int) -> Array:
@@ -80,11 +80,11 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
         at = lengths[-1] / count * np.arange(count)
         return np.column_stack([np.interp(at, lengths, values) for values in closed.T])
 
-    samples = around(AROUND)
+    samples = around(RIM_SAMPLES)
     bow = 0.5 * np.hypot(*(np.roll(samples, 1, 0) - 2.0 * samples + np.roll(samples, -1, 0)).T).max()
     rings = np.arange(5)[:, None, None] / 4.0 * samples
-    sizes = size(rings.reshape(-1, 2)).reshape(5, AROUND)
-    bound = max(AROUND / 2.0 * math.sqrt(bow / off), lengths[-1] / (RIM_SPACING * sizes[-1].min()))
+    sizes = size(rings.reshape(-1, 2)).reshape(5, RIM_SAMPLES)
+    bound = max(RIM_SAMPLES / 2.0 * math.sqrt(bow / off), lengths[-1] / (RIM_SPACING * sizes[-1].min()))
     return around(4 * math.ceil(min(bound, MOST_RIM_EDGES) / 4.0)), float(sizes.min())
 
 

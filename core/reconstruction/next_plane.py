@@ -35,12 +35,13 @@ def suggest_plane(
     points, weights = r.domain.nodes
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
     covariances = r.uncertainty.covariances_with(points / r.radius)
+    widening = r.geometry.widening(*points.T) ** 2
 
     def lost(azimuths: NDArray[np.intp], most: int) -> Array:
         """What a contour at each of these takes off the variances at the points, (k, n), in unit radius."""
         count = min(wanted, most)
-        noise = r.uncertainty.noise**2 * count / wanted
-        return _lost(covariances, AZIMUTHS[azimuths % len(AZIMUTHS)], count, noise)
+        noise = float(r.uncertainty.noise) ** 2 * count / wanted
+        return widening * _lost(covariances, AZIMUTHS[azimuths % len(AZIMUTHS)], count, noise)
 
     tried = np.arange(0, len(AZIMUTHS), COARSE_STRIDE)
     near = tried[[np.argmax(lost(tried, FEW_CONTACTS) @ weights)]] + NEARBY

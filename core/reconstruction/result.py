@@ -112,7 +112,7 @@ class Reconstruction:
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
         u, v = self.geometry.in_unit_radius(x, y)
-        std = self.uncertainty.height_std(u, v)
+        std = self.geometry.widening(x, y) * self.uncertainty.height_std(u, v)
         if self.joint_posterior is None:  # a patch by another method departs from the posterior's mean too
             off = self.posterior.height(u, v) - np.ravel(self.height(x, y)) / self.radius
             std = np.hypot(std, off)

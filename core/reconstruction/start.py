@@ -25,7 +25,7 @@ from ..patch.domain import BRINK, Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
 from .strokes import STRIPS, FirstFrame, first_frame, means, unit_in
 
-MOST_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
+TOUCH_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
 
 
 class Given(NamedTuple):
@@ -89,7 +89,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     each = zip(touches, curves.present, curves.tangents, normals, strict=True)
     apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
     errors = [
-        degeneracy(*touch) or (_coarse(gap, size) if gap > MOST_ROUNDING * size else None)
+        degeneracy(*touch) or (_coarse(gap, size) if gap > TOUCH_ROUNDING * size else None)
         for touch, gap, size in zip(each, apart, reach, strict=True)
     ]
     good = [i for i, error in enumerate(errors) if error is None]
@@ -147,7 +147,7 @@ def strokes_start(
     ]
     for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
         first = frames[i]
-        if isinstance(first, FirstFrame) and gap > MOST_ROUNDING * first.radius:
+        if isinstance(first, FirstFrame) and gap > TOUCH_ROUNDING * first.radius:
             frames[i] = _coarse(gap, first.radius)
     errors = [None if isinstance(first, FirstFrame) else first for first in frames]
     firsts = {i: first for i, first in enumerate(frames) if isinstance(first, FirstFrame)}
@@ -189,9 +189,11 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     brinks = np.zeros_like(felt)
     for i, contour in enumerate(contours):
         brinks[:, i] = [stop in BRINKS for stop in contour.stops or ("", "")]
-    at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
-    ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
-    counted = felt | at_point
+    counted = felt
+    if brinks.any():
+        at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
+        ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
+        counted = felt | at_point
     return closed_spline_domain(ends[counted], 1.0, brinks[counted])
 
 

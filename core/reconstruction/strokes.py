@@ -23,9 +23,9 @@ from ..patch.monge import exponents, monomials
 # Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot).
 STRIPS, LEAST_STRIPS = 10, 6
 ROWS = 4  # that a mean takes in at least, on average
-CELL = 0.02  # of the radius: contacts in one such square tell of one place
-SOME = 2000  # contacts that the quartic is fitted to
-NEAR = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
+STROKE_CELL = 0.02  # of the radius: contacts in one such square tell of one place
+QUARTIC_CONTACTS = 2000  # contacts that the quartic is fitted to
+FIRST_REACH = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
 DETERMINED = 0.02  # the least singular value of a quadric's terms on average over contacts, in unit radius
 QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 OPEN = 1e-3  # share of the largest singular value: contacts on a few lines leave such terms of a quartic open
@@ -87,7 +87,7 @@ def means(contacts: Array, along: Array, strips: int = STRIPS) -> tuple[Array, i
     if strips > LEAST_STRIPS and rows < ROWS * len(starts):
         return means(contacts, along, strips - 2)
     counts = np.diff(starts, append=n)[:, None]
-    some = contacts[:: max(1, n // SOME)]
+    some = contacts[:: max(1, n // QUARTIC_CONTACTS)]
     quartic = np.linalg.lstsq(_basis(some), some[:, 2], rcond=OPEN)[0]
     over = contacts[order]
     over[:, 2] -= _basis(over) @ quartic
@@ -100,8 +100,8 @@ def _groups(flat: Array, along: Array, strips: int) -> NDArray[np.intp]:
     """The group of each of n contacts, (n,): by equal shares of the cells that (n, 2) are in."""
     run, across = flat @ along, flat[:, 1] * along[0] - flat[:, 0] * along[1]
     across *= np.copysign(1.0, np.sum(across**3))  # the same whatever the side of the normal
-    places = np.clip(np.column_stack([run, across]), -1.0, 1.0) / CELL
-    cells = places.round().astype(np.intp) @ [1, round(4.0 / CELL)]
+    places = np.clip(np.column_stack([run, across]), -1.0, 1.0) / STROKE_CELL
+    cells = places.round().astype(np.intp) @ [1, round(4.0 / STROKE_CELL)]
     cells -= cells.min()
     shares = 1.0 / np.bincount(cells)[cells]
     first = _equal(shares, np.argsort(run, kind="stable"), np.zeros(len(flat), dtype=np.intp), strips)
@@ -137,7 +137,7 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
     if len(r) < len(QUADRIC) or reach < SMALLEST:
         return _too_few(len(r))
     tangent = r[np.argmax(distances >= FAR * reach)] / reach
-    for share in (NEAR, 1.0):
+    for share in (FIRST_REACH, 1.0):
         near = r[distances <= share * reach] / (share * reach)
         plane = _plane(near, outward)
         quadric = _quadric(near @ plane)

@@ -12,7 +12,7 @@ from ..reconstruction.result import Reconstruction
 # benchmarks.refusals counts the patches that are off and say nothing.
 PATCH_SAMPLES = 15  # So many samples of a patch are compared with the mesh.
 MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh.
-BEYOND = 3.0  # A mesh that is off by more than so many deviations contradicts the patch.
+CONTRADICTING = 3.0  # A mesh that is off by more than so many deviations contradicts the patch.
 
 
 def height_error(r: Reconstruction, surface: Surface) -> float | None:
@@ -34,7 +34,7 @@ def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
     mean : distance of the mesh from the patch, on average
     """
     std, percent = r.mean_height_std, 100.0 / r.radius
-    if r.status != "ok" or mean <= BEYOND * std:
+    if r.status != "ok" or mean <= CONTRADICTING * std:
         return r.status, r.message
     return "uncertain", (
         f"The mesh is {percent * mean:.3g} % of the radius off the patch on average, which expects "

@@ -25,8 +25,8 @@ from .scanned_mesh import Mesh, corners_of, mesh_distances, mesh_of
 SPACING = 0.1  # Spacing of the points that a polynomial is fitted to.
 MOST_POINTS = 400
 PLACE_SPACING = 0.2  # between the places that are tried
-TURNS = 36
-TERMS = exponents(0, 4)
+TRIED_TURNS = 36
+QUARTIC = exponents(0, 4)
 POLYNOMIAL_RIDGE = 1e-3  # where a polynomial has few points
 COARSE_CONTACTS = 60  # The coarse search takes no more contacts.
 COARSE_PLACES, COARSE_STEPS = 400, 8  # places that move to the planes of the nearest triangles
@@ -34,7 +34,7 @@ FINE, FINE_STEPS = 24, 20  # and of them to the triangles themselves
 NEAREST_TRIANGLES = 16  # triangles that are measured
 SAME_PLACE, SAME_TURN = 0.05, math.radians(2.0)  # poses that differ by less are one
 AMBIGUOUS = 1.5  # times the residual is about as good
-SIGNIFICANT = 3.0  # standard deviations
+SIGNIFICANT_SHIFT = 3.0  # standard deviations
 LEAST_RESIDUAL = 1e-3  # less is none: the mesh's own facets
 
 
@@ -94,15 +94,15 @@ def _coarse(felt: Array, mesh: Mesh) -> Array:
     felt = felt[:, :: math.ceil(felt.shape[1] / COARSE_CONTACTS)]
     places, fields = _fields(mesh, 1.05 * np.linalg.norm(felt[0], axis=1).max())
     turns = Rotation.from_rotvec(
-        2.0 * np.pi / TURNS * np.arange(TURNS)[:, None] * [0.0, 0.0, 1.0]
+        2.0 * np.pi / TRIED_TURNS * np.arange(TRIED_TURNS)[:, None] * [0.0, 0.0, 1.0]
     ).as_matrix()
     scores = np.column_stack([_scores(felt @ turn.T, fields) for turn in turns])
     least = (scores <= np.roll(scores, 1, axis=1)) & (scores <= np.roll(scores, -1, axis=1))
     order = np.argsort(np.where(least, scores, np.inf), axis=None)[
         : min(COARSE_PLACES, np.count_nonzero(least))
     ]
-    places = places[order // TURNS]
-    places[..., :3] = places[..., :3] @ turns[order % TURNS]
+    places = places[order // TRIED_TURNS]
+    places[..., :3] = places[..., :3] @ turns[order % TRIED_TURNS]
     places, residuals, _ = _descended(places, felt, mesh, 1, COARSE_STEPS)
     return places[_distinct(places, residuals)[:FINE]]
 
@@ -124,8 +124,8 @@ def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
         local = (co[found] - origins[:, None]) @ axes
         weights = np.maximum(normals[found] @ axes[..., 2:], 0.0)
         x, y = local.reshape(-1, 3)[:, :2].T
-        basis = weights * monomials(x, y, TERMS).reshape(*found.shape, -1)
-        system = basis.swapaxes(1, 2) @ basis + POLYNOMIAL_RIDGE * np.eye(len(TERMS))
+        basis = weights * monomials(x, y, QUARTIC).reshape(*found.shape, -1)
+        system = basis.swapaxes(1, 2) @ basis + POLYNOMIAL_RIDGE * np.eye(len(QUARTIC))
         fields.append(np.linalg.solve(system, basis.swapaxes(1, 2) @ (weights * local)[..., 2:])[..., 0])
     return places, np.concatenate(fields).T
 
@@ -138,7 +138,7 @@ def _scores(felt: Array, fields: Array) -> Array:
     """
     x, y, z = felt[0].T
     weights = felt[1, :, 2:]  # a height on a slope is less of a distance
-    off = weights * (z[:, None] - monomials(x, y, TERMS) @ fields)
+    off = weights * (z[:, None] - monomials(x, y, QUARTIC) @ fields)
     free = np.linalg.qr(weights * monomials(x, y, exponents(0, 1)))[0]
     return np.sum(off**2, axis=0) - np.sum((free.T @ off) ** 2, axis=0)
 
@@ -174,7 +174,7 @@ def _descended(
     slopes = slopes * np.repeat([SAME_TURN, SAME_PLACE], 3)
     growth = np.linalg.eigvalsh(slopes.swapaxes(1, 2) @ slopes)[:, 0]
     residuals = np.sqrt(np.mean(distances[..., 0] ** 2, axis=1))
-    return places, residuals, growth < (SIGNIFICANT * np.maximum(residuals, LEAST_RESIDUAL)) ** 2
+    return places, residuals, growth < (SIGNIFICANT_SHIFT * np.maximum(residuals, LEAST_RESIDUAL)) ** 2
 
 
 def _distinct(places: Array, residuals: Array) -> list[int]:

@@ -11,7 +11,7 @@ from ..arguments import Array
 
 SORTED_AT_ONCE = 100_000  # points that are sorted at once (benchmarks.stability_map)
 JAMMED = 0.575  # points in a square of the spacing, once no more have room
-CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
+SAMPLING_CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
 
 
 def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[int | None]:
@@ -24,10 +24,10 @@ def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[
 
     left = []
     for start in range(0, len(points), SORTED_AT_ONCE):
-        left.append(start + _one_a_cell(points[start : start + SORTED_AT_ONCE], CELL * spacing))
+        left.append(start + _one_a_cell(points[start : start + SORTED_AT_ONCE], SAMPLING_CELL * spacing))
         yield None
     chosen = np.concatenate(left)
-    chosen = rng.permutation(chosen[_one_a_cell(points[chosen], CELL * spacing)])
+    chosen = rng.permutation(chosen[_one_a_cell(points[chosen], SAMPLING_CELL * spacing)])
     yield None
     tree = cKDTree(points[chosen])
     yield None

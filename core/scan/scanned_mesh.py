@@ -14,7 +14,7 @@ from ..arguments import Array, finite_array
 
 LARGEST_MESH = 40.0
 LONGEST_EDGE = 0.25  # longer ones are halved: a patch covers a hundred triangles
-FACING = 0.05  # what a right angle between normals counts, about, as a distance to a triangle
+FACING_WEIGHT = 0.05  # what a right angle between normals counts, about, as a distance to a triangle
 TOUCHING = 1e-9
 
 
@@ -58,7 +58,7 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> Mesh:
     if not good.any():
         raise ValueError("faces: expected triangles, got none that has an area")
     centers, smooth = mean[good, :3], mean[good, 3:] / bends[good, None]
-    tree = cKDTree(np.concatenate([centers, FACING * smooth], axis=1))
+    tree = cKDTree(np.concatenate([centers, FACING_WEIGHT * smooth], axis=1))
     return Mesh(pieces[good, :, :3], across[good] / lengths[good, None], centers, smooth, tree)
 
 
@@ -90,7 +90,7 @@ def mesh_distances(places: Array, felt: Array, mesh: Mesh, neighbors: int) -> tu
     turned = places[..., :3].swapaxes(1, 2)
     arms, normals = felt[0] @ turned, (felt[1] @ turned).reshape(-1, 3)
     points = (arms + places[:, None, :, 3]).reshape(-1, 3)
-    near = mesh.tree.query(np.hstack([points, FACING * normals]), range(1, neighbors + 1))[1]
+    near = mesh.tree.query(np.hstack([points, FACING_WEIGHT * normals]), range(1, neighbors + 1))[1]
     nearest = near[:, 0]
     up, offsets = mesh.normals[nearest], points - mesh.centers[nearest]
     if neighbors > 1:

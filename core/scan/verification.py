@@ -20,9 +20,9 @@ from ..reconstruction.result import Reconstruction
 EXTRA = 9  # contours, as in the paper's Fig. 3
 # benchmarks.scans prints what is found with these.
 STEPS_A_RADIUS = 12  # Steps of such a contour in a radius.
-REACHES = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
-AT_ONCE = 5000  # vertices whose distances are found in one step, in some hundredths of a second
-HAIR = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.
+FOOT_REACH = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
+MISSES_AT_ONCE = 5000  # vertices whose distances are found in one step, in some hundredths of a second
+OWN_LAYER = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.
 
 
 def reachable(
@@ -67,8 +67,8 @@ def verifying(
     found: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
     found |= _spread("contact", distances(r.geometry, r.contacts))
     misses = np.empty(len(local))
-    for start in range(0, len(local), AT_ONCE):
-        some = slice(start, start + AT_ONCE)
+    for start in range(0, len(local), MISSES_AT_ONCE):
+        some = slice(start, start + MISSES_AT_ONCE)
         misses[some] = distances(r.geometry, local[some])
         yield found
     contours = _extra_contours(r, surface, extra)
@@ -129,7 +129,7 @@ def _azimuths_between(domain: Domain, count: int) -> list[float]:
 
 def _start(r: Reconstruction, surface: Surface) -> Vector | None:
     """The place of the surface nearest to the reference point along the normal; None where there is none."""
-    hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in REACHES)
+    hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in FOOT_REACH)
     return next((hit for hit in hits if hit is not None), None)
 
 
@@ -154,7 +154,7 @@ def _below(r: Reconstruction, surface: Surface, local: Vector, distance: float) 
 
 def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:
     """Whether something of the surface is above the point, within `reach` along the unit `up`."""
-    (x, y, z), (ux, uy, uz), hair = point, up, HAIR * reach
+    (x, y, z), (ux, uy, uz), hair = point, up, OWN_LAYER * reach
     return surface.ray_cast((x + hair * ux, y + hair * uy, z + hair * uz), up, reach) is not None
 
 

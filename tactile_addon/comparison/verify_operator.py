@@ -16,7 +16,7 @@ from ..touch.surface import MeshSurface
 from ..touch.touch_report import judgment
 from .verification_wording import verification_summary
 
-AT_ONCE = 2000  # vertices that are looked at in one step
+VERTICES_AT_ONCE = 2000  # vertices that are looked at in one step
 
 
 class Verification:
@@ -54,11 +54,11 @@ class Verification:
         _, vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
         self.count, seen = len(vertices), [np.empty((0, 3))]
         yield
-        for start in range(0, self.count, AT_ONCE):
-            some = slice(start, start + AT_ONCE)
+        for start in range(0, self.count, VERTICES_AT_ONCE):
+            some = slice(start, start + VERTICES_AT_ONCE)
             over = core.reachable(r.geometry, self, vertices[some], normals[some])
             seen.append(vertices[some][over])
-            self.done = min(start + AT_ONCE, self.count)
+            self.done = min(start + VERTICES_AT_ONCE, self.count)
             yield
         for found in core.verifying(r, self, np.vstack(seen)):
             self._found = found

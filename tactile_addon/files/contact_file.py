@@ -18,7 +18,7 @@ from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 VERSION = 2
 TITLE = "# Tactile Patch contacts, version "
 UNIT_METERS = dict(units.METERS.values())  # meters in each unit
-DIRECTIONS, DEVIATIONS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
+VECTOR_KEYS, DEVIATION_KEYS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
 COLUMNS = ("curve", "time", *POINT_COLUMNS, *NORMAL_COLUMNS)
 STROKE = "stroke"  # the name of a curve that runs beside the reference point begins with it
 
@@ -62,7 +62,7 @@ def write(path, contacts):
     contours = [*contours, *strokes]
     names = POINT_COLUMNS + (NORMAL_COLUMNS if any(c.normals is not None for c in contours) else ())
     told = {"point": point, "outward": outward}
-    for key in DEVIATIONS:
+    for key in DEVIATION_KEYS:
         stds = [getattr(c, key) for c in contours]
         if any(std is not None for std in stds):
             told[key] = stds[:1] if len(set(stds)) == 1 else stds
@@ -104,7 +104,7 @@ def _read_csv(name, path):
     for _, first, block in contact_rows.blocks(text, start, number + 1):
         rows.add(first, block)
     contours = rows.contours()
-    for key in DEVIATIONS:
+    for key in DEVIATION_KEYS:
         stds = told.pop(key, [None])
         stds = stds * len(contours) if len(stds) == 1 else stds
         if len(stds) != len(contours):
@@ -137,11 +137,11 @@ def _told(name, text):
         if number == 1:
             _require_version(at, line.removeprefix(TITLE).partition(",")[0].strip())
         key, *words = line[1:].rstrip(",;\t\n ").split() or [""]  # A spreadsheet may leave separators behind.
-        if key in DIRECTIONS and len(words) != 3:
+        if key in VECTOR_KEYS and len(words) != 3:
             raise ValueError(f"{at}: expected 3 numbers for {key}, got {len(words)}")
-        if key in DIRECTIONS:
+        if key in VECTOR_KEYS:
             told[key] = [contact_rows.number_of(f'{at}, "{key}"', word, LARGEST) for word in words]
-        elif key in DEVIATIONS:
+        elif key in DEVIATION_KEYS:
             told[key] = [_deviation(f'{at}, "{key}"', word) for word in words]
         start, number = end, number + 1
     return told

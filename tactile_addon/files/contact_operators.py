@@ -53,7 +53,8 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
     )
     tolerance: length_property(
         "Tolerance",
-        "Standard deviation to reach for heights of a whole object, in the scene's unit; 0: 1.2 % of a patch",
+        "Standard deviation to reach for heights of a whole object, in the scene's unit; 0 uses 1.2 "
+        "% of each patch",
         precision=4,
     )
     point: FloatVectorProperty(

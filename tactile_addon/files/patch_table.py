@@ -10,7 +10,7 @@ from ..touch import units
 from . import whole_file
 
 # Keys of the report, and the power of length each is measured in.
-NUMBERS = {
+NUMBER_POWERS = {
     **dict.fromkeys(("k1", "k1_std", "k2", "k2_std"), -1),
     **dict.fromkeys(("gaussian_curvature", "gaussian_curvature_std"), -2),
     **dict.fromkeys(("mean_curvature", "mean_curvature_std", "curvedness"), -1),
@@ -50,7 +50,7 @@ def _row(patch, record, unit):
     owner = probe.probe_of(patch)
     numbers = {_heading("xyz"[i], 1, unit): x / unit[1] for i, x in enumerate(record["frame"]["origin"])}
     numbers |= dict(zip(("nx", "ny", "nz"), record["frame"]["normal"], strict=True))
-    for key, power in NUMBERS.items():
+    for key, power in NUMBER_POWERS.items():
         numbers[_heading(key, power, unit)] = record[key] / unit[1] ** power if key in record else None
     named = {"probe": owner.name if owner else "", "patch": patch.name}
     said = {key: "" if value is None else f"{value:.9g}" for key, value in numbers.items()}

@@ -7,6 +7,7 @@ not do: so it stays where it is when the target is deleted, and is not sheared w
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from mathutils import Matrix, Vector
@@ -89,9 +90,10 @@ def seat(probe, extent):
     Those that it keeps, unless it is no longer there.
     """
     settings, target = probe.tactile_probe, probe.tactile_probe.target
-    to_world = np.eye(4) if target is None else np.array(target.matrix_world, dtype=float)
-    place, kept = np.array(probe.matrix_world, dtype=float), np.array(settings.seat)
-    now = _seat(to_world, place) if can_have_children(probe) else np.full(SEAT, np.nan)
+    above = np.eye(4).ravel().tolist() if target is None else _numbers(target.matrix_world)
+    own, kept = _numbers(probe.matrix_world), np.array(settings.seat)
+    now = np.array(_seat(*above, *own)) if can_have_children(probe) else np.full(SEAT, np.nan)
+    to_world, place = np.reshape([above, own], (2, 4, 4))
     rounding = np.finfo(np.float32).eps * np.abs([to_world[:3, 3], place[:3, 3]]).max()
     off = np.linalg.norm(to_world[:3, :3] @ (now[:3] - kept[:3]))
     is_turned = not np.abs(now[3:] - kept[3:]).max() <= CLOSE  # of NaN too
@@ -99,8 +101,10 @@ def seat(probe, extent):
     return kept.tolist() if is_there else now.tolist()
 
 
-def _seat(to_world, place):
-    """SEAT numbers of the world matrices (4, 4) of a target and a probe; NaN where the target is flat."""
+@lru_cache(maxsize=16)  # It is asked for some times in a row, each time something has changed.
+def _seat(*matrices):
+    """SEAT numbers of the world matrices of a target and a probe, 16 each; NaN where the target is flat."""
+    to_world, place = np.reshape(matrices, (2, 4, 4))
     linear = to_world[:3, :3]
     shape, size, volume = linear.T @ linear, np.linalg.norm(linear), np.linalg.det(linear)
     if not abs(volume) > 1e-12 * size**3 > 0.0:

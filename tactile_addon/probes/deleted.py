@@ -101,6 +101,11 @@ def _is_left(obj, there):
     return owner is not None and owner not in there and obj.parent is None and obj.is_editable
 
 
+def _is_data(datablock):
+    """Whether it is none of a window's, as the list of objects in it, which finds them again."""
+    return not isinstance(datablock, bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace)
+
+
 def _unused_meshes():
     return [mesh for mesh in bpy.data.meshes if DIGEST in mesh and not mesh.users]
 
@@ -114,7 +119,7 @@ def remove():
     # Children and modifiers point to an object without being its users, and undo may leave them as they are:
     # it would bring back the object, and not these links.
     pointing = bpy.data.user_map(subset=gone) if gone else {}
-    gone = [obj for obj in gone if not pointing.get(obj)]
+    gone = [obj for obj in gone if not any(map(_is_data, pointing.get(obj, ())))]
     left = [obj for obj in there.values() if _is_left(obj, there) and is_result(obj)]
     _deleted.clear()
     patch_object.remove_objects(left)

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty
 from ..touch.settings import UNSAVED
 from .operators import report_error
 
-AT_ONCE = 0.2  # seconds of work before a window is told that there is more
+FIRST_SLICE = 0.2  # seconds of work before a window is told that there is more
 SLICE = 0.03  # seconds of work between two events
 SAY = 1.0  # seconds between two lines of progress where there is no window
 NEXT = 0.01  # seconds from one slice to the next
@@ -38,7 +38,7 @@ class InSlices:
     def invoke(self, context, event):
         try:
             self._begin(context)
-            if self._advance(context, AT_ONCE):
+            if self._advance(context, FIRST_SLICE):
                 return self._finish(context)
         except ValueError as error:
             return report_error(self, error)

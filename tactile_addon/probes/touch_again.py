@@ -17,7 +17,7 @@ from . import anchor
 from .probe import DIGEST, patch_of, record_of
 
 NO_SHAPE = " 00000000"  # the checksum of a mesh that cannot be touched, as settings.shape ends
-VERTICES = 2000  # of the mesh around, compared with the patch at most; a quarter or more lies over it
+VERTICES = 1000  # of the mesh around, compared with the patch at most; a quarter or more lies over it
 
 
 def _put(probe, touched):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..scene.colors import shades
 
-SIZE = 320  # of a picture, in pixels
+PIXELS = 320  # of a picture, in pixels
 BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # of a histogram
 
 
@@ -23,7 +23,7 @@ def triangles(points, corners, colors, marks=()):
 
 def dots(points, colors):
     """Dots at points (n, 2), later ones above earlier ones, in colors (n, 3 or 4)."""
-    place, radius = _fitted(points), max(2.0, 0.9 * SIZE / np.sqrt(max(len(points), 1)))
+    place, radius = _fitted(points), max(2.0, 0.9 * PIXELS / np.sqrt(max(len(points), 1)))
     return _picture(
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{_hex(color)}"/>'
         for (x, y), color in zip(place(points), colors, strict=True)
@@ -61,22 +61,22 @@ def scale(limit, label, low=-1.0):
         f'<text x="{x}" y="27" text-anchor="{anchor}">{label(at * limit)}</text>'
         for x, at, anchor in (
             (0, low, "start"),
-            (SIZE // 2, 0.5 * (low + 1.0), "middle"),
-            (SIZE, 1.0, "end"),
+            (PIXELS // 2, 0.5 * (low + 1.0), "middle"),
+            (PIXELS, 1.0, "end"),
         )
     ]
-    return f'<svg viewBox="0 0 {SIZE} 32" width="{SIZE}">{"".join([*boxes, *words])}</svg>'
+    return f'<svg viewBox="0 0 {PIXELS} 32" width="{PIXELS}">{"".join([*boxes, *words])}</svg>'
 
 
 def _picture(shapes):
-    return f'<svg viewBox="0 0 {SIZE} {SIZE}" width="{SIZE}">{"".join(shapes)}</svg>'
+    return f'<svg viewBox="0 0 {PIXELS} {PIXELS}" width="{PIXELS}">{"".join(shapes)}</svg>'
 
 
 def _fitted(points):
     """What takes points (n, 2) to the middle of a picture, y upward."""
     low, high = points.min(axis=0), points.max(axis=0)
-    factor = (SIZE - 10.0) / max((high - low).max(), 1e-300)
-    return lambda at: SIZE / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
+    factor = (PIXELS - 10.0) / max((high - low).max(), 1e-300)
+    return lambda at: PIXELS / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
 
 
 def _pairs(points, between):

@@ -37,9 +37,9 @@ def _legend(painted, record, unit):
     swatches = "".join(page.swatch(color, words) for words, color in map_object.swatches(painted))
     if shown == "reason":
         return swatches
-    title = next(words for key, words, *_ in map_object.SHOWN if key == shown)
+    title = next(words for key, words, *_ in map_object.MAP_QUANTITIES if key == shown)
     low = "1" if shown in map_object.LOGARITHMIC else "0"
-    high = units.say(record["color_limit"], map_object.POWERS[shown], unit)
+    high = units.say(record["color_limit"], map_object.MAP_POWERS[shown], unit)
     return page.words(f"{title}: white at {low}, dark red from {high} on.") + swatches
 
 
@@ -63,7 +63,7 @@ def _errors(mesh, record, unit):
 
 def _screen_colors(mesh):
     """The colors of the vertices as screens have them, (n, 4)."""
-    attribute = mesh.attributes[map_object.COLOR]
+    attribute = mesh.attributes[map_object.MAP_COLOR]
     rgba = np.empty((len(attribute.data), 4), dtype=np.float32)
     attribute.data.foreach_get("color_srgb", rgba.ravel())
     return rgba

@@ -14,7 +14,7 @@ from ..touch import units
 from . import drawing, page
 
 SHARES = (0.005, 0.01, 0.02, 0.05)  # of the radius, or of the extent of a map
-DEVIATIONS = ((1.0, 0.68), (2.0, 0.95), (3.0, 0.997))  # and what a normal distribution has within them
+NORMAL_SHARES = ((1.0, 0.68), (2.0, 0.95), (3.0, 0.997))  # and what a normal distribution has within them
 LEAST_RANGE = 1e-12
 MANIFEST = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
 
@@ -38,7 +38,7 @@ def bands(values, weights, std, unit, reaches):
         return name, units.say(reach, 1, unit), f"{100.0 * within:.1f} %", due
 
     rows = [row(*reach) for reach in reaches]
-    for count, due in DEVIATIONS:
+    for count, due in NORMAL_SHARES:
         rows.append(
             row(
                 f"± {count:g} standard deviation{'s' if count > 1.0 else ''}",

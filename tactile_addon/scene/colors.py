@@ -13,7 +13,11 @@ COLOR_STOPS = np.array([
 
 def symmetric_range(values, floor):
     """The r of a scale -r..r: the 98th percentile of |values|, so a few wild ones do not bleach the rest."""
-    return max(float(np.percentile(np.abs(values), 98.0)), floor)
+    sizes, at = np.abs(values), 0.98 * (len(values) - 1)  # np.percentile takes five times as long
+    before = int(at)
+    sizes.partition([before, min(before + 1, len(sizes) - 1)])
+    one, other = sizes[before], sizes[min(before + 1, len(sizes) - 1)]
+    return max(float(one + (at - before) * (other - one)), floor)
 
 
 def shades(values, limit):

@@ -9,9 +9,9 @@ import numpy as np
 
 from .mesh_data import fill, write
 
-CORNERS, RIM = 96, 0.6  # points around a patch, and how thick its rim is beside a contour
+RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # points around a patch, and how thick its rim is beside a contour
 CONTACT = 3.6  # how far the tips of a contact are from it, beside the thickness of a contour
-TIPS = np.vstack([np.eye(3), -np.eye(3)])
+CONTACT_TIPS = np.vstack([np.eye(3), -np.eye(3)])
 FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
 SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # of a square tube
 
@@ -46,10 +46,10 @@ def fill_contours(mesh, touched):
     paths = [*contours, _rim(result)]  # by which a flat patch is told from a flat face below it
     form = _form(tuple(len(path) for path in paths), len(strokes))
     lengths = [len(path) for path in paths]
-    sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM]), lengths)
+    sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM_THICKNESS]), lengths)
     tubes = _tubes(np.vstack(paths), np.repeat([*across, (0.0, 0.0, 1.0)], lengths, axis=0), sizes, form)
     contacts = np.vstack([*contours, frame.to_local(strokes)])
-    octahedra = contacts[:, None] + CONTACT * thickness * TIPS
+    octahedra = contacts[:, None] + CONTACT * thickness * CONTACT_TIPS
     points = np.vstack([tubes, octahedra.reshape(-1, 3)])
     if _has_form(mesh, form):
         write(mesh, "position", "FLOAT_VECTOR", points)
@@ -73,7 +73,7 @@ def _has_form(mesh, form):
 
 def _rim(result):
     """The closed path (n, 3) around a patch, in its frame."""
-    edge = result.domain.boundary(CORNERS)
+    edge = result.domain.boundary(RIM_CORNERS)
     edge = np.vstack([edge, edge[:1]])
     return np.column_stack([edge, result.height(*edge.T)])
 

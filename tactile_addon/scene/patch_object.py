@@ -34,7 +34,7 @@ from .viewports import show_colors
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 NORMAL, PLACE = "custom_normal", "domain_place"  # attributes: as shaded; on the unit disk, see core.Domain
-FLOOR = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
+WHITE_RANGE = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
 
 
 def insert(scene, touched, parent=None, lines=None):
@@ -112,7 +112,7 @@ def recolor(patch):
     own_mesh(patch)
     shown, mesh = patch.tactile_colors, patch.data
     shades, record = values(mesh, shown), patch[RECORD if RECORD in patch else ATLAS_RECORD]
-    floor = FLOOR * record["radius"] ** POWERS[shown]
+    floor = WHITE_RANGE * record["radius"] ** POWERS[shown]
     limit = patch.get(RANGE) or colors.symmetric_range(shades, floor)
     mesh.attributes[COLOR].data.foreach_set("color", colors.diverging(shades, limit).ravel())
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR

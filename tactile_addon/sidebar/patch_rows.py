@@ -4,9 +4,9 @@
 
 from ..touch import units
 
-FLAT = 2.0  # A curvature within so many deviations of 0 has no radius.
+FLAT_DEVIATIONS = 2.0  # A curvature within so many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
-NOTHING = 1e-6  # of a number in unit radius
+ZERO = 1e-6  # of a number in unit radius
 
 
 def main_rows(record, unit):
@@ -70,12 +70,12 @@ def _measured(record, key, power, unit):
 
 def _value(record, key, power):
     # What is left of nothing in single precision is none.
-    return record[key] if abs(record[key]) > NOTHING * record["radius"] ** power else 0.0
+    return record[key] if abs(record[key]) > ZERO * record["radius"] ** power else 0.0
 
 
 def _radii(record, unit):
     """Rows of the radii 1 / kappa, with their deviations, as far as the curvatures are known not to be 0."""
     for number in (1, 2):
         k, std = record[f"k{number}"], record[f"k{number}_std"]
-        if abs(k) > FLAT * std and abs(k) * record["radius"] > FLATTEST:
+        if abs(k) > FLAT_DEVIATIONS * std and abs(k) * record["radius"] > FLATTEST:
             yield f"1/κ{number}", units.say(1.0 / k, 1, unit, std / k**2)

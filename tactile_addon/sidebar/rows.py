@@ -5,8 +5,12 @@
 import re
 import textwrap
 
+import blf
 import bpy
 from bpy.props import StringProperty
+
+FONT, TEXT = 0, 11.0  # Blender's own, and its size in panels,
+LETTER, PADDING = 6.5, 12.0  # the width of a letter, about, and what is free around a text: pixels at scale 1
 
 TIPS = {
     "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
@@ -70,21 +74,30 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
 
 
 def draw_rows(context, layout, rows, active=True):
-    """Labels and values side by side, gray where they are not active; a heading has no value."""
+    """Labels and values side by side, gray where they are not active; a heading has no value.
+
+    A value that has no room there stands below its label.
+    """
     longest = max((len(label) for label, value in rows if value), default=0)
-    share = min(max((longest + 4) / _letters(context), 0.34), 0.66)
+    share = min(max((longest + 3) / _letters(context), 0.34), 0.66)
+    room = (1.0 - share) * _letters(context) * LETTER - PADDING
+    blf.size(FONT, TEXT)
     column = layout.column(align=True)
     column.active = active
     for label, value in rows:
         if not value:
             column.label(text=label)
             continue
-        split = column.split(factor=share, align=True)
-        left = split.row(align=True)
+        is_long = blf.dimensions(FONT, value)[0] > room
+        line = column if is_long else column.split(factor=share, align=True)
+        left = line.row(align=True)
         left.alignment = "LEFT"
         copy = left.operator(TACTILE_OT_copy_value.bl_idname, text=label, emboss=False, translate=False)
         copy.label, copy.value = label, value
-        split.label(text=value, translate=False)
+        if is_long:
+            line = column.split(factor=0.15, align=True)
+            line.label(text="")
+        line.label(text=value, translate=False)
 
 
 def draw_sentence(context, layout, sentence, icon):
@@ -97,4 +110,4 @@ def draw_sentence(context, layout, sentence, icon):
 
 def _letters(context):
     """How many stand beside each other in the sidebar, about."""
-    return context.region.width / (6.5 * context.preferences.system.ui_scale) - 8.0
+    return context.region.width / (LETTER * context.preferences.system.ui_scale) - 8.0

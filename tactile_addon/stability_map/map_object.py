@@ -14,11 +14,11 @@ from ..scene.viewports import show_colors
 from ..touch.settings import MOST_PLANES
 from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
 
-COLOR = "stability_color"
+MAP_COLOR = "stability_color"
 SHADES = 256
-ABOVE = 5e-3  # of the object's size; 20000 clip starts away, as a scan in mm is, less flickers
+SHOWN_ABOVE = 5e-3  # of the object's size; 20000 clip starts away, as a scan in mm is, less flickers
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
-SHOWN = [
+MAP_QUANTITIES = [
     ("error", "Error", "Mean distance in height between patch and mesh", 1),
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
     (
@@ -31,7 +31,7 @@ SHOWN = [
     ("reason", "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # on a scale from 1
-POWERS = {name: power for name, _, _, power in SHOWN}
+MAP_POWERS = {name: power for name, _, _, power in MAP_QUANTITIES}
 REFUSED = (0.27, 0.27, 0.27, 1.0)
 # Colors of the reasons, sRGB, are Okabe and Ito's, which color-blind readers can tell apart.
 REASON_COLORS = np.array([
@@ -52,10 +52,10 @@ def insert(context, obj, touched):
     mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
     # It lies in the mesh it describes: shown a little above it, but not in front, as the patches are in it.
     above = painted.modifiers.new("Above the Mesh", "DISPLACE")
-    above.mid_level, above.strength = 0.0, ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
+    above.mid_level, above.strength = 0.0, SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
     _paint(mesh, touched)
     mesh.materials.clear()
-    mesh.materials.append(emission("Tactile Stability", attribute=COLOR))
+    mesh.materials.append(emission("Tactile Stability", attribute=MAP_COLOR))
     painted[patch_record.MAP_RECORD] = touched.report() | {"source": obj.name, "painted": painted.name}
     patch_object.collection(context.scene).objects.link(painted)
     recolor(painted)
@@ -67,13 +67,13 @@ def _paint(mesh, touched):
     """Every vertex gets the values of the touch that is nearest."""
     attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in MEASURES]
     attributes.append(("reason", "INT", touched.reason))
-    for name in (*MEASURES, "reason", COLOR):
+    for name in (*MEASURES, "reason", MAP_COLOR):
         if name in mesh.attributes:  # The source may have one of that name, of whatever type.
             mesh.attributes.remove(mesh.attributes[name])
     for name, kind, values in attributes:
         mesh.attributes.new(name, kind, "POINT").data.foreach_set("value", values[touched.nearest])
-    mesh.attributes.new(COLOR, "FLOAT_COLOR", "POINT")
-    mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
+    mesh.attributes.new(MAP_COLOR, "FLOAT_COLOR", "POINT")
+    mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
 
 
 def recolor(painted):
@@ -91,7 +91,7 @@ def recolor(painted):
         share = np.log(share) / np.log(limit) if shown in LOGARITHMIC else share / limit
         place = (np.minimum(share, 1.0) * (SHADES - 1) + 0.5).astype(np.int32)
         rgba = table[np.where(values == NOTHING, SHADES, place)]
-    mesh.attributes[COLOR].data.foreach_set("color", rgba.astype(np.float32).ravel())
+    mesh.attributes[MAP_COLOR].data.foreach_set("color", rgba.astype(np.float32).ravel())
     mesh.update()
     record["color_limit"] = limit
 
@@ -100,7 +100,7 @@ def _limit(shown, values, extent):
     """The end of the colors' range."""
     if shown == "blind_share":
         return 1.0
-    floor = 10.0 if shown in LOGARITHMIC else patch_object.FLOOR * extent
+    floor = 10.0 if shown in LOGARITHMIC else patch_object.WHITE_RANGE * extent
     return colors.symmetric_range(values, floor) if len(values) else floor
 
 
@@ -134,7 +134,7 @@ def register():
     bpy.types.Object.tactile_map_colors = EnumProperty(
         name="Colors",
         description="What the colors of the map show",
-        items=[item[:3] for item in SHOWN],
+        items=[item[:3] for item in MAP_QUANTITIES],
         update=lambda obj, _: recolor(obj) if patch_record.MAP_RECORD in obj else None,
     )
 

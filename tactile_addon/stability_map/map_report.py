@@ -57,6 +57,6 @@ def median_rows(record, unit):
 
 def _medians(record, unit):
     """(attribute, title, value) of each that is known."""
-    for name, title, _, power in map_object.SHOWN:
+    for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:
             yield name, title, units.say(record[f"{name}_median"], power, unit)

@@ -7,6 +7,7 @@ import zlib
 
 import numpy as np
 
+SHORT = 0.05  # Share of the reach within which a patch has its mesh, mostly.
 FARTHEST_VERTEX = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
 
 
@@ -145,13 +146,12 @@ class PlacedMesh:
         return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
 
     def _deviation(self, point, normal, reach):
-        found = []
-        for sign in (-1.0, 1.0):
-            hit = self.ray_cast(point, [-sign * v for v in normal], reach)
-            if hit is not None:
-                found.append(sign * math.dist(point, hit[0]))
-        if found:
-            return min(found, key=abs)
+        ways = [(sign, [-sign * v for v in normal]) for sign in (-1.0, 1.0)]
+        for within in (SHORT * reach, reach):  # A long ray that meets nothing is dear.
+            hits = [(sign, self.ray_cast(point, way, within)) for sign, way in ways]
+            found = [sign * math.dist(point, hit[0]) for sign, hit in hits if hit is not None]
+            if found:
+                return min(found, key=abs)
         foot = self._to_world(self._nearest(self._to_local(point))[0])
         return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
 

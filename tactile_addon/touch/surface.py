@@ -9,7 +9,7 @@ import numpy as np
 
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 
-SOME = 8  # times as many vertices as are wanted, that are looked at before all of them are
+MANY = 8  # times as many vertices as are wanted, that are looked at before all of them are
 WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
 
 
@@ -50,7 +50,7 @@ class MeshSurface(PlacedMesh):
         """
         # A sphere of the world is an ellipsoid in the object: its longest axis bounds it.
         reach = radius * np.linalg.norm(self._inverse, ord=2)
-        at, few = self._to_local(point).astype(np.float32), len(self._co) // (SOME * (most or len(self._co)))
+        at, few = self._to_local(point).astype(np.float32), len(self._co) // (MANY * (most or len(self._co)))
         for stride in dict.fromkeys((max(few, 1), 1)):  # of all only where some of them are not enough
             local = self._co[::stride] - at
             near = stride * np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)

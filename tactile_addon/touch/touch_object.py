@@ -28,7 +28,7 @@ AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where n
 FINEST_STEP = 1.0 / 128.0  # Share of it: the step where neither is given.
 LEAST_STEPS = 12  # Least steps of a half contour, where no step is given.
 LARGE_FACET = 4.0  # Steps: the finger feels facets that are longer, and creases between them.
-MOST_ROUNDING = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
+STEP_ROUNDING = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ def nearest_point(name, surface, location, farthest):
 
 def require_fine(spacing, step):
     """Raises ValueError where coordinates are too coarse for the step."""
-    if spacing > MOST_ROUNDING * step:
+    if spacing > STEP_ROUNDING * step:
         raise ValueError(
             f"Neighboring coordinates at the point are {length(spacing)} apart in single precision, "
             "too coarse "

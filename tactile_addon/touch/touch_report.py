@@ -80,7 +80,7 @@ def measures(result):
 
 def reconstruction_report(result, ended=""):
     """The report of a fit; `ended` is added to its message. Nothing of a mesh is known yet."""
-    d1, d2, n = result.frame.axes.T.tolist()
+    (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
         **judgment(result, 0.0, ended),
         "ended": ended,
@@ -88,11 +88,11 @@ def reconstruction_report(result, ended=""):
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},
         "k1": result.patch.k1,
         "k2": result.patch.k2,
-        "gaussian_curvature": float(result.patch.gaussian_curvature(0.0, 0.0)),
-        "mean_curvature": float(result.patch.mean_curvature(0.0, 0.0)),
+        "gaussian_curvature": float(at_point.gaussian_curvature),
+        "mean_curvature": float(at_point.mean_curvature),
         **{f"{name}_std": getattr(result, f"{name}_std") for name in CURVATURES},
-        "shape_index": float(result.patch.shape_index(0.0, 0.0)),
-        "curvedness": float(result.patch.curvedness(0.0, 0.0)),
+        "shape_index": float(at_point.shape_index),
+        "curvedness": float(at_point.curvedness),
         "residual": 0.0 if result.residual is None else result.radius * result.residual.size,
         "coefficients": result.patch.coefficients.tolist(),
         "radius": result.radius,

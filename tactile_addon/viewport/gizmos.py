@@ -12,7 +12,7 @@ from ..touch.touch_object import plane_axes
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .overlay import PLANE_COLORS
 
-REACH = 1.15  # Place of the handles, in extents.
+HANDLE_REACH = 1.15  # Place of the handles, in extents.
 UPRIGHT = 0.75
 BALL, LEAST_BALL = 0.12, 0.05  # sizes of balls, in those of Blender's gizmos,
 SHARE = 0.125  # and that of one in the reach of a patch that is small in the view
@@ -73,7 +73,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
                 t, up, _ = plane_axes(matrix, settings, i).T
                 # Seen edge on, its plane turns by much where the mouse moves by little.
                 tilt.hide = tilt.hide or abs(ahead.dot(Vector(t))) < STEEP
-                turn.matrix_basis = Matrix.Translation(center + REACH * reach * t)
+                turn.matrix_basis = Matrix.Translation(center + HANDLE_REACH * reach * t)
                 tilt.matrix_basis = Matrix.Translation(center + UPRIGHT * reach * up)
         self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)
 

@@ -21,17 +21,17 @@ PLANE_COLORS = [
     (0.94, 0.89, 0.26), (0.80, 0.47, 0.65), (0.84, 0.37, 0.0),
 ]  # fmt: skip
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
-RIM = 96  # points around a patch
+RIM_CORNERS = 96  # points around a patch
 FONT = 0
-STEPS = 65  # of the legend's colors
+LEGEND_STEPS = 65  # of the legend's colors
 # In pixels at the resolution scale 1, width and height: the legend's bar, and Blender's navigation buttons.
-BAR, NAVIGATION = (150, 12), (50, 290)
+BAR, NAVIGATION_GIZMO = (150, 12), (50, 290)
 
 
 def preview_lines(touched):
     """(points, color) of what a pick shows: the rim of what was felt, the normal, and the section curves."""
     r = touched.result
-    edge = r.domain.boundary(RIM)
+    edge = r.domain.boundary(RIM_CORNERS)
     edge = r.frame.to_world(np.column_stack([edge, r.height(*edge.T)]))
     normal = np.array([r.frame.origin, r.frame.origin + 0.6 * r.radius * r.frame.axes[:, 2]])
     pairs = zip(r.contours, PLANE_COLORS, strict=False)
@@ -106,7 +106,7 @@ def draw_legend():
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
-        bar = _scale(context, title, record, record["spacing"], map_object.POWERS[shown], 0.0)
+        bar = _scale(context, title, record, record["spacing"], map_object.MAP_POWERS[shown], 0.0)
         if shown == "reason":
             bar = title, 0.0, []
         elif shown in map_object.LOGARITHMIC:
@@ -156,8 +156,8 @@ def _draw_box(context, title, low, labels, swatches=()):
 
 def _draw_bar(x, y, wide, high, gap, low, labels):
     """The colors from `low` to 1, and below them the (place, text) labels."""
-    at = np.linspace(x, x + wide, STEPS)
-    shades = colors.shades(np.repeat(np.linspace(low, 1.0, STEPS), 2), 1.0)
+    at = np.linspace(x, x + wide, LEGEND_STEPS)
+    shades = colors.shades(np.repeat(np.linspace(low, 1.0, LEGEND_STEPS), 2), 1.0)
     _fill([(a, b) for a in at for b in (y, y + high)], shades.tolist())
     labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
     first, middle, last = (blf.dimensions(FONT, text)[0] for _, text in labels)
@@ -204,8 +204,8 @@ def _free_strip(context, high):
             right = min(right, x)
         elif other.alignment == "BOTTOM":
             bottom = max(bottom, y + other.height)
-    if region.height - NAVIGATION[1] * scale < bottom + high:
-        right -= NAVIGATION[0] * scale
+    if region.height - NAVIGATION_GIZMO[1] * scale < bottom + high:
+        right -= NAVIGATION_GIZMO[0] * scale
     if hud and right - 1.3 * BAR[0] * scale < hud:
         bottom = max(bottom, hud_top)
     return left, right, bottom

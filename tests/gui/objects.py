@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: a probe and its patch as Blender's objects.
 
-What undo, playback, moving, deleting and clicking do to them, with a picture after each.
+What undo, playback, moving, deleting and clicking do to them, with a picture after each. TACTILE_SCAN is a
+mesh file to do it to in place of Suzanne, or "million", for a sheet of so many faces.
 """
 
 import math
+import os
 import sys
 from pathlib import Path
 
 import bpy
 import gui
+import numpy as np
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -29,11 +32,46 @@ from common import (
     until,
 )
 
-TARGET = "Suzanne"
+SCAN = os.environ.get("TACTILE_SCAN", "")
+TARGET = Path(SCAN).stem or "Suzanne"
+SIZE = 2.7  # of Suzanne
 
 
 def suzanne():
     return bpy.data.objects.get(TARGET)
+
+
+def unit():
+    """What a unit is on Suzanne, for a target of another size."""
+    return max(suzanne().dimensions) / SIZE if SCAN else 1.0
+
+
+def scan():
+    """Has another mesh in the place of Suzanne, and the 3D cursor on it."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    if SCAN == "million":
+        bpy.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=1000, size=SIZE)
+        co = np.empty((len(bpy.context.object.data.vertices), 3), dtype=np.float32)
+        bpy.context.object.data.vertices.foreach_get("co", co.ravel())
+        co[:, 2] = 0.3 * np.sin(2.0 * co[:, 0]) * np.cos(1.5 * co[:, 1])
+        bpy.context.object.data.vertices.foreach_set("co", co.ravel())
+    elif SCAN.endswith(".ply"):
+        bpy.ops.wm.ply_import(filepath=SCAN)
+    else:
+        bpy.ops.wm.stl_import(filepath=SCAN)
+    obj = bpy.context.object
+    obj.name = TARGET
+    bpy.context.view_layer.update()
+    middle = sum((Vector(corner) for corner in obj.bound_box), Vector()) / 8.0
+    ray = Vector((0.2, -0.3, 1.0)).normalized()
+    hit, place, _, _ = obj.ray_cast(middle + 2.0 * unit() * SIZE * ray, -ray)
+    check("there is a scan", hit)
+    bpy.context.scene.cursor.location = obj.matrix_world @ place
+    space = gui.find()[1].spaces.active
+    space.clip_start, space.clip_end = 1e-3 * unit(), 1e3 * unit()
+    bpy.ops.ed.undo_push(message="Scan")
+    yield 1
 
 
 def select(obj):
@@ -86,7 +124,7 @@ def drag_object(obj, keys, by=(90, 50)):
 
 def pick():
     place = bpy.context.scene.cursor.location.copy()
-    look(place, (0.3, -1, 0.3), 5)
+    look(place, (0.3, -1, 0.3 if not SCAN else 2), 5 * unit())
     bpy.ops.tactile.pick(target=TARGET, location=place)
     bpy.ops.ed.undo_push(message="Pick")
     yield from until(is_complete)
@@ -97,14 +135,16 @@ def move_target():
     digest, before = probe().tactile_probe.digest, probe().matrix_world.translation.copy()
     yield from drag_object(suzanne(), "g")
     moved = (probe().matrix_world.translation - before).length
-    check("G on the target takes probe and patch along", moved > 0.1 and gap() < 0.01, (moved, gap()))
+    check(
+        "G on the target takes probe and patch along", moved > 0.1 * unit() and gap() < 0.01, (moved, gap())
+    )
     check("... and touches nothing again", probe().tactile_probe.digest == digest and not is_outdated())
     picture("target_moved")
     press("ctrl+z")
     yield 1
     yield from until(is_complete)
     moved = (probe().matrix_world.translation - before).length
-    check("Ctrl Z brings all back", moved < 1e-5 and gap() < 0.01, (moved, gap()))
+    check("Ctrl Z brings all back", moved < 1e-5 * unit() and gap() < 0.01, (moved, gap()))
     select(suzanne())
     press("s", "shift+z", "1", "period", "5", "Return")
     yield 1
@@ -121,6 +161,7 @@ def move_target():
 
 def delete_target():
     place = [probe().matrix_world.copy(), patch().matrix_world.copy()]
+    reach = place[0].translation.length
     select(suzanne())
     press("x", "Return")
     yield from until(lambda: suzanne() is None)
@@ -128,15 +169,12 @@ def delete_target():
 
     def stays():
         now = [probe().matrix_world, patch().matrix_world]
-        return (
-            max(
-                abs(a - b)
-                for m, n in zip(place, now, strict=True)
-                for r, s in zip(m, n, strict=True)
-                for a, b in zip(r, s, strict=True)
-            )
-            < 1e-5
-        )
+        return max(
+            abs(a - b)
+            for m, n in zip(place, now, strict=True)
+            for r, s in zip(m, n, strict=True)
+            for a, b in zip(r, s, strict=True)
+        ) < 1e-5 * max(1.0, reach)
 
     check("X deletes the target", suzanne() is None, bpy.data.objects.keys())
     check("... and probe and patch stay where they are", stays() and probe().parent is None)
@@ -195,10 +233,12 @@ def move_and_delete_patch():
     place, count = patch().matrix_world.copy(), len(bpy.data.objects)
     yield from drag_object(patch(), "g")
     off = (patch().matrix_world.translation - place.translation).length
-    check("G on the patch leaves it where it was touched", off < 1e-5, off)
+    check(
+        "G on the patch leaves it where it was touched", off < 1e-5 * max(1.0, place.translation.length), off
+    )
     yield from drag_object(patch().children[0], "g")
     off = (patch().children[0].matrix_world.translation - place.translation).length
-    check("... and so it does the contours", off < 1e-5, off)
+    check("... and so it does the contours", off < 1e-5 * max(1.0, place.translation.length), off)
     select(patch())
     press("x", "Return")
     yield from until(lambda: len(bpy.data.objects) == count - 2, 10)
@@ -250,14 +290,16 @@ def handles():
     moved = probe().matrix_world.translation - before
     check("seen head on, a drag at the center tilts nothing", probe().tactile_probe.tilts[:] == tilts)
     off = math.dist(gui.view_point(probe().matrix_world.translation), (at[0] + 40, at[1] + 15))
-    check("... it slides the point to below the mouse", moved.length > 0.01 and off < 2.0, (moved, off))
+    check(
+        "... it slides the point to below the mouse", moved.length > 0.01 * unit() and off < 2.0, (moved, off)
+    )
     check("... over the surface", gap() < 0.01 and fresh() < 1e-3, (gap(), fresh()))
     picture("slid")
     press("ctrl+z")
     yield 1
     yield from until(is_complete)
     moved = probe().matrix_world.translation - before
-    check("... and one Ctrl Z takes it back", moved.length < 1e-5, moved)
+    check("... and one Ctrl Z takes it back", moved.length < 1e-5 * max(1.0, before.length), moved)
 
 
 def edges():
@@ -294,13 +336,16 @@ def edges():
 
 def steps():
     yield from open_tab()
+    if SCAN:
+        yield from scan()
     yield from pick()
     yield from move_target()
     yield from delete_target()
     yield from move_and_delete_patch()
     yield from handles()
     yield from play()
-    yield from edges()
+    if not SCAN:
+        yield from edges()
 
 
 gui.play(steps())

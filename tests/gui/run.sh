@@ -53,7 +53,7 @@ GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the viewport's checks" \
   $gui shot tests/gui/viewport.py "$out/viewport.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the conventions' checks" \
   $gui shot tests/gui/conventions.py "$out/conventions.png"
-GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the checks of probes as objects" \
+GUI_TIMEOUT=${GUI_TIMEOUT:-300} GUI_ARGS="$out/scene.blend" step "the checks of probes as objects" \
   $gui shot tests/gui/objects.py "$out/objects.png"
 GUI_TIMEOUT=$((200 + 4 * ${TACTILE_STEPS:-50})) GUI_ARGS="$out/scene.blend" step "the random steps" \
   $gui shot tests/gui/random_steps.py "$out/random_steps.png"

@@ -73,11 +73,15 @@ def test_a_target_that_is_no_mesh_and_a_scale_that_is_none_are_messages(empty, b
             lambda: setattr(settings, "target", ball),
             "is not a mesh",
         ),
-        (lambda: setattr(probe, "scale", (0, 1, 1)), lambda: setattr(probe, "scale", (1, 1, 1)), "scaled to"),
+        (
+            lambda: setattr(probe, "scale", (0, 1, 1)),
+            lambda: setattr(probe, "scale", (1, 1, 1)),
+            "a scale of 0",
+        ),
         (
             lambda: setattr(probe, "scale", (1, 1, 3e38)),
             lambda: setattr(probe, "scale", (1, 1, 1)),
-            "scaled to",
+            "a scale of 0",
         ),
     ):
         change()

@@ -158,3 +158,15 @@ def test_undo_of_a_deleted_target_gives_others_back_what_they_had_of_it(empty, e
     assert empty.data.objects["Child"].parent == ball
     assert empty.data.objects["Wrapped"].modifiers["Wrap"].target == ball
     assert settings_of(empty, probe).target == ball
+
+
+def test_undo_leaves_no_pointer_to_patches_that_are_still_growing(empty, extension, probe):
+    rest(empty)
+    rest(empty)
+    patches = extension.tactile_addon.whole_object.whole_mesh.GrowingPatches
+    growing = patches(empty.context.scene, "Sphere", (0.0, 0.0, 0.0))
+    assert "Sphere Touches" in empty.data.objects
+    empty.ops.ed.undo()
+    assert pointers(empty)
+    assert "Sphere Touches" not in empty.data.objects
+    growing.remove()

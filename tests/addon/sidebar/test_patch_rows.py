@@ -177,6 +177,18 @@ class Layout:
     prop_search = prop
 
 
+@pytest.mark.parametrize(
+    "width, line", [(250, ["K", "", "0.00312 ± 0.002 1/mm²"]), (300, ["K", "0.00312 ± 0.002 1/mm²"])]
+)
+def test_a_value_that_has_no_room_beside_its_label_stands_below_it(extension, width, line):
+    context = SimpleNamespace(
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)), region=SimpleNamespace(width=width)
+    )
+    layout, rows = Layout(), [("Shape Index", "0.57"), ("K", "0.00312 ± 0.002 1/mm²")]
+    extension.tactile_addon.sidebar.rows.draw_rows(context, layout, rows)
+    assert [text for text, _ in layout.drawn] == ["Shape Index", "0.57", *line]
+
+
 def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty, ball):
     probe, _ = ball
     assert empty.ops.tactile.verify() == {"FINISHED"}

@@ -31,6 +31,19 @@ def test_turning_coefficients_about_the_normal_turns_the_surface():
     assert turned == pytest.approx(monomials(x, y, posterior.TERMS) @ b, rel=1e-9)
 
 
+@pytest.mark.parametrize(("count", "freedom"), [(65, 60.0), (9, 5.0)])
+def test_intervals_count_in_that_waviness_and_noise_are_estimates(count, freedom):
+    flat = np.random.default_rng(0).uniform(-0.7, 0.7, (2, count))
+    contacts = np.array([*flat, 0.1 * flat[0] ** 2]).T[None]
+    expected, weights = linear_system.prior_mean(np.array([0.2]), np.zeros(1)), np.ones((1, count))
+    system = linear_system.linear_system(contacts, weights, expected, contacts[:, :0])
+    data = evidence.restricted(system.equations)
+    hyper = linear_system.hyperparameters(system, data, np.array([2e-3]))
+    found = linear_system.posterior(expected, system, data, hyper, weights).covariance[0]
+    alone = np.linalg.inv(linear_system._precision(system, hyper.variances, hyper.noise)[0])
+    assert found == pytest.approx(freedom / (freedom - 2.0) * alone, rel=1e-6)
+
+
 def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
     rng = np.random.default_rng(2)
     mean = np.concatenate([[0.0, 0.0, 0.2, 0.0, 0.3], rng.normal(size=22)])
@@ -355,12 +368,18 @@ def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
     for azimuths in ((0, 60, 120), (0, 35, 80), (10, 20, 60), (0, 45, 100), (5, 50, 140), (0, 70, 110)):
         r = touched(surface, surfaces.planes(azimuths), noise=0.03)
         points, weights = r.domain.nodes
-        lost = next_plane._lost(r, points / r.radius, next_plane.AZIMUTHS) @ weights
+        covariances = r.uncertainty.covariances_with(points / r.radius)
+        count, noise = len(r.contacts) / 3, r.uncertainty.noise**2
+
+        def lost_at_all(most, c=covariances, weights=weights, count=count, noise=noise):
+            return next_plane._lost(c, next_plane.AZIMUTHS, most, noise * most / count) @ weights
+
+        lost, few = lost_at_all(round(count)), lost_at_all(next_plane.FEW_CONTACTS)
         plane, _ = suggest_plane(r)
         chosen = np.argmin(np.abs(next_plane.AZIMUTHS - plane.azimuth))
         assert next_plane.AZIMUTHS[chosen] == pytest.approx(plane.azimuth)
         assert lost[chosen] > 0.97 * lost.max()
-        assert lost[chosen] >= (1.0 - 1e-12) * lost[(chosen + np.arange(-1, 2)) % len(lost)].max()
+        assert few[chosen] >= (1.0 - 1e-12) * few[(chosen + np.arange(-1, 2)) % len(few)].max()
 
 
 @pytest.mark.parametrize("planes", [THREE, surfaces.planes((0, 25, 70))], ids=["even", "uneven"])

@@ -303,9 +303,26 @@ def test_the_suggested_plane_keeps_what_it_promises():
 def test_the_suggested_plane_tells_as_much_as_any_of_all(seed):
     r = touched(seed, azimuths=(0, 50, 130))[1]
     points, weights = r.domain.nodes
-    told = _lost(r, points / r.radius, AZIMUTHS) @ weights
+    covariances = r.uncertainty.covariances_with(points / r.radius)
+    told = (
+        r.geometry.widening(*points.T) ** 2
+        * _lost(covariances, AZIMUTHS, 24, r.uncertainty.noise**2)
+        @ weights
+    )
     chosen = np.argmin(np.abs(AZIMUTHS - suggest_plane(r)[0].azimuth))
     assert told[chosen] >= 0.97 * told.max()
+
+
+def test_deviations_are_less_near_the_point_and_more_at_the_rim_and_a_contour_takes_off_as_much():
+    _, r = touched()
+    x, y = np.vstack([np.zeros(2), r.domain.boundary(12)]).T
+    process = r.radius * r.residual.height_std(x / r.radius, y / r.radius)
+    wanted = np.append(0.6, np.full(12, 1.2)) * process
+    assert r.height_std(x, y) == pytest.approx(wanted, rel=1e-4)
+    points, weights = r.domain.nodes
+    assert weights @ r.geometry.widening(*points.T) == pytest.approx(1.0, abs=0.01)
+    # What is taken off a variance is as much of it as of the process's.
+    assert 0.0 < suggest_plane(r)[1] < r.mean_height_std
 
 
 def test_it_goes_into_json_and_back():

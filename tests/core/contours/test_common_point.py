@@ -147,7 +147,7 @@ def test_of_many_contacts_as_many_are_looked_at_as_tell_something(monkeypatch):
     assert point == pytest.approx(np.zeros(3), abs=1e-6)
     assert misses == pytest.approx(np.zeros(3), abs=1e-6)
     assert max(r.shape[2] for r, _, _ in seen) == module.CONTACTS_AROUND
-    assert len(module._starts([bent(angle, 30_001) for angle in (0.0, 1.0, 2.0)])) <= module.STARTS
+    assert len(module._starts([bent(angle, 30_001) for angle in (0.0, 1.0, 2.0)])) <= module.MOST_STARTS
 
 
 def test_a_long_curve_among_many_short_ones():

@@ -362,9 +362,8 @@ def test_how_far_to_feel_is_found_where_curves_end_by_themselves():
 
 
 def test_a_surface_without_an_end_asks_how_far_to_feel():
-    with pytest.raises(
-        ValueError, match="The curves do not end by themselves: set farthest, the greatest length"
-    ):
+    said = "The curves do not end by themselves: set farthest, the greatest length"
+    with pytest.raises(ValueError, match=said):
         core.explore(surfaces.plane(), (0.0, 0.0, 0.0), UP)
 
 

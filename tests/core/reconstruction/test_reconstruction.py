@@ -321,7 +321,7 @@ def test_bad_arguments_of_many_are_named(change, message):
 def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():
     s = np.linspace(0.1, 1.0, 9)
     curves = [Contour(np.column_stack([s, bend * s * (1.0 - s), 0.0 * s])) for bend in (-0.1, 0.0, 0.1)]
-    with pytest.raises(DegenerateCurvesError, match="fewer than three places apart"):
+    with pytest.raises(DegenerateCurvesError, match="fewer than three separate places"):
         reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
 
 

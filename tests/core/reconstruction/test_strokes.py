@@ -188,7 +188,9 @@ def test_the_radius_limits_the_contacts_of_strokes_alone():
     assert np.linalg.norm(r.strokes - SURFACES["saddle"].point, axis=1).max() <= 6.0
     with pytest.raises(ValueError, match="radius: expected a finite number above 0"):
         alone("saddle", points, radius=0.0)
-    with pytest.raises(ValueError, match="radius: expected none beside contours, which say how far"):
+    with pytest.raises(
+        ValueError, match="radius: expected none with contours, which say how far the patch reaches"
+    ):
         SURFACES["pear"].fit(crossed("pear"), radius=5.0)
 
 
@@ -373,8 +375,8 @@ def test_from_inside_strokes_show_the_mirror_image(name):
 ACROSS = np.array([0.0, 1.0, 0.0])
 LINE = np.column_stack([np.linspace(-9, 9, 200), np.zeros(200), np.zeros(200)])
 TURNS = np.linspace(0.0, 6.0, 200)
-NEEDED = "contacts around the point, and 6 are needed: measure more, or take"
-OPEN = "the strokes run along a line, two lines or a ring, which leaves open what is beside"
+NEEDED = "contacts around the point, and 6 are needed: measure more, or use a larger"
+OPEN = "the strokes run along a line, two lines or a ring, which leaves the surface beside them open"
 
 
 @pytest.mark.parametrize(
@@ -392,7 +394,7 @@ OPEN = "the strokes run along a line, two lines or a ring, which leaves open wha
         ([9.0 * np.column_stack([np.cos(TURNS), np.sin(TURNS), 0.0 * TURNS])], OPEN),
         (
             [LINE + y * ACROSS for y in (1.0, 3.0, 5.0, 7.0, 9.0)],
-            "the point is beside the strokes or at their rim",
+            "the point is outside the strokes or at their rim",
         ),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 import surfaces
 
 import core
-from core.scan.mesh_error import BEYOND
+from core.scan.mesh_error import CONTRADICTING
 
 
 class Levels:
@@ -70,8 +70,8 @@ def test_it_is_the_mean_over_the_domain_of_what_the_fit_misses():
 
 def test_a_mesh_contradicts_a_fit_without_doubt_where_it_is_beyond_its_deviation(flat):
     std = flat.mean_height_std
-    assert core.judged_by_mesh(flat, BEYOND * std) == (flat.status, flat.message)
-    status, message = core.judged_by_mesh(flat, 1.01 * BEYOND * std)
+    assert core.judged_by_mesh(flat, CONTRADICTING * std) == (flat.status, flat.message)
+    status, message = core.judged_by_mesh(flat, 1.01 * CONTRADICTING * std)
     assert (flat.status, status) == ("ok", "uncertain")
     assert message.startswith("The mesh is ") and message.endswith(
         "use a shorter extent or add sampling planes."

@@ -1,0 +1,18 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Work in slices between a window's events, without a window."""
+
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+
+
+def test_a_slice_ends_when_its_time_is_over_and_the_next_one_goes_on(extension):
+    done = []
+    operator = extension.tactile_addon.probes.in_slices.InSlices()
+    operator._steps = (done.append(number) for number in range(3))
+    assert not operator._advance(None, -1.0)  # its time is over after the first step
+    assert done == [0]
+    assert not operator._advance(None, -1.0)
+    assert operator._advance(None, 60.0)
+    assert done == [0, 1, 2]
