@@ -35,7 +35,7 @@ def suggest_plane(
     points, weights = r.domain.nodes
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
     covariances = r.uncertainty.covariances_with(points / r.radius)
-    widening = r.geometry.widening(*points.T) ** 2
+    widening = r.geometry.node_widening**2
 
     def lost(azimuths: NDArray[np.intp], most: int) -> Array:
         """What a contour at each of these takes off the variances at the points, (k, n), in unit radius."""
