@@ -79,10 +79,12 @@ class Atlas:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
-        if self.uncovered:
+        count = len(self.uncovered)
+        if count:
+            places = "one place" if count == 1 else f"{count} places"
             return "uncertain", (
-                f"The patches end at {len(self.uncovered)} places where the object goes on: allow "
-                "more touches or a larger tolerance."
+                f"The patches end at {places} where the object goes on: allow more touches or a larger "
+                "tolerance."
             )
         rough = len(self._uncertain)
         if rough:
