@@ -61,7 +61,7 @@ def _follow(probe, target):
 
 
 def _remove_soon():
-    """Not now: a handler may not delete what is being evaluated."""
+    """Has `remove` called later: a handler may not delete what is being evaluated."""
     # Without a window no timer runs, and one that is left keeps Blender's module from ending.
     if not bpy.app.background and not bpy.app.timers.is_registered(remove):
         bpy.app.timers.register(remove)
