@@ -142,7 +142,7 @@ def test_the_same_object_twice_is_touched_once(command, tmp_path):
     write_ball(tmp_path / "one.ply")
     write_ball(tmp_path / "two.ply")
     code, output, error = command(tmp_path, "--touches", "4", "--output", tmp_path / "set")
-    assert code == 0 and output.startswith("1 objects, 4 touches")
+    assert code == 0 and output.startswith("1 object, 4 touches")
     assert "two.ply) is the same as one (" in error
 
 
