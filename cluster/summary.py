@@ -20,5 +20,5 @@ def summary(rows: list[dict[str, Any]], run: Any) -> str:
     for row in wrong[:MOST_NAMED]:
         lines.append(f"{row['object']} ({row['file']}): {row['error']:,} errors: {row['message']}")
     if len(wrong) > MOST_NAMED:
-        lines.append(f"and {len(wrong) - MOST_NAMED:,} objects more with errors, see {run.data_set.objects}")
+        lines.append(f"and {len(wrong) - MOST_NAMED:,} more objects with errors, see {run.data_set.objects}")
     return "\n".join([*lines, f"Data set: {run.data_set.folder}"])

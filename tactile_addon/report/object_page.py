@@ -43,7 +43,7 @@ def _deviations(mesh, record):
     unit, off = unit_of(record), values(mesh, "deviation").astype(float)
     areas = parts.vertex_areas(values(mesh, "position").astype(float), parts.corners(mesh))
     reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
-    words = "Shares of the area by its distance from the mesh. The outermost bars count all beyond."
+    words = "Shares of the area by its distance from the mesh. The outermost bars count all larger distances."
     return [
         page.section("Deviations", parts.spread(off, areas, unit, words)),
         page.section("Tolerance bands", parts.bands(off, areas, record["height_std"], unit, reaches)),
