@@ -119,6 +119,12 @@ class Domain:
         weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
 
+    @property
+    def node_places(self) -> Array:
+        """How far out the nodes are, as shares of the radius there, (n,)."""
+        piece, _, _, out, _ = _gauss(len(self.ends))
+        return np.repeat(out.ravel(), len(piece))
+
     def _radius(self, azimuth: Array) -> Array:
         """How far out the boundary is, by the chords of its samples: straight pieces are exact."""
         azimuths, radii = self._polar

@@ -102,6 +102,11 @@ def table(rows):
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 
 
+def many(count, one, several):
+    """So many of something, as in "1 touch"."""
+    return f"{count} {one if count == 1 else several}"
+
+
 def sentence(error):
     """The words of an exception, as a sentence begins, in one line: names may hold more."""
     words = " ".join(str(error).split())

@@ -95,18 +95,19 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
             yield
 
     def _done(self):
+        if self._touches.is_stopped:
+            self.stop = "Drop It"
         return self._touches.words, self._touches.share
 
     def _check(self, context):
         self._touches.surface.require_source(context)
 
     def _stopped(self, context):
-        """Esc joins what there is so far; once more, and nothing is kept."""
+        """Esc joins what there is so far; once more, or while it is joined, and nothing is kept."""
         if self._touches.is_stopped or not self._touches.found:
             self._leave(context)
             return {"CANCELLED"}
         self._touches.stop()
-        self.stop = "Drop It"
         return {"RUNNING_MODAL"}
 
     def _leave(self, context):

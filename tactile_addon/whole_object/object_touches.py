@@ -10,6 +10,7 @@ from ... import core
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
 from ..touch.units import length
+from ..touch.wording import many
 from .whole_surface import WholeSurface
 
 TOLERANCE_SHARE = 1.0 / 500.0  # of the object's size, where no tolerance is given
@@ -127,9 +128,11 @@ class ObjectTouches:
     def _note(self, state):
         self.found += [exploration.result for exploration in state.found]
         self.done, self.uncovered = state.done, state.uncovered
-        self.words = f"{state.done} touches, {state.uncovered} places to go on from"
+        touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
+        self.words = f"{touches}, {places} to go on from"
         if state.joining is not None:
-            self.words, self.share = f"Joining {len(self.found)} patches", 0.5 * state.joining
+            self.words = f"Joining {many(len(self.found), 'patch', 'patches')}"
+            self.is_stopped, self.share = True, 0.5 * state.joining
 
     def _shown(self):
         self.words = "Meshing"

@@ -72,7 +72,7 @@ def _fan():
 
 def insert(scene, name, whole, report):
     """Adds the surface of a WholeSurface, of what has that name, to the scene; returns the object."""
-    mesh = bpy.data.meshes.new(f"{name} Touched")
+    mesh = bpy.data.meshes.new(f"{name} {'Touched' if 'touches' in report else 'Joined'}")
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin), True
     patch_object.collection(scene).objects.link(obj)

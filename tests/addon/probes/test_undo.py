@@ -6,6 +6,8 @@ There an operator's step of undo is stored before any handler sees what it has d
 stores the step itself.
 """
 
+from types import SimpleNamespace
+
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
@@ -164,7 +166,7 @@ def test_undo_leaves_no_pointer_to_patches_that_are_still_growing(empty, extensi
     rest(empty)
     rest(empty)
     patches = extension.tactile_addon.whole_object.whole_mesh.GrowingPatches
-    growing = patches(empty.context.scene, "Sphere", (0.0, 0.0, 0.0))
+    growing = patches(empty.context.scene, SimpleNamespace(name="Sphere", origin=(0.0, 0.0, 0.0)))
     assert "Sphere Touches" in empty.data.objects
     empty.ops.ed.undo()
     assert pointers(empty)
