@@ -116,7 +116,9 @@ def test_a_changed_option_version_or_object_is_refused(command, tmp_path):
     before = rows_of(tmp_path / "set")
     code, _, error = command(*words, "--extent", "5%")
     assert code == 2
-    assert error.startswith("cluster: extent: this data set was begun with auto, and it is now 5%: use the same")
+    assert error.startswith(
+        "cluster: extent: this data set was begun with auto, and it is now 5%: use the same"
+    )
     manifest = tmp_path / "set" / "manifest.json"
     kept = manifest.read_text()
     manifest.write_text(kept.replace('"scipy": "', '"scipy": "0.'))
