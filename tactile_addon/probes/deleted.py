@@ -102,8 +102,9 @@ def _is_left(obj, there):
 
 
 def _is_data(datablock):
-    """Whether it is none of a window's, as the list of objects in it, which finds them again."""
-    return not isinstance(datablock, bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace)
+    """Whether it is an object or the like; scenes and windows see by themselves that one is gone."""
+    kinds = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
+    return not isinstance(datablock, kinds)
 
 
 def _unused_meshes():
