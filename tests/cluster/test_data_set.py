@@ -132,7 +132,7 @@ def test_a_changed_option_version_or_object_is_refused(command, tmp_path):
     code, _, error = command(*words)
     assert (
         code == 2
-        and "has changed since this data set was begun, or cannot be read any more: put the old" in error
+        and "has changed since this data set was begun, or can no longer be read: put the old" in error
     )
     assert rows_of(tmp_path / "set") == before
     assert json.loads(manifest.read_text()) == json.loads(kept)
@@ -142,7 +142,7 @@ def test_the_same_object_twice_is_touched_once(command, tmp_path):
     write_ball(tmp_path / "one.ply")
     write_ball(tmp_path / "two.ply")
     code, output, error = command(tmp_path, "--touches", "4", "--output", tmp_path / "set")
-    assert code == 0 and output.startswith("1 objects, 4 touches")
+    assert code == 0 and output.startswith("1 object, 4 touches")
     assert "two.ply) is the same as one (" in error
 
 
