@@ -103,7 +103,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         self._touches.surface.require_source(context)
 
     def _stopped(self, context):
-        """Esc joins what there is so far; once more, or while it is joined, and nothing is kept."""
+        """Esc joins what there is so far; once more, or when that is meshed, and nothing is kept."""
         if self._touches.is_stopped or not self._touches.found:
             self._leave(context)
             return {"CANCELLED"}
