@@ -191,6 +191,7 @@ def while_it_is_meshed():
 
 def afterwards():
     """What becomes of the surface: renamed, saved and opened, deleted, and its target too."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
     yield from start(target="Target", most=6)
     yield from until(lambda: not running(), 60)
     (surface,) = surfaces()
