@@ -70,6 +70,26 @@ def test_edges_join_neighbors_along_curves_on_the_surface(ball):
     assert np.degrees(np.mean(np.concatenate([edge.angle for edge in ball.edges]))) < 1.0
 
 
+def test_neighbors_agree_on_normals_and_bends_where_they_meet(ring):
+    assert np.degrees(np.mean(np.concatenate([edge.angle for edge in ring.edges]))) < 0.5
+    bends, charts = [], ring.charts
+    for edge in ring.edges:
+        for node in edge.nodes:
+            each = np.full(len(edge.curve), node)
+            x, y, _ = charts.local(edge.curve, np.arange(len(each)), each).T
+            bends.append(charts.curvatures(x, y, each)[0])
+    one, other = np.concatenate(bends[::2]), np.concatenate(bends[1::2])
+    assert np.abs(one - other).mean() < 0.2 * np.ptp(one)
+
+
+def test_patches_are_as_certain_as_asked(ball, ring):
+    for atlas in (ball, ring):
+        assert atlas.charts.mean_stds.max() <= atlas.tolerance
+        assert [
+            node["mean_height_std"] for node in atlas.to_dict()["nodes"]
+        ] == atlas.charts.mean_stds.tolist()
+
+
 def test_a_torus_has_one_handle(ring):
     mesh = ring.mesh(0.06)
     assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 0, 1)
