@@ -13,7 +13,7 @@ def summary(rows: list[dict[str, Any]], run: Any) -> str:
     """A few lines: how much there is, how fast it came, and what could not be touched."""
     totals = {name: sum(row[name] for row in rows) for name in COUNTS}
     words = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in totals.items())
-    lines = [f"{len(rows):,} objects, {sum(totals.values()):,} touches: {words}"]
+    lines = [f"{len(rows):,} object{'s'[: len(rows) != 1]}, {sum(totals.values()):,} touches: {words}"]
     if run.progress.done:
         lines.append(f"{run.progress.done:,} {run.progress.noun} now, {run.progress.rate:.3g} a second")
     wrong = [row for row in rows if row["error"]]

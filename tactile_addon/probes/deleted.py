@@ -61,7 +61,7 @@ def _follow(probe, target):
 
 
 def _remove_soon():
-    """Not now: a handler may not delete what is being evaluated."""
+    """Has `remove` called later: a handler may not delete what is being evaluated."""
     # Without a window no timer runs, and one that is left keeps Blender's module from ending.
     if not bpy.app.background and not bpy.app.timers.is_registered(remove):
         bpy.app.timers.register(remove)
@@ -102,8 +102,9 @@ def _is_left(obj, there):
 
 
 def _is_data(datablock):
-    """Whether it is none of a window's, as the list of objects in it, which finds them again."""
-    return not isinstance(datablock, bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace)
+    """Whether it is an object or the like; scenes and windows see by themselves that one is gone."""
+    kinds = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
+    return not isinstance(datablock, kinds)
 
 
 def _unused_meshes():

@@ -7,7 +7,7 @@ import numpy as np
 from ..scene.mesh_data import values
 from . import drawing, page
 
-MOST_DOTS = 6000  # in a picture
+MOST_DOTS = 4000  # in a picture
 DARKEST = 0.45  # of its color, that a dot has where the surface turns away
 # Words, the axes to the right and up, the axis of sight and its sign toward the viewer.
 VIEWS = (

@@ -145,7 +145,7 @@ def _verified_rows(found, unit):
 
 
 def registration_summary(found):
-    """Where a patch was put, in a sentence."""
+    """A sentence that says where a patch was put."""
     residual = found["residuals"][found["pose"] - 1]
     words = f'The contacts are {length(residual)} off "{found["target"]}" (root mean square)'
     if not found["is_ambiguous"]:

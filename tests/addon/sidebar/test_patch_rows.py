@@ -97,6 +97,14 @@ def test_a_number_that_is_left_to_the_surface_shows_what_it_has(empty, extension
     assert patch["tactile"]["extent"] == pytest.approx(0.2 * size)
 
 
+def test_a_length_that_is_dragged_in_a_dialog_is_the_operators_own(empty, extension):
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=2.0)
+    name = extension.tactile_addon.probes.number_fields.fields(4.0)["extent"]
+    inputs = {"location": (0.0, 0.0, 2.0), name: 0.37}
+    assert empty.ops.tactile.reconstruct(**inputs) == {"FINISHED"}
+    assert empty.context.object["tactile"]["extent"] == pytest.approx(0.37)
+
+
 def test_what_was_found_stands_beside_auto(said, empty, ball):
     _, report = ball
     scene = empty.context.scene
