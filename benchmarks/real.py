@@ -129,6 +129,8 @@ def constants(**values):
         for m in (geometry, residual, residual_evidence, rough_fit)
         if any(hasattr(m, name) for name in values)
     ]
+    if unknown := [name for name in values if not any(hasattr(m, name) for m in modules)]:
+        raise ValueError(f"no module of the fit has the constants {unknown}")
     before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
     try:
         for module, old in zip(modules, before, strict=True):
@@ -158,7 +160,7 @@ OURS, ALONE, PROCESS = "bayes", "without residual", "Matérn process on a quadri
 # Settings that came out best on the scans.
 METHODS = {
     OURS: ours,
-    ALONE: partial(ours, UNEXPLAINED=math.inf),
+    ALONE: partial(ours, UNEXPLAINED_MISFIT=math.inf),
     "RBF thin plate": partial(radial_basis, kernel="thin_plate_spline", smoothing=1e-3),
     "RBF cubic": partial(radial_basis, kernel="cubic", degree=2, smoothing=1e-3),
     PROCESS: quadric_process,

@@ -154,7 +154,8 @@ def _joined(run: _Run, more: bool) -> Steps:
     known: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
         uncovered = tuple(run.frontier.uncovered())
-        charts = yield from _charts(run, len(uncovered), known)
+        charts, goes_on = yield from _charts(run, len(uncovered), known)
+        more = goes_on and more
         rough = charts.less_certain_than(run.tolerance)
         missing = run.missing(charts, rough)
         chosen = [contact for contact in missing if contact is not None][: run.most - run.done]
@@ -171,18 +172,18 @@ def _joined(run: _Run, more: bool) -> Steps:
 
 def _charts(
     run: _Run, uncovered: int, known: dict[int, tuple[int, Table]]
-) -> Generator[Progress, bool | None, Charts]:
-    """Joined patches; yields how far that is."""
+) -> Generator[Progress, bool | None, tuple[Charts, bool]]:
+    """Joined patches, and whether nobody has sent False; yields how far that is."""
     assert run.frontier.charts is not None
-    yield Progress(run.done, uncovered, joining=0.0)
+    more = (yield Progress(run.done, uncovered, joining=0.0)) is not False
     contours, results = [e.contours for e in run.found], [e.result for e in run.found]
     steps = joined(contours, results, run.frontier.charts, run.wanted["noise"], known)
     while True:
         try:
-            yield Progress(run.done, uncovered, joining=next(steps))
+            progress = Progress(run.done, uncovered, joining=next(steps))
         except StopIteration as end:
-            charts: Charts = end.value
-            return charts
+            return end.value, more
+        more = (yield progress) is not False and more
 
 
 def explore_object(

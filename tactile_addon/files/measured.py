@@ -82,7 +82,7 @@ def whole_of(contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
         pass
     report = {"contacts": sum(len(contour.points) for contour in felt), **found.report()}
     if report["status"] == "ok":  # nobody has looked for places where the object goes on
-        report |= {"message": "The patches are as certain as was asked for, wherever there are contacts."}
+        report |= {"message": "The patches reach the tolerance wherever there are contacts."}
     return found, report | {"tolerance": tolerance, "noise": noise}
 
 

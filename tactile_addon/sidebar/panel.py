@@ -150,8 +150,10 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
-        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER").new = True
         record = obj[patch_record.ATLAS_RECORD]
+        if "touches" in record:  # measured contacts have no mesh to touch
+            row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")
+            row.new = True
         draw_sentence(context, layout, record["message"], ICONS.get(record["status"], "ERROR"))
         _draw_colors(context, layout, obj, "tactile_colors")
         draw_rows(context, layout.box(), object_rows(record))

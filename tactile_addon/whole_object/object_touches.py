@@ -129,13 +129,13 @@ class ObjectTouches:
         self.found += [exploration.result for exploration in state.found]
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
-        self.words = f"{touches}, {places} to go on from"
+        self.words, self.share = f"{touches}, {places} to go on from", None
         if state.joining is not None:
             self.words = f"Joining {many(len(self.found), 'patch', 'patches')}"
-            self.is_stopped, self.share = True, 0.5 * state.joining
+            self.share = 0.5 * state.joining
 
     def _shown(self):
-        self.words = "Meshing"
+        self.words, self.is_stopped = "Meshing", True
         for share in self.whole.steps(self.edge):
             self.share = 0.5 + 0.4 * share
             yield

@@ -173,24 +173,25 @@ def by_escape():
         check(f"{times} Esc: nothing else is left", data_blocks() == before, data_blocks())
 
 
-def while_it_joins():
+def while_it_is_meshed():
     """Esc has nothing left to keep then: it drops it."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
     before = data_blocks()
     yield from start(target="Target")
     for _ in range(1200):
         yield 0.05
-        if WORDS[-1].startswith("Joining"):
+        if WORDS[-1] == "Meshing":
             break
-    check("while it joins: it is under way", running(), WORDS[-1])
-    picture("whole_joining")
+    check("while it is meshed: it is under way", running(), WORDS[-1])
+    picture("whole_meshing")
     gui.xdo("mousemove", *ASIDE, "sleep", 0.1, "key", "Escape")
     yield from until(lambda: not running(), 20)
-    check("while it joins, Esc drops it", is_clean() and data_blocks() == before, data_blocks())
+    check("while it is meshed, Esc drops it", is_clean() and data_blocks() == before, data_blocks())
 
 
 def afterwards():
     """What becomes of the surface: renamed, saved and opened, deleted, and its target too."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
     yield from start(target="Target", most=6)
     yield from until(lambda: not running(), 60)
     (surface,) = surfaces()
@@ -241,7 +242,7 @@ def steps():
     yield from by_dialog()
     yield from by_click()
     yield from by_escape()
-    yield from while_it_joins()
+    yield from while_it_is_meshed()
     yield from disturbed("whole", start, is_clean, surfaces, tolerance=5e-4)
     yield from afterwards()
 

@@ -77,7 +77,7 @@ def test_contacts_of_three_files_become_one_closed_surface(empty, three_files):
     assert (record["source"], record["contacts"]) == ("part0.csv and 2 more", 3000)
     assert empty.context.view_layer.objects.active == surface
     assert record["is_closed"]
-    assert record["message"] == "The patches are as certain as was asked for, wherever there are contacts."
+    assert record["message"] == "The patches reach the tolerance wherever there are contacts."
     assert "deviation_mean" not in record
     place = np.array(surface.matrix_world)[:3, 3]
     off = np.linalg.norm(positions(surface.data) + place - CENTER, axis=1) - RADIUS

@@ -232,3 +232,19 @@ def test_edges_in_steps_are_the_edges(block):
     assert again.edges is again.edges
     assert [e.nodes for e in again.edges] == [e.nodes for e in block.edges]
     assert list(again.bounding()) == []
+
+
+@pytest.mark.parametrize("answer", [None, False])
+def test_false_while_patches_are_joined_ends_the_touching(answer):
+    """Without it, patches that are less certain than the tolerance are touched again."""
+    solid, joining = solids.ring(), []
+    steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=8e-3, noise=8e-3, rng=0)
+    state = next(steps)
+    try:
+        while True:
+            joining.append(state.joining is not None)
+            state = steps.send(answer if joining[-1] else None)
+    except StopIteration as end:
+        assert len(end.value.patches) > 30
+    since = joining[joining.index(True) :]
+    assert all(since) is (answer is False)
