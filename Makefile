@@ -60,8 +60,7 @@ test: $(ZIP)
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) --ignore tests/cluster
 
 test-core: $(READY)
-	$(VENV_PY) -m mypy core
-	$(VENV_PY) -m pytest $(BESIDE) tests/core tests/test_rooms.py
+	$(VENV_PY) -m pytest $(BESIDE) --hypothesis-profile=quick tests/core tests/test_rooms.py
 
 test-cluster: $(CLUSTER)
 	$(VENV_PY) -m pytest tests/cluster

@@ -4,10 +4,13 @@
 
 `python -m benchmarks.atlas [--only NAME] [--finest T] [--no-peers]`, from the root of a checkout; bpy to read
 the scans and to cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a noise of .0005.
-Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the object
-from the mesh, what share of these the field's 90 % interval holds, and what the mesh is; (b) peers on the
-contacts of tolerance .001, each at the best of its settings, with the surface's own normals at all contacts;
-(c) as many touches at random places. Draws build/charts/atlas.png.
+Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the
+object from the mesh, what share of these the field's 90 % interval holds, the angle of normals across edges
+and the share of their points where K is alike within 90 %, and what the mesh is; (b) peers on the contacts of
+tolerance .001, each at the best of its settings, with the same normals; and where normals are off by ten
+degrees; (c) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of
+touching alone. Draws build/charts/atlas.png. `--memory` touches the lemon 1000 times and prints how much
+memory that took at most.
 """
 
 import argparse
@@ -30,6 +33,7 @@ SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
 NOISE, COMPARED, POINTS, MOST = 0.0005, 0.001, 2500, 1500
 EDGE = 0.01
+BLURRED = np.radians(10.0)  # deviation of normals
 
 
 class Scanned:
@@ -59,6 +63,26 @@ class Exact:
             points += [hit[0]] if hit else []
         self.points = np.array(points)
         self.random = np.array([(p, self.solid.normal(*p)) for p in points[: POINTS // 2]])
+
+
+class Blurred:
+    """An object whose normals are felt badly."""
+
+    def __init__(self, thing):
+        self.thing, self.rng = thing, np.random.default_rng(0)
+        self.name, self.start, self.outward, self.points = (
+            thing.name,
+            thing.start,
+            thing.outward,
+            thing.points,
+        )
+
+    def ray_cast(self, origin, direction, distance):
+        hit = self.thing.ray_cast(origin, direction, distance)
+        if hit is None:
+            return None
+        normal = np.add(hit[1], self.rng.normal(0.0, BLURRED / np.sqrt(2.0), 3))
+        return hit[0], tuple(normal / np.linalg.norm(normal))
 
 
 def off_mesh(vertices, triangles, points):
@@ -91,6 +115,21 @@ def explored(thing, tolerance):
     return atlas, found, touched - start, process_time() - touched, mesh
 
 
+def agreeing(atlas):
+    """The mean angle of normals across edges in degrees, and the share of K that is alike within 90 %."""
+    angles, alike = [], []
+    for edge in atlas.edges:
+        angles += edge.angle.tolist()
+        bends, variance = [], 0.0
+        for node in edge.nodes:
+            each = np.full(len(edge.curve), node)
+            x, y, _ = atlas.charts.local(edge.curve, np.arange(len(each)), each).T
+            bends.append(atlas.charts.curvatures(x, y, each)[0])
+            variance += atlas.patches[node].gaussian_curvature_std ** 2
+        alike += (np.abs(bends[0] - bends[1]) <= 1.645 * np.sqrt(variance)).tolist()
+    return np.degrees(np.mean(angles or [0.0])), np.mean(alike or [1.0])
+
+
 def row(thing, tolerance):
     """A line of the first table, and what it is made of."""
     atlas, found, touching, meshing, mesh = explored(thing, tolerance)
@@ -100,10 +139,10 @@ def row(thing, tolerance):
     within = np.mean(np.abs(distance[felt]) <= 1.645 * std[felt])
     shape = solids.topology(mesh.triangles)
     contacts = sum(len(c.points) for e in found for c in e.contours)
-    angle = np.degrees(np.mean(np.concatenate([e.angle for e in atlas.edges] or [[0.0]])))
+    angle, alike = agreeing(atlas)
     cells = [thing.name, f"{1e3 * tolerance:g}", str(len(atlas.patches)), str(contacts)]
     cells += [f"{touching:.1f}", f"{meshing:.1f}", f"{100 * felt.mean():.1f}", three(off), f"{within:.2f}"]
-    cells += [f"{angle:.1f}", f"{shape.open} / {shape.euler} / {shape.pieces}"]
+    cells += [f"{angle:.1f}", f"{alike:.2f}", f"{shape.open} / {shape.euler} / {shape.pieces}"]
     return cells, (thing.name, tolerance, len(atlas.patches), touching + meshing, off.mean()), found
 
 
@@ -160,8 +199,8 @@ def implicit_process(points, normals, at, length, offset=0.01, most=700):
     return np.abs(np.concatenate([kernel(part, where) @ weights for part in np.array_split(at, 20)])) * 1e3
 
 
-def peers(thing, found):
-    """Lines of the second table."""
+def peers(thing, found, some=""):
+    """Lines of the second table, of peers with that in their names."""
     points = np.vstack([c.points for e in found for c in e.contours])
     normals = np.vstack([c.normals for e in found for c in e.contours])
     points, first = np.unique(points, axis=0, return_index=True)
@@ -182,6 +221,8 @@ def peers(thing, found):
     }
     for name, (run, settings) in tried.items():
         best = None
+        if some not in name:
+            continue
         for setting in settings:
             start = process_time()
             try:
@@ -195,22 +236,68 @@ def peers(thing, found):
             yield [thing.name, name, ", ".join(map(str, best[2])), three(best[0]), f"{best[1]:.1f}"]
 
 
-def at_random(thing, count, tolerance):
-    """A line of the third table: as many touches, at random places."""
-    points, outward = thing.random[:count, 0], thing.random[:count, 1]
+def spread(points, count):
+    """Indices of so many of points, each the farthest from those before."""
+    found, nearest = [0], np.linalg.norm(points - points[0], axis=1)
+    while len(found) < count:
+        found.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(points - points[found[-1]], axis=1))
+    return found
+
+
+def elsewhere(thing, which, where, tolerance):
+    """A line of the third table: touches at other places."""
+    points, outward = thing.random[which, 0], thing.random[which, 1]
     wanted = {"farthest": 0.3, "largest_std": 1.5 * tolerance, "noise": NOISE, "rng": 0}
+    start = process_time()
     found = [e for e in core.explore_many(thing, points, outward, **wanted) if not isinstance(e, ValueError)]
-    charts = charts_of([e.result for e in found], deviations=False)
-    steps = joined([e.contours for e in found], [e.result for e in found], charts, NOISE)
+    seconds = process_time() - start
+    results = [e.result for e in found]
+    charts = charts_of(results, deviations=False)
+    steps = joined([e.contours for e in found], results, charts, NOISE, {})
     try:
         while True:
             next(steps)
     except StopIteration as end:
-        atlas = Atlas(tuple(end.value[0]), end.value[1], tolerance)
+        atlas = Atlas(tuple(results), end.value, tolerance)
     mesh = atlas.mesh(EDGE)
     covered = np.isfinite(atlas.distance(thing.points)[1]).mean()
     off = off_mesh(mesh.vertices, mesh.triangles, thing.points)
-    return [thing.name, str(len(found)), f"{100 * covered:.1f}", three(off)]
+    return [thing.name, where, str(len(found)), f"{100 * covered:.1f}", three(off), f"{seconds:.1f}"]
+
+
+def compared(thing, found, cells, tolerance):
+    """Lines of the second table and of the third."""
+    others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]]
+    others += peers(thing, found)
+    badly = Blurred(thing)
+    cells, _, again = row(badly, tolerance)
+    others.append(
+        [thing.name, "this atlas, normals 10° off", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]
+    )
+    for line in peers(badly, again, "Poisson"):
+        others.append([line[0], f"{line[1]}, normals 10° off", *line[2:]])
+    count = min(len(found), len(thing.random))
+    even = spread(thing.random[:, 0], count)
+    return others, [
+        elsewhere(thing, slice(count), "random", tolerance),
+        elsewhere(thing, even, "evenly spaced", tolerance),
+    ]
+
+
+def print_memory():
+    """How much more than before 1000 touches of the lemon took at most."""
+    import resource
+
+    with blender.quiet():
+        thing = Scanned("lemon")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    atlas = core.explore_object(
+        thing, thing.start, thing.outward, tolerance=NOISE, noise=NOISE, most=1000, rng=0
+    )
+    atlas.mesh(EDGE)
+    took = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    print(f"{len(atlas.patches)} patches of at most 1000 touches, joined and meshed: {took:.0f} MB")
 
 
 def draw(numbers):
@@ -241,7 +328,11 @@ def main():
     parser.add_argument("--only", default="", help="objects with this in their names")
     parser.add_argument("--finest", type=float, default=min(TOLERANCES), help="tolerance (%(default)s)")
     parser.add_argument("--no-peers", action="store_true", help="nor random places")
+    parser.add_argument("--memory", action="store_true", help="of 1000 touches, and no more")
     options = parser.parse_args()
+    if options.memory:
+        print_memory()
+        return
     names = [name for name in (*SCANS, "ring", "egg") if options.only in name]
     rows, others, random, numbers = [], [], [], []
     for name in names:
@@ -252,14 +343,14 @@ def main():
             rows.append(cells)
             numbers.append(number)
             if tolerance == COMPARED and not options.no_peers:
-                others.append([name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]])
-                others += peers(thing, found)
-                random.append(at_random(thing, len(found), tolerance))
+                lines = compared(thing, found, cells, tolerance)
+                others += lines[0]
+                random += lines[1]
     head = "object|tolerance|touches|contacts|s touch, join|s mesh|% covered|mean / median / 95 %|within 90 %"
-    table([*head.split("|"), "angle at edges", "open edges / Euler / pieces"], rows)
+    table([*head.split("|"), "angle at edges", "K alike", "open edges / Euler / pieces"], rows)
     if others:
         table(["object", "method", "setting", "mean / median / 95 %", "s"], others, left=3)
-        table(["object", "touches at random", "% covered", "mean / median / 95 %"], random)
+        table(["object", "places", "touches", "% covered", "mean / median / 95 %", "s touch"], random, left=2)
     draw(numbers)
     print(f"Lengths in permille of the size; CPU seconds, {machine('bpy', 'numpy', 'scipy')}.")
 

@@ -109,7 +109,7 @@ class Run:
         return f"{_title(facts)} block {block}"
 
     def _log(self, text: str, aloud: bool = True) -> None:
-        """Into the folder's log, and to the terminal."""
+        """Writes into the folder's log, and to the terminal."""
         now = datetime.now().astimezone().isoformat(timespec="seconds")
         with self.data_set.log.open("a", encoding="utf-8") as file:
             file.write(f"{now} {text}\n")

@@ -13,12 +13,12 @@ def summary(rows: list[dict[str, Any]], run: Any) -> str:
     """A few lines: how much there is, how fast it came, and what could not be touched."""
     totals = {name: sum(row[name] for row in rows) for name in COUNTS}
     words = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in totals.items())
-    lines = [f"{len(rows):,} objects, {sum(totals.values()):,} touches: {words}"]
+    lines = [f"{len(rows):,} object{'s'[: len(rows) != 1]}, {sum(totals.values()):,} touches: {words}"]
     if run.progress.done:
         lines.append(f"{run.progress.done:,} {run.progress.noun} now, {run.progress.rate:.3g} a second")
     wrong = [row for row in rows if row["error"]]
     for row in wrong[:MOST_NAMED]:
         lines.append(f"{row['object']} ({row['file']}): {row['error']:,} errors: {row['message']}")
     if len(wrong) > MOST_NAMED:
-        lines.append(f"and {len(wrong) - MOST_NAMED:,} objects more with errors, see {run.data_set.objects}")
+        lines.append(f"and {len(wrong) - MOST_NAMED:,} more objects with errors, see {run.data_set.objects}")
     return "\n".join([*lines, f"Data set: {run.data_set.folder}"])

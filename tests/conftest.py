@@ -14,6 +14,7 @@ DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 
 # The short one asks the same every time, so that a test does not fail for what somebody else has changed.
 COMMON = {"deadline": None, "suppress_health_check": list(HealthCheck)}
+settings.register_profile("quick", max_examples=15, derandomize=True, database=None, **COMMON)
 settings.register_profile("short", max_examples=60, derandomize=True, database=None, **COMMON)
 settings.register_profile("long", max_examples=2500, print_blob=True, **COMMON)
 settings.load_profile("short")

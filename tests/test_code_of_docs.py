@@ -82,6 +82,8 @@ def folder(empty, scans, tmp_path, monkeypatch):
     for name, points in zip("abc", measured, strict=True):
         write(tmp_path / f"{name}.csv", [(name, points)])
     write(tmp_path / "strokes.csv", [("stroke", rows())])
+    for name, half in zip(("left", "right"), np.array_split(rows(), 2), strict=True):
+        write(tmp_path / f"{name}.csv", [("stroke", half)])
     place = suzanne(empty)
     empty.ops.tactile.pick(target="Suzanne", location=place)
     save(empty, tmp_path / "probes.blend")

@@ -35,7 +35,7 @@ def surface(target: Touchable, options: WholeOptions) -> tuple[dict[str, Any], f
     for _ in touches.steps():
         pass
     common = {"object": facts["name"], "hash": facts["hash"], "seed": options.seed}
-    return common | _found(touches) | _mesh(touches, target) | _graph(touches.atlas, target), (
+    return common | _found(touches) | _mesh(touches.whole, target) | _graph(touches.whole.atlas, target), (
         process_time() - start
     )
 
@@ -43,17 +43,16 @@ def surface(target: Touchable, options: WholeOptions) -> tuple[dict[str, Any], f
 def _found(touches: Any) -> dict[str, Any]:
     report = touches.report()
     names = ("noise", "touches", "in_doubt", *(name for name, *_ in FOUND))
-    verdict = {"status": touches.atlas.status, "message": touches.atlas.message}
-    return verdict | {name: report[name] for name in names}
+    return {name: report[name] for name in ("status", "message", *names)}
 
 
-def _mesh(touches: Any, target: Touchable) -> dict[str, Any]:
-    mesh = touches.mesh
+def _mesh(whole: Any, target: Touchable) -> dict[str, Any]:
+    mesh = whole.mesh
     return {
         "vertices": (mesh.vertices + target.offset).ravel(),
         "triangles": mesh.triangles.ravel(),
         "vertex_stds": mesh.std,
-        "vertex_deviations": touches.deviation,
+        "vertex_deviations": whole.deviation,
         "vertex_nodes": mesh.patch,
     }
 

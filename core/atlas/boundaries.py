@@ -39,14 +39,15 @@ class _Crossing(NamedTuple):
     angle: Array
 
 
-def node_dict(r: Reconstruction) -> dict[str, Any]:
-    """A patch as a node: what tells where it is and how it bends, as plain values."""
+def node_dict(r: Reconstruction, std: float) -> dict[str, Any]:
+    """A patch as a node of this mean deviation: where it is and how it bends, as plain values."""
     return {
         "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
         "radius": r.radius,
         "polynomial": polynomial_dict(r.patch),
         "domain": r.domain.ends.tolist(),
-        **{name: getattr(r, name) for name in ("mean_height_std", "status", "message")},
+        "mean_height_std": std,
+        **{name: getattr(r, name) for name in ("status", "message")},
     }
 
 

@@ -7,9 +7,9 @@ cubic B-spline, which is C2 and off the patch by less than the residual's own gr
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector
+from ..patch.differential_geometry import Derivatives
+from ..patch.smoothing_spline import SIDE, weights_at
 
-SIDE = 33  # knots of a table along each axis
 MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
 AZIMUTHS = 96  # samples of a domain's radius
 REACH = 0.5  # of the radius, that a place may be off its patch
@@ -135,21 +136,69 @@ class Charts:
 
     def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
         """Heights, slopes and deviations (m,) at local (x, y)."""
+        h, hx, hy = self._derivatives(x, y, node, ((0, 0), (1, 0), (0, 1)))
         pitch = 2.0 * self.halves[node] / (SIDE - 1)
-        column, by_x, by_dx = _b_spline(x / pitch + 0.5 * (SIDE - 1))
-        row, by_y, by_dy = _b_spline(y / pitch + 0.5 * (SIDE - 1))
-        h, hx, hy = np.zeros((3, len(x)))
-        flat = self.heights.reshape(-1)
+        nearest = np.clip(np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp), 0, SIDE - 1)
+        return h, hx, hy, self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]]
+
+    def _derivatives(
+        self, x: Array, y: Array, node: NDArray[np.intp], orders: Sequence[tuple[int, int]]
+    ) -> list[Array]:
+        """Derivatives (m,) of the heights at local (x, y), of each of the orders in x and y."""
+        pitch = 2.0 * self.halves[node] / (SIDE - 1)
+        (column, *by_x), (row, *by_y) = weights_at(x / pitch), weights_at(y / pitch)
+        found, flat = [np.zeros(len(x)) for _ in orders], self.heights.reshape(-1)
         start = (node * SIDE + column - 1) * SIDE + row - 1
         for i in range(4):
             taps = flat[start[:, None] + (i * SIDE + np.arange(4))]
-            across = np.einsum("mk,mk->m", taps, by_y)
-            h += by_x[:, i] * across
-            hx += by_dx[:, i] * across
-            hy += by_x[:, i] * np.einsum("mk,mk->m", taps, by_dy)
-        nearest = np.clip(np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp), 0, SIDE - 1)
-        std = self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]]
-        return h, hx / pitch, hy / pitch, std
+            across = [np.einsum("mk,mk->m", taps, by_y[k]) for k in range(max(j for _, j in orders) + 1)]
+            for total, (along, beside) in zip(found, orders, strict=True):
+                total += by_x[along][:, i] * across[beside]
+        return [
+            total / pitch ** (along + beside) for total, (along, beside) in zip(found, orders, strict=True)
+        ]
+
+    def curvatures(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Gaussian and mean curvature (m,) of patches above local (x, y), in 1/length^2 and 1/length."""
+        orders = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)
+        d = Derivatives(np.zeros_like(x), *self._derivatives(x, y, node, orders))
+        return d.gaussian_curvature / self.radii[node] ** 2, d.mean_curvature / self.radii[node]
+
+    @cached_property
+    def mean_stds(self) -> Array:
+        """The mean deviation of the heights over each domain, (n,), a length."""
+        inside = self._inside()
+        sums: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
+        return self.radii * sums
+
+    def less_certain_than(self, std: float) -> list[int]:
+        """Patches whose mean deviation is above it, the worst first."""
+        order = np.argsort(-self.mean_stds, kind="stable")
+        found: list[int] = order[self.mean_stds[order] > std].tolist()
+        return found
+
+    def _inside(self) -> NDArray[np.bool_]:
+        """Which knots are inside the domains, (n, SIDE, SIDE)."""
+        count = len(self.radii)
+        x, y = self.knots().reshape(2, -1)
+        shares = self.shares(x, y, np.repeat(np.arange(count), SIDE**2))
+        return (shares <= 1.0).reshape(count, SIDE, SIDE)
+
+    def knots(self) -> Array:
+        """Local x and y of all knots, (2, n, SIDE, SIDE)."""
+        along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
+        return np.array(np.broadcast_arrays(along[:, :, None], along[:, None]))
+
+    def least_certain(self, node: int) -> tuple[Array, Array]:
+        """The point and the normal, (3,) each, where a patch is least certain inside its domain."""
+        at = np.argmax(np.where(self._inside()[node], self.stds[node], -1.0))
+        x, y = self.knots()[:, node].reshape(2, -1)[:, [at]]
+        points, normals = self.world(np.array([node]), x, y)
+        return points[0], normals[0]
+
+    def chosen(self, which: NDArray[Any]) -> "Charts":
+        """Some of the patches."""
+        return Charts(*(getattr(self, f.name)[which] for f in fields(Charts)))
 
     def joined(self, others: "Charts") -> "Charts":
         """These patches and others."""
@@ -183,24 +232,6 @@ def _catmull_rom(t: Array) -> Array:
         )
         / 2.0
     )
-
-
-def _b_spline(at: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """The knot before each place (m,), weights of the four knots around it (m, 4), and their slopes."""
-    at = np.clip(at, 1.0, SIDE - 2.0 - 1e-9)
-    knot = at.astype(np.intp)
-    powers = np.vander(at - knot, 4, increasing=True)
-    values, slopes = _b_spline_tables()
-    return knot, powers @ values, powers[:, :3] @ slopes
-
-
-@cache
-def _b_spline_tables() -> tuple[Array, Array]:
-    values = (
-        np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]])
-        / 6.0
-    )
-    return values, values[1:] * np.array([[1.0], [2.0], [3.0]])
 
 
 def disk_around(normal: Vector, ahead: Vector) -> Array:

@@ -21,6 +21,7 @@ AGREE, DIFFER = 0.64, 0.34  # cosines of 50 and 70 degrees: between them a patch
 LAYER = 0.15  # of the radius, that patches of one wall may differ in height at most
 SLANT = 0.5  # and of the distance from it
 WALLS = 3  # that meet at a place
+WELL_INSIDE = 0.8  # of a domain's radius
 
 
 class Blend(NamedTuple):
@@ -45,23 +46,23 @@ def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
         sure = (pairs.share <= 1.0) & (np.abs(pairs.distance) < room)
         known = np.bincount(pairs.place[sure], minlength=len(points)) > 0
         pairs = pairs.chosen((pairs.share < MARGIN) | ~known[pairs.place])
-    return blend_of(charts, pairs, len(points))
+    return blend_of(charts, pairs, points)
 
 
-def blend_of(charts: Charts, pairs: Pairs, count: int) -> Blend:
-    """The field at `count` places of what patches say there."""
+def blend_of(charts: Charts, pairs: Pairs, points: Array) -> Blend:
+    """The field at places (k, 3) of what patches say there."""
     weights = node_weights(charts, pairs)
-    first, taken = _wall(charts, pairs, weights, count, np.ones(len(weights), dtype=bool))
+    first, taken = _wall(charts, pairs, weights, points, np.ones(len(weights), dtype=bool))
     found, left = first, ~taken
     for _ in range(WALLS - 1):
         if not left.any():
             break
-        other, taken = _wall(charts, pairs, weights, count, left)
+        other, taken = _wall(charts, pairs, weights, points, left)
         found, left = _combined(found, first, other), left & ~taken
     return found[0]
 
 
-_Wall = tuple[Blend, Array]  # with the places of the patches' origins
+_Wall = tuple[Blend, Array]  # with a point of it (k, 3), the nearest that its patch has well inside
 
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
@@ -73,13 +74,13 @@ def node_weights(charts: Charts, pairs: Pairs) -> Array:
 
 
 def _wall(
-    charts: Charts, pairs: Pairs, weights: Array, count: int, active: NDArray[np.bool_]
+    charts: Charts, pairs: Pairs, weights: Array, points: Array, active: NDArray[np.bool_]
 ) -> tuple[_Wall, NDArray[np.bool_]]:
     """The blend of the active pairs that face the way of the nearest at each place, and which they are."""
     which = np.flatnonzero(active)
     place, node, out, distance, normal, std = pairs.chosen(which)
     radius = charts.radii[node]
-    nearest = _first(place, np.abs(distance) + 0.5 * LAYER * radius * out**2, count)
+    nearest = _first(place, np.abs(distance) + 0.5 * LAYER * radius * out**2, len(points))
     r = nearest[place]
     cosine = np.einsum("mi,mi->m", normal, normal[r])
     agree = np.clip((cosine - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
@@ -87,11 +88,18 @@ def _wall(
     room = LAYER * np.maximum(radius, radius[r]) + SLANT * np.abs(distance[r])
     agree *= np.clip(1.0 - ((distance - distance[r]) / room) ** 2, 0.0, 1.0) ** 2
     w = weights[which] * agree
-    blend = _mean(place, node, distance, normal, std, w, count)
-    origins = charts.origins[node[nearest]] if len(node) else np.zeros((count, 3))
+    blend = _mean(place, node, distance, normal, std, w, len(points))
+    feet = points.copy()
+    if len(node):
+        origins, pull = (
+            charts.origins[node[nearest]],
+            np.minimum(1.0, WELL_INSIDE / np.maximum(out[nearest], 1e-9)),
+        )
+        feet -= distance[nearest, None] * normal[nearest]
+        feet += (1.0 - pull)[:, None] * (origins - feet)
     taken = active.copy()
     taken[which] = agree > 0.0
-    return (blend, origins), taken
+    return (blend, feet), taken
 
 
 def _first(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
@@ -135,7 +143,7 @@ def _mean(
 
 def _combined(found: _Wall, first: _Wall, other: _Wall) -> _Wall:
     """What is inside both walls where they face away from each other, inside either elsewhere."""
-    (a, origins), (b, others) = found, other
+    (a, feet), (b, others) = found, other
     across = others - first[1]
     away = np.einsum("ki,ki->k", first[0].normal - b.normal, across) < 0.0
     takes = (b.node >= 0) & np.where(away, b.distance > a.distance, b.distance < a.distance)
@@ -146,4 +154,4 @@ def _combined(found: _Wall, first: _Wall, other: _Wall) -> _Wall:
         np.where(wide, b.normal, a.normal),
         np.where(takes, b.node, a.node),
     )
-    return blend, np.where(wide, others, origins)
+    return blend, np.where(wide, others, feet)

@@ -183,12 +183,7 @@ class Frontier:
     def is_covered(self, points: Array, normals: Array) -> NDArray[np.bool_]:
         """Which of (k, 3) do."""
         assert self.charts is not None
-        pairs = self.charts.pairs(points)
-        on = pairs.share < INSIDE
-        on &= np.abs(pairs.distance) < LAYER * self.charts.radii[pairs.node]
-        on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
-        found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
-        return found
+        return covered(self.charts, points, normals)
 
     def around(self, contact: Contact, place: Place, radius: float) -> tuple[float, Contact]:
         """The area of a disk around a contact that is not covered, and the contact in the middle of that.
@@ -211,6 +206,16 @@ class Frontier:
         off = points[new] - points[new].mean(axis=0)
         middle = hits[new[np.argmin((off**2).sum(axis=1))]]
         return len(new) / (DISK + 1) * math.pi * radius**2, middle
+
+
+def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
+    """Which of the places (k, 3) lie inside a patch that faces their way."""
+    pairs = charts.pairs(points)
+    on = pairs.share < INSIDE
+    on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
+    on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
+    found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
+    return found
 
 
 def side_of(surface: Surface, point: Array, outward: Array, reach: float) -> float:

@@ -1,99 +1,128 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches of one object, fitted again with what their neighbors felt inside them, and made tables.
+"""Patches of one object as tables, and joined: each a spline through all contacts on it, of all patches.
 
-A patch alone knows its own few curves. Blended, such patches are farther off than a surface through all
-contacts; with those of the neighbors they are nearer.
+A patch alone knows its own few curves, and the blend of such patches is farther off than a surface through
+all contacts. Where patches overlap they are made to agree.
 """
 
 from collections.abc import Generator, Sequence
-from itertools import pairwise
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Contour
-from ..reconstruction.from_contours import reconstruct_many
+from ..patch.smoothing_spline import SIDE, between, smoothing_spline
 from ..reconstruction.result import Reconstruction
-from .charts import AZIMUTHS, MARGIN, SIDE, Charts
+from .charts import AZIMUTHS, MARGIN, Charts, Pairs
+from .field import blended
 
-LAYER = 0.15  # of the radius, that a neighbor's contact is off the patch at most
-FACING = 0.34  # cosine of the angle between its normal and the patch's, at least
-SURE, DEVIATIONS = 0.8, 1.2816  # quantile of |dz|, and how many standard deviations that is
-BETWEEN = 2.0  # times that between the contacts, for at them the fit has taken some of it; benchmarks.atlas
-AT_ONCE, LOOK = 6, 1500  # patches, and contacts of all, in a step
+FACING = 0.5  # cosine of the angle between a contact's normal and the patch's there, at least
+LIKELY = 2.0  # deviations of a patch, as many as a contact is off it at most that weighs 1
+BEYOND = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain
+FARTHEST = 3.0  # times that, a contact is of another wall
+NOISE = 5e-4  # of the radius, at least
+AT_ONCE, LOOK = 4, 1500  # patches, and contacts or other places of all, in a step
+NEAR = 1.3  # of a domain's radius, as far as heights are asked at knots
+OPPOSED = 0.34  # cosine of the angle of the surface to a patch, below which they are not made to agree
+MOVED = 0.03  # of the radius, that a patch is at most
 
 Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
-Joining = Generator[float, None, tuple[list[Reconstruction], Charts]]
+Joining = Generator[float, None, Charts]
 
 
 def joined(
-    contours: Sequence[list[Contour]], results: Sequence[Reconstruction], charts: Charts, noise: float
+    contours: Sequence[list[Contour]],
+    results: Sequence[Reconstruction],
+    charts: Charts,
+    noise: float,
+    known: dict[int, tuple[int, Table]],
 ) -> Joining:
-    """The patches fitted again, and their charts; yields the share that is done."""
-    strokes = yield from neighbors_contacts(contours, charts)
-    found: list[Reconstruction] = []
-    tables: list[Table] = []
-    for start in range(0, len(results), AT_ONCE):
-        some = slice(start, start + AT_ONCE)
-        fits = reconstruct_many(
-            [r.frame.origin for r in results[some]],  # type: ignore[arg-type]
-            contours[some],
-            outward=[r.frame.axes[:, 2] for r in results[some]],  # type: ignore[arg-type]
-            strokes_list=[[points] if len(points) else [] for points in strokes[some]],
-            noise=noise,
-        )
-        for old, new in zip(results[some], fits, strict=True):
-            found.append(new if isinstance(new, Reconstruction) else old)
-            tables.append(table_of(found[-1], unexplained(found[-1], strokes[len(tables)], noise)))
-        yield len(found) / len(results)
-    return found, stacked(found, tables)
+    """The charts of patches with all contacts, of which `charts` have but their own; yields the share done.
 
-
-def unexplained(r: Reconstruction, strokes: Array, noise: float) -> float:
-    """How far contacts are off a patch beyond their noise: texture that a fit takes for noise.
-
-    Off all contacts, not their means; by the quantile of SURE, which outlying ones do not change.
+    known : tables of patches that were joined before, and of how many contacts; is changed
     """
-    x, y, z = np.vstack([r.contacts, r.frame.to_local(strokes)]).T
-    off = float(np.quantile(np.abs(r.height(x, y) - z), SURE)) / DEVIATIONS
-    return BETWEEN * float(np.sqrt(max(off**2 - noise**2, 0.0)))
-
-
-def neighbors_contacts(
-    contours: Sequence[list[Contour]], charts: Charts
-) -> Generator[float, None, list[Array]]:
-    """For each patch the contacts (m, 3) that others have inside its domain, on its wall; yields 0."""
     points, normals, owner = _contacts(contours)
-    nodes, places = [], []
+    parts = []
     for start in range(0, len(points), LOOK):
-        pairs = charts.pairs(points[start : start + LOOK])
-        place = start + pairs.place
-        on = (pairs.share <= 1.0) & (pairs.node != owner[place])
-        on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
-        on &= np.einsum("mi,mi->m", pairs.normal, normals[place]) > FACING
-        nodes.append(pairs.node[on])
-        places.append(place[on])
+        part = charts.pairs(points[start : start + LOOK])
+        parts.append(part._replace(place=start + part.place))
         yield 0.0
-    node, place = np.concatenate(nodes), np.concatenate(places)
-    order = np.argsort(node, kind="stable")
-    bounds = np.searchsorted(node[order], np.arange(len(charts.radii) + 1))
-    return [points[place[order[a:b]]] for a, b in pairwise(bounds)]
+    pairs = Pairs(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    each = np.argsort(pairs.node, kind="stable")
+    bounds = np.searchsorted(pairs.node[each], np.arange(len(results) + 1))
+    tables: list[Table] = []
+    for i, r in enumerate(results):
+        some = pairs.chosen(each[bounds[i] : bounds[i + 1]])
+        if i not in known or known[i][0] != len(some.place):
+            table = _joined_table(r, some, points, normals, owner == i, noise)
+            known[i] = len(some.place), table
+        tables.append(known[i][1])
+        if len(tables) % AT_ONCE == 0:
+            yield len(tables) / len(results)
+    return (yield from _agreed(stacked(results, tables)))
+
+
+def _joined_table(
+    r: Reconstruction, some: Pairs, points: Array, normals: Array, own: NDArray[np.bool_], noise: float
+) -> Table:
+    """The table of a patch with those contacts of `some` that are likely to be on it."""
+    rim, half = _square(r)
+    least = max(noise / r.radius, NOISE)
+    likely = np.hypot(least, LIKELY * r.mean_height_std / r.radius)
+    likely = likely * (1.0 + BEYOND * np.maximum(some.share - 1.0, 0.0))
+    off = np.abs(some.distance) / (r.radius * likely)
+    facing = np.einsum("mi,mi->m", some.normal, normals[some.place]) > FACING
+    on = own[some.place] | ((off < FARTHEST) & facing)
+    place = some.place[on]
+    local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
+    weights = 1.0 / np.maximum(off[on], 1.0) ** 2
+    found = smoothing_spline(local, normals[place] @ r.frame.axes, weights, half, least)
+    return rim, half, *found
+
+
+def _agreed(charts: Charts) -> Joining:
+    """Patches moved onto the surface that all of them make; yields 1."""
+    from scipy.ndimage import spline_filter
+
+    x, y = charts.knots().reshape(2, -1)
+    node = np.repeat(np.arange(len(charts.radii)), SIDE**2)
+    asked = np.flatnonzero(charts.shares(x, y, node) < NEAR)
+    moves = np.zeros(charts.heights.size)
+    for start in range(0, len(asked), LOOK):
+        some = asked[start : start + LOOK]
+        moves[some] = _move(charts, node[some], x[some], y[some])
+        yield 1.0
+    each = moves.reshape(charts.heights.shape)
+    change = np.array([spline_filter(move, order=3, mode="mirror") for move in each])
+    return replace(charts, heights=charts.heights + change)
+
+
+def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
+    """How far patches are from the surface of all above local (x, y), along their axes and in unit radius."""
+    points, _ = charts.world(node, x, y)
+    field = blended(charts, points)
+    up = np.einsum("ki,ki->k", field.normal, charts.axes[node, :, 2])
+    move = -field.distance / np.maximum(up, OPPOSED) / charts.radii[node]
+    on = (field.node >= 0) & (up > OPPOSED) & (np.abs(move) < MOVED)
+    return np.where(on, move, 0.0)
 
 
 def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[np.intp]]:
-    """All contacts, their normals, (n, 3), and whose they are, (n,)."""
+    """All contacts, their unit normals, (n, 3), and whose they are, (n,)."""
     flat = [(i, contour) for i, some in enumerate(contours) for contour in some]
     points = np.vstack([contour.points for _, contour in flat])
     normals = np.vstack([contour.normals for _, contour in flat])  # type: ignore[misc]
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     owner = np.repeat([i for i, _ in flat], [len(contour.points) for _, contour in flat])
     return points, normals, owner
 
 
 def charts_of(results: Sequence[Reconstruction], deviations: bool = True) -> Charts:
-    """Patches as tables; or without their deviations, which cost most."""
-    return stacked(results, [table_of(r, 0.0 if deviations else None) for r in results])
+    """Patches alone as tables; or without their deviations, which cost most."""
+    return stacked(results, [table_of(r, deviations) for r in results])
 
 
 def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Charts:
@@ -110,23 +139,26 @@ def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Chart
     )
 
 
-def table_of(r: Reconstruction, beside: float | None) -> Table:
-    """The table of a patch, with a deviation beside its own; with none at all for None."""
+def table_of(r: Reconstruction, deviations: bool) -> Table:
+    """The table of a patch alone."""
     from scipy.ndimage import spline_filter
 
-    rim = _rim(r)
-    half = float(1.05 * MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 5)  # with knots beside for the spline
+    rim, half = _square(r)
     knots = np.linspace(-half, half, SIDE)
     x, y = (axis.ravel() for axis in np.meshgrid(knots, knots, indexing="ij"))
     at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
     share = np.hypot(x, y) / np.interp(at, np.arange(AZIMUTHS + 1), np.append(rim, rim[0]))
     # A sextic that is asked farther out runs away, and the spline would carry that inward.
-    pull = r.radius * np.minimum(1.0, 1.3 / np.maximum(share, 1e-9))
+    pull = r.radius * np.minimum(1.0, NEAR / np.maximum(share, 1e-9))
     heights = r.height(pull * x, pull * y).reshape(SIDE, SIDE) / r.radius
-    stds = np.zeros((SIDE, SIDE))
-    if beside is not None:
-        stds = np.hypot(_stds(r, pull * x, pull * y), beside / r.radius)
+    stds = _stds(r, pull * x, pull * y) if deviations else np.zeros((SIDE, SIDE))
     return rim, half, spline_filter(heights, order=3, mode="mirror"), stds
+
+
+def _square(r: Reconstruction) -> tuple[Array, float]:
+    """The domain's radii, and half the side of the square of knots: with some beside for the spline."""
+    rim = _rim(r)
+    return rim, float(1.05 * MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 5)
 
 
 def _rim(r: Reconstruction) -> Array:
@@ -146,9 +178,4 @@ def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
     """Deviations (SIDE, SIDE) from every other knot: they are smooth, and cost the most."""
     coarse = slice(None, None, 2)
     x, y = x.reshape(SIDE, SIDE)[coarse, coarse], y.reshape(SIDE, SIDE)[coarse, coarse]
-    some = r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius
-    full = np.empty((SIDE, SIDE))
-    full[coarse, coarse] = some
-    full[1::2, coarse] = 0.5 * (some[:-1] + some[1:])
-    full[:, 1::2] = 0.5 * (full[:, :-2:2] + full[:, 2::2])
-    return full
+    return between(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

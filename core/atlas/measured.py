@@ -12,7 +12,8 @@ from ..arguments import Array, list_of, number, unit_vector
 from ..contours.contour import Contour
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
-from .join import FACING, charts_of
+from .frontier import FACING
+from .join import charts_of
 from .object_atlas import Atlas
 
 FIRST, SOME = 40, 24  # contacts of the smallest patch; those that are asked how large that is

@@ -79,10 +79,12 @@ class Atlas:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
-        if self.uncovered:
+        count = len(self.uncovered)
+        if count:
+            places = "one place" if count == 1 else f"{count} places"
             return "uncertain", (
-                f"The patches end at {len(self.uncovered)} places where the object goes on: allow "
-                "more touches or a larger tolerance."
+                f"The patches end at {places} where the object goes on: allow more touches or a larger "
+                "tolerance."
             )
         rough = len(self._uncertain)
         if rough:
@@ -93,11 +95,9 @@ class Atlas:
         return "ok", "The object was felt everywhere a finger could reach."
 
     @cached_property
-    def _uncertain(self) -> list[Reconstruction]:
+    def _uncertain(self) -> list[int]:
         """Patches less certain than the tolerance, the worst first."""
-        most = np.inf if self.tolerance is None else self.tolerance
-        rough = [r for r in self.patches if r.mean_height_std > most]
-        return sorted(rough, key=lambda r: -r.mean_height_std)
+        return self.charts.less_certain_than(np.inf if self.tolerance is None else self.tolerance)
 
     def next_touch(self) -> NextTouch | None:
         """Where the next touch would bring most; None if all is covered to the tolerance."""
@@ -107,10 +107,8 @@ class Atlas:
             return NextTouch(np.array(place.point), np.array(place.normal), area)
         if not self._uncertain:
             return None
-        r = self._uncertain[0]
-        x, y = r.domain.nodes[0][int(np.argmax(r.node_stds))]
-        point = r.frame.to_world(np.array([x, y, float(r.height(x, y))]))
-        return NextTouch(point, r.geometry.normal(x, y) @ r.frame.axes.T, r.domain.area)
+        worst = self._uncertain[0]
+        return NextTouch(*self.charts.least_certain(worst), self.patches[worst].domain.area)
 
     def distance(self, points: ArrayLike) -> tuple[Array, Array]:
         """Signed distances (n,) of points (n, 3), negative inside, and their standard deviations (n,).
@@ -165,8 +163,7 @@ class Atlas:
         A chord e of a circle of curvature k is off it by k e^2 / 8; an edge is no longer than half a radius.
         """
         bends = np.array([max(abs(r.patch.k1), abs(r.patch.k2)) for r in self.patches])
-        stds = np.array([r.mean_height_std for r in self.patches])
-        radii = np.array([r.radius for r in self.patches])
+        stds, radii = self.charts.mean_stds, self.charts.radii
         chords = np.sqrt(4.0 * stds / np.maximum(bends, stds / radii**2))
         return float(np.median(np.minimum(chords, 0.5 * radii)))
 
@@ -182,7 +179,7 @@ class Atlas:
         K and H are means over the patches there, each with its weight in the blended surface; the others
         follow from these. Where there is no patch, all are 0.
         """
-        gauss, mean = _blended_curvatures(self, points, normals)
+        gauss, mean = _blended_curvatures(self.charts, points, normals)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # of the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,
@@ -204,30 +201,26 @@ class Atlas:
 
         The `to_dict` of a patch has all of it, and is thirty times as large.
         """
-        touch = self.next_touch()
+        touch, stds = self.next_touch(), self.charts.mean_stds
         return {
             "version": VERSION,
             **{name: getattr(self, name) for name in ("status", "message", "tolerance")},
-            "nodes": [node_dict(r) for r in self.patches],
+            "nodes": [node_dict(r, float(std)) for r, std in zip(self.patches, stds, strict=True)],
             "edges": [edge.to_dict() for edge in self.edges],
             "uncovered": [{"point": list(p.point), "outward": list(p.normal)} for p in self.uncovered],
             "next_touch": None if touch is None else plain(touch._asdict()),
         }
 
 
-def _blended_curvatures(atlas: Atlas, points: Array, normals: Array) -> tuple[Array, Array]:
+def _blended_curvatures(charts: Charts, points: Array, normals: Array) -> tuple[Array, Array]:
     """Means of K and H (n,) at points, over the patches of their own wall."""
-    charts = atlas.charts
     pairs = charts.pairs(points)
     facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
     weights = node_weights(charts, pairs) * np.clip((facing - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
     radii = charts.radii[pairs.node]
     weights *= np.abs(pairs.distance) < LAYER * radii
-    x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T * radii
-    curvatures, order = np.zeros((2, len(x))), np.argsort(pairs.node, kind="stable")
-    for at in np.split(order, np.flatnonzero(np.diff(pairs.node[order])) + 1):
-        d = atlas.patches[pairs.node[at[0]]].patch.derivatives(x[at], y[at])
-        curvatures[:, at] = d.gaussian_curvature, d.mean_curvature
+    x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T
+    curvatures = charts.curvatures(x, y, pairs.node)
     count = len(points)
     total = np.maximum(np.bincount(pairs.place, weights, count), SMALLEST)
     gauss, mean = (np.bincount(pairs.place, weights * each, count) / total for each in curvatures)

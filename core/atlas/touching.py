@@ -2,20 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches that grow over a whole object by themselves (paper, VI), and the surface of all of them."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import LARGEST, finite_array, number, unit_vector
+from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.finger import Surface
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.side_by_side import exploring
 from ..exploration.touches import explore
-from .frontier import Frontier, Next, side_of
-from .join import joined
+from .charts import Charts
+from .frontier import Frontier, covered, side_of
+from .join import Table, joined
 from .object_atlas import Atlas
 
 MOST = 1000
@@ -23,7 +24,10 @@ FIRST = 300.0  # times the tolerance, that half curves of the first touch may be
 SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
 LEAST = 5.0  # times it, that a patch is wide at least
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
+AGAIN = 2  # times that patches less certain than the tolerance are touched again
 LARGER = 2.0  # times the patch where it begins, that a touch may become
+
+Contact = tuple[Array, Array]  # a point and its normal, (3,) each
 
 
 class Progress(NamedTuple):
@@ -61,22 +65,27 @@ def touch_all_over(
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
     if tolerance < noise:
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
-    wanted: dict[str, Any] = {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance}
-    found = [explore(surface, p, up, farthest=FIRST * tolerance, **wanted)]
-    frontier = Frontier(surface, side_of(surface, p, up, found[0].step))
-    frontier.add(found[0].result)
-    more = yield Progress(1, len(frontier.queue), tuple(found))
-    done = 1
-    while more is not False and done < most:
-        now = Progress(done, len(frontier.queue))
-        chosen, more = yield from _told(frontier.taking(min(SIDE_BY_SIDE, most - done)), now)
+    run = _Run(surface, tolerance, most, {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance})
+    more = (yield run.first(p, up)) is not False
+    more = yield from _all_over(run, more)
+    return (yield from _joined(run, more))
+
+
+def _all_over(run: "_Run", more: bool) -> Generator[Progress, bool | None, bool]:
+    """Touches until nothing within reach is uncovered; returns whether nobody has sent False."""
+    while more and run.done < run.most:
+        chosen, more = yield from _told(
+            run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)), run.now()
+        )
         if not chosen or not more:
             break
-        done += len(chosen)
-        new, more = yield from _told(_touched(surface, frontier, chosen, LEAST * tolerance, wanted), now)
-        found += new
-        more = (yield Progress(done, len(frontier.queue), tuple(new))) is not False and more
-    return (yield from _joined(found, done, frontier, tolerance, noise))
+        farthest = LARGER * max(touch.place.radius for touch in chosen)
+        contacts = [(touch.point, touch.outward) for touch in chosen]
+        new, more = yield from _told(run.touch(contacts, farthest), run.now())
+        for touch in chosen:
+            run.frontier.tried(touch)
+        more = (yield run.now(new)) is not False and more
+    return more
 
 
 def _told(
@@ -92,34 +101,89 @@ def _told(
         more = (yield progress) is not False and more
 
 
-def _touched(
-    surface: Surface, frontier: Frontier, chosen: list[Next], least: float, wanted: dict[str, Any]
-) -> Generator[None, None, list[Exploration]]:
-    """Touches at the places chosen, where there can be one; their rims are the frontier's."""
-    points, outward = np.array([n.point for n in chosen]), np.array([n.outward for n in chosen])
-    farthest = LARGER * max(n.place.radius for n in chosen)
-    results = yield from exploring(surface, points, outward, farthest=farthest, **wanted)
-    found = []
-    for touch, result in zip(chosen, results, strict=True):
-        if isinstance(result, Exploration) and result.result.radius >= least:
-            frontier.add(result.result)
-            found.append(result)
-        frontier.tried(touch)
-        yield
-    return found
+class _Run:
+    """Touches so far, and what all of them have in common."""
+
+    def __init__(self, surface: Surface, tolerance: float, most: int, wanted: dict[str, Any]) -> None:
+        self.surface, self.tolerance, self.most, self.wanted = surface, tolerance, most, wanted
+        self.found: list[Exploration] = []
+        self.done = 0
+
+    def first(self, point: Array, up: Array) -> Progress:
+        """The touch from which all others go on; raises ValueError where there is none."""
+        first = explore(self.surface, point, up, farthest=FIRST * self.tolerance, **self.wanted)
+        self.frontier = Frontier(self.surface, side_of(self.surface, point, up, first.step))
+        self.frontier.add(first.result)
+        self.found, self.done = [first], 1
+        return self.now([first])
+
+    def now(self, new: Sequence[Exploration] = ()) -> Progress:
+        """How far it is."""
+        return Progress(self.done, len(self.frontier.queue), tuple(new))
+
+    def touch(self, contacts: Sequence[Contact], farthest: float) -> Generator[None, None, list[Exploration]]:
+        """Touches at places, where there can be one that is wide enough; their rims are the frontier's."""
+        points, outward = (np.array(values) for values in zip(*contacts, strict=True))
+        results = yield from exploring(self.surface, points, outward, farthest=farthest, **self.wanted)
+        new = [e for e in results if isinstance(e, Exploration) and e.result.radius >= LEAST * self.tolerance]
+        for exploration in new:
+            self.frontier.add(exploration.result)
+            yield
+        self.found += new
+        self.done += len(contacts)
+        return new
+
+    def missing(self, charts: Charts, rough: list[int]) -> list[Contact | None]:
+        """For each of these patches the contact in the middle of those that no other covers, if there are."""
+        others = charts.chosen(np.setdiff1d(np.arange(len(self.found)), rough))
+        found: list[Contact | None] = []
+        for i in rough:
+            points = np.vstack([contour.points for contour in self.found[i].contours])
+            normals = np.vstack([contour.normals for contour in self.found[i].contours])  # type: ignore[misc]
+            new = np.flatnonzero(~covered(others, points, normals))
+            off = ((points[new] - points[new].mean(axis=0)) ** 2).sum(axis=1) if len(new) else new
+            found.append((points[new[np.argmin(off)]], normals[new[np.argmin(off)]]) if len(new) else None)
+        return found
 
 
-def _joined(found: list[Exploration], done: int, frontier: Frontier, tolerance: float, noise: float) -> Steps:
-    assert frontier.charts is not None
-    steps = joined([e.contours for e in found], [e.result for e in found], frontier.charts, noise)
-    uncovered = tuple(frontier.uncovered())
-    yield Progress(done, len(uncovered), joining=0.0)
+def _joined(run: _Run, more: bool) -> Steps:
+    """The atlas of what was found, after more touches where patches are less certain than the tolerance.
+
+    Patches that stay less certain are left out where others cover all that they felt.
+    """
+    known: dict[int, tuple[int, Table]] = {}
+    for again in range(AGAIN, -1, -1):
+        uncovered = tuple(run.frontier.uncovered())
+        charts, goes_on = yield from _charts(run, len(uncovered), known)
+        more = goes_on and more
+        rough = charts.less_certain_than(run.tolerance)
+        missing = run.missing(charts, rough)
+        chosen = [contact for contact in missing if contact is not None][: run.most - run.done]
+        if not (again and chosen and more):
+            break
+        new, more = yield from _told(run.touch(chosen, float(charts.radii[rough].max())), run.now())
+        more = (yield run.now(new)) is not False and more
+        more = yield from _all_over(run, more)
+    gone = [i for i, contact in zip(rough, missing, strict=True) if contact is None]
+    kept = np.setdiff1d(np.arange(len(run.found)), gone)
+    patches = tuple(run.found[i].result for i in kept)
+    return Atlas(patches, charts.chosen(kept), run.tolerance, uncovered)
+
+
+def _charts(
+    run: _Run, uncovered: int, known: dict[int, tuple[int, Table]]
+) -> Generator[Progress, bool | None, tuple[Charts, bool]]:
+    """Joined patches, and whether nobody has sent False; yields how far that is."""
+    assert run.frontier.charts is not None
+    more = (yield Progress(run.done, uncovered, joining=0.0)) is not False
+    contours, results = [e.contours for e in run.found], [e.result for e in run.found]
+    steps = joined(contours, results, run.frontier.charts, run.wanted["noise"], known)
     while True:
         try:
-            yield Progress(done, len(uncovered), joining=next(steps))
+            progress = Progress(run.done, uncovered, joining=next(steps))
         except StopIteration as end:
-            patches, charts = end.value
-            return Atlas(tuple(patches), charts, tolerance, uncovered)
+            return end.value, more
+        more = (yield progress) is not False and more
 
 
 def explore_object(

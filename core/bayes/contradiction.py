@@ -33,7 +33,7 @@ def measured_normals(contours: Sequence[Contour], frame: Frame, radius: float) -
 
 
 def contradiction(contacts: Array, normals: Array, posterior: Posterior) -> tuple[float, float]:
-    """By how many deviations normals contradict contacts, and by what angle in the root mean square.
+    """The deviations, and the angle in the root mean square, by which normals contradict contacts.
 
     contacts, normals : (n, 3), of `measured_normals`
     posterior : what contacts leave open without any normal, in the same frame and unit

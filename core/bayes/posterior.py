@@ -96,7 +96,7 @@ class Posterior(NamedTuple):
         return added
 
     def covariances_with(self, q: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Of points (..., n, 2): covariances of the heights with those at q, (m, 2), and with each other."""
+        """The covariances of heights at points (..., n, 2) with those at q, (m, 2), and with each other."""
         return lambda p: (self.height_covariance(p, q), self.height_covariance(p, p))
 
     def height(self, x: Array, y: Array) -> Array:
@@ -180,7 +180,7 @@ def _turn(angle: Array) -> Array:
     """
     (parts, from_complex), angles = _complex_terms(), np.asarray(angle)[..., None]
     turned = from_complex * np.exp(angles * WINDING)[..., None, :]
-    # Of the product only the real part, in real numbers.
+    # Only the real part of the product is needed, which real numbers give.
     turn: Array = np.concatenate([turned.real, turned.imag], axis=-1) @ parts
     return turn
 

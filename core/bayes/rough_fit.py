@@ -105,7 +105,7 @@ class _Misfit(NamedTuple):
 
 
 def _misfit(contacts: Array, weights: Array, posterior: Posterior) -> _Misfit:
-    """For b touches of contacts (b, n, 3) with weights (b, n)."""
+    """The misfits of b touches of contacts (b, n, 3) with weights (b, n)."""
     flat = contacts.reshape(-1, 3)
     basis = monomials(flat[:, 0], flat[:, 1], TERMS).reshape(*weights.shape, -1)
     off = np.abs(contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0])
@@ -128,7 +128,7 @@ def _is_texture(off: Array, accuracy: float) -> bool:
 def _settle(
     found: RoughFit, place: int, touch: Observations, system: System, size: Sizes, tangent: Array
 ) -> None:
-    """Into `found`: the fit of a touch in the frame that its first fit shows."""
+    """Puts the fit of a touch, in the frame that its first fit shows, into `found`."""
     (at, weights), half = _projection(), len(nodes()[2])
     first, places = mean_given(touch, system, size), touch.contacts[system.places, :2]
     mean = _terms()[:FREE] @ first[: len(TERMS)]

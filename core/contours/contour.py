@@ -141,7 +141,7 @@ def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:
 
 
 def vector_of(v: Sequence[float] | Array) -> Vector:
-    """In Python floats: in the inner loops a numpy call would cost more than what it does."""
+    """The vector in Python floats: in inner loops a numpy call would cost more than what it does."""
     x, y, z = v
     return float(x), float(y), float(z)
 

@@ -76,6 +76,6 @@ def _alike(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) ->
 
 
 def _starts(first: int, last: int, size: int) -> NDArray[np.intp]:
-    """Where groups of about that size begin, of places from first to last."""
+    """The starts of groups of about that size, of places from first to last."""
     count = max(1, (last - first) // size) if last > first else 0
     return first + np.arange(count, dtype=np.intp) * (last - first) // max(count, 1)

@@ -119,7 +119,7 @@ class Grown(NamedTuple):
 
     @property
     def doubt(self) -> float:
-        """At most 1 for none."""
+        """The largest doubt; there is none up to 1."""
         return max(float(self.misfits.max()), self.spread)
 
     @property

@@ -204,6 +204,6 @@ def is_enough(r: Reconstruction) -> bool:
     variance = own**2
     seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
     told = solved(cholesky(seen), shared)
-    lost = r.geometry.widening(*points.T) ** 2 * np.einsum("in,in->n", told, told)
+    lost = r.geometry.node_widening**2 * np.einsum("in,in->n", told, told)
     then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
     return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))

@@ -89,7 +89,7 @@ class Domain:
         return azimuths[order], radii[order]
 
     def _without_turning_back(self) -> tuple[Array, Array]:
-        """Beside an end near to the origin the spline may turn back: a monotone one, of the radius."""
+        """A monotone spline of the radius: beside an end near the origin the closed one may turn back."""
         from scipy.interpolate import PchipInterpolator
 
         # Two ends in one direction count once, the farther.
@@ -118,6 +118,12 @@ class Domain:
         ahead = chords * (slope + t * (2.0 * bend + 3.0 * t * third))
         weights = along * np.abs(points[:, 0] * ahead[:, 1] - points[:, 1] * ahead[:, 0])
         return (out * points).reshape(-1, 2), np.ravel(outward * weights) / weights.sum()
+
+    @property
+    def node_places(self) -> Array:
+        """How far out the nodes are, as shares of the radius there, (n,)."""
+        piece, _, _, out, _ = _gauss(len(self.ends))
+        return np.repeat(out.ravel(), len(piece))
 
     def _radius(self, azimuth: Array) -> Array:
         """How far out the boundary is, by the chords of its samples: straight pieces are exact."""
@@ -167,7 +173,7 @@ class Domain:
 
 @lru_cache(maxsize=16)
 def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
-    """For Domain.nodes: piece, place on it and weight of each ray; places and weights along a ray."""
+    """The rule of Domain.nodes: piece, place on it and weight of each ray; places and weights along a ray."""
     along, along_weights = np.polynomial.legendre.leggauss(GAUSS_ALONG)  # type: ignore[no-untyped-call]
     square, outward = np.polynomial.legendre.leggauss(GAUSS_ACROSS)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
     return (
@@ -199,7 +205,7 @@ def closed_spline_domain(ends: ArrayLike, radius: float, brinks: ArrayLike | Non
 
 
 def hull_domain(points: ArrayLike, radius: float) -> Domain:
-    """Through places on the convex hull of points (n, 2). Raises ValueError for an origin beside it."""
+    """The domain through places on the hull of points (n, 2). Raises ValueError for an origin beside it."""
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(np.asarray(points, dtype=float)).equations  # outward normals, and less their distances

@@ -81,8 +81,13 @@ class Geometry(HeightField):
         points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
         if self.residual is None:
             return np.ones(len(points))
-        outward = np.linalg.norm(self.domain.places(points), axis=1)
-        return NEAR_POINT + 1.5 * (1.0 - NEAR_POINT) * outward
+        return _widened(np.linalg.norm(self.domain.places(points), axis=1))
+
+    @property
+    def node_widening(self) -> Array:
+        """That at the nodes of the domain, (n,)."""
+        outward = self.domain.node_places
+        return np.ones(len(outward)) if self.residual is None else _widened(outward)
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether each local (x, y) lies in the domain or on its boundary; in the shape of x and y."""
@@ -105,6 +110,11 @@ class Geometry(HeightField):
             self.domain.scaled(scale),
             self.residual,
         )
+
+
+def _widened(outward: Array) -> Array:
+    """By the share of the domain's radius."""
+    return NEAR_POINT + 1.5 * (1.0 - NEAR_POINT) * outward
 
 
 def similarity(matrix: ArrayLike) -> tuple[float, Array, Array]:

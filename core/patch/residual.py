@@ -82,7 +82,7 @@ class Residual:
         return self._covariance(p, self.signed(p), q, self.signed(q))
 
     def covariances_with(self, q: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Of points (..., n, 2): covariances of the heights with those at q, (m, 2), and with each other."""
+        """The covariances of heights at points (..., n, 2) with those at q, (m, 2), and with each other."""
         at_q = self.signed(q)
 
         def covariances(p: Array) -> tuple[Array, Array]:

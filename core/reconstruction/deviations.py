@@ -29,7 +29,7 @@ def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
 
 
 def _mean_stds_of_sextics(results: Sequence[Reconstruction]) -> list[float]:
-    """In unit radius, of results without a residual."""
+    """The mean deviations, in unit radius, of results without a residual."""
     nodes = [r.domain.nodes for r in results]
     most = max((len(weights) for _, weights in nodes), default=0)
     points, weights = np.zeros((len(results), most, 2)), np.zeros((len(results), most))

@@ -13,10 +13,10 @@ from ..contours.contour import SamplingPlane
 from .result import Reconstruction
 
 AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))  # 1.5 degrees off, a plane ends a 38th of the radius aside.
-COARSE_STRIDE = 4  # So many azimuths lie between those that are tried first.
+COARSE_STRIDE = 5  # So many azimuths lie between those that are tried first.
 MOST_CONTACTS = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
-FEW_CONTACTS = 12  # of those that are compared
-NEARBY = np.arange(1 - COARSE_STRIDE, COARSE_STRIDE)  # azimuths beside the best of those tried first
+FEW_CONTACTS = 8  # of those that are compared
+NEARBY = np.arange(-(COARSE_STRIDE // 2), COARSE_STRIDE // 2 + 1)  # Azimuths about the best of those.
 
 
 def suggest_plane(
@@ -35,7 +35,7 @@ def suggest_plane(
     points, weights = r.domain.nodes
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
     covariances = r.uncertainty.covariances_with(points / r.radius)
-    widening = r.geometry.widening(*points.T) ** 2
+    widening = r.geometry.node_widening**2
 
     def lost(azimuths: NDArray[np.intp], most: int) -> Array:
         """What a contour at each of these takes off the variances at the points, (k, n), in unit radius."""

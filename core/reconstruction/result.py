@@ -111,8 +111,11 @@ class Reconstruction:
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
+        return self._height_std(x, y, self.geometry.widening(x, y))
+
+    def _height_std(self, x: ArrayLike, y: ArrayLike, widening: Array) -> Array:
         u, v = self.geometry.in_unit_radius(x, y)
-        std = self.geometry.widening(x, y) * self.uncertainty.height_std(u, v)
+        std = widening * self.uncertainty.height_std(u, v)
         if self.joint_posterior is None:  # a patch by another method departs from the posterior's mean too
             off = self.posterior.height(u, v) - np.ravel(self.height(x, y)) / self.radius
             std = np.hypot(std, off)
@@ -121,14 +124,14 @@ class Reconstruction:
     @cached_property
     def mean_height_std(self) -> float:
         """The mean of height_std over the domain."""
-        if self.known_height_std is not None:
-            return self.known_height_std
-        return float(self.domain.nodes[1] @ self.node_stds)
+        known = self.known_height_std
+        return float(self.domain.nodes[1] @ self.node_stds) if known is None else known
 
     @cached_property
     def node_stds(self) -> Array:
         """height_std at the domain's nodes, (n,)."""
-        return self.height_std(*self.domain.nodes[0].T)
+        x, y = self.domain.nodes[0].T
+        return self._height_std(x, y, self.geometry.node_widening)
 
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
@@ -156,10 +159,8 @@ class Reconstruction:
     @property
     def gaussian_curvature_std(self) -> float:
         """Standard deviation of K at the point, in 1/length^2, for normally distributed k1 and k2."""
-        c, k = (
-            4.0 * self.posterior.covariance[2:FREE:2, 2:FREE:2],
-            self.radius * np.array([self.patch.k2, self.patch.k1]),
-        )
+        c = 4.0 * self.posterior.covariance[2:FREE:2, 2:FREE:2]
+        k = self.radius * np.array([self.patch.k2, self.patch.k1])
         variance = k @ c @ k + c[0, 0] * c[1, 1] + c[0, 1] ** 2
         return math.sqrt(variance) / self.radius**2
 

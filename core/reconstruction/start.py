@@ -81,7 +81,7 @@ Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | 
 
 
 def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: float | None) -> Started:
-    """For contours with strokes beside them, what their fits start from, contours as fitted, and errors."""
+    """The start of fits to contours with strokes beside them, the contours as they are fitted, and errors."""
     thin = [[thinned(c, point) for c in touch.contours] for point, touch in zip(points, given, strict=True)]
     touches = [[contour for contour, _ in c] for c in thin]
     curves = curves_through(*stacked(points, touches))
@@ -177,7 +177,7 @@ def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
 
 
 def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
-    """Through the curves' ends on either side of the point. Raises ValueError where they bound nothing.
+    """The domain through the curves' ends on either side of the point. Raises ValueError if they bound none.
 
     Where the surface ended before the first contact of a side, it ends at the point.
     """

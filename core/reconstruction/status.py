@@ -69,7 +69,7 @@ class _Judged(Protocol):
 
     @property
     def contradiction(self) -> tuple[float, float]:
-        """By how many deviations, and by what angle, normals contradict contacts."""
+        """The deviations, and the angle, by which normals contradict contacts."""
 
 
 def doubt(r: _Judged) -> tuple[str, str] | None:

@@ -17,7 +17,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..probes.operators import is_in_object_mode, make_active, report_error, waiting
 from ..scene import patch_object
-from ..touch.settings import FitSettings, draw_solver, length_property
+from ..touch.settings import FitSettings, draw_chosen, draw_solver, length_property
 from ..touch.units import length
 from ..touch.wording import fit_summary
 from ..whole_object import whole_mesh
@@ -158,10 +158,12 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         of_patch = "point", "strokes", "radius", "flip", "noise", "normal_std"
-        of_object = "outward", "flip", "tolerance", "noise"
+        of_object = "outward", "flip", "noise"
         for name in ("unit", "whole", *(of_object if self.whole else of_patch)):
             layout.prop(self, name)
-        if not self.whole:
+        if self.whole:
+            draw_chosen(layout, self, "tolerance")
+        else:
             draw_solver(layout, self)
 
 

@@ -80,8 +80,10 @@ def whole_of(contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
     found = WholeSurface(atlas, origin)
     for _ in found.steps(0.0):
         pass
-    count = sum(len(contour.points) for contour in felt)
-    return found, {"contacts": count, **found.report(), "tolerance": tolerance, "noise": noise}
+    report = {"contacts": sum(len(contour.points) for contour in felt), **found.report()}
+    if report["status"] == "ok":  # nobody has looked for places where the object goes on
+        report |= {"message": "The patches reach the tolerance wherever there are contacts."}
+    return found, report | {"tolerance": tolerance, "noise": noise}
 
 
 def _scaled(curve, factor):

@@ -129,7 +129,7 @@ def let_go(patch):
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def carry(probe, patch):
-    """Where the target was moved since, the patch's record is that of a patch that was moved with it.
+    """Has the patch's record say that the patch was moved with its target, where that was moved since.
 
     Not where the probe has been left behind, as one that is not the target's child.
     """

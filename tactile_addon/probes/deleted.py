@@ -61,7 +61,7 @@ def _follow(probe, target):
 
 
 def _remove_soon():
-    """Not now: a handler may not delete what is being evaluated."""
+    """Has `remove` called later: a handler may not delete what is being evaluated."""
     # Without a window no timer runs, and one that is left keeps Blender's module from ending.
     if not bpy.app.background and not bpy.app.timers.is_registered(remove):
         bpy.app.timers.register(remove)
@@ -101,6 +101,12 @@ def _is_left(obj, there):
     return owner is not None and owner not in there and obj.parent is None and obj.is_editable
 
 
+def _is_data(datablock):
+    """Whether it is an object or the like; scenes and windows see by themselves that one is gone."""
+    kinds = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
+    return not isinstance(datablock, kinds)
+
+
 def _unused_meshes():
     return [mesh for mesh in bpy.data.meshes if DIGEST in mesh and not mesh.users]
 
@@ -114,7 +120,7 @@ def remove():
     # Children and modifiers point to an object without being its users, and undo may leave them as they are:
     # it would bring back the object, and not these links.
     pointing = bpy.data.user_map(subset=gone) if gone else {}
-    gone = [obj for obj in gone if not pointing.get(obj)]
+    gone = [obj for obj in gone if not any(map(_is_data, pointing.get(obj, ())))]
     left = [obj for obj in there.values() if _is_left(obj, there) and is_result(obj)]
     _deleted.clear()
     patch_object.remove_objects(left)

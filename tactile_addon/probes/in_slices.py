@@ -106,7 +106,7 @@ class InSlices:
         """Blender's, where it ends the operator itself: by a dialog, a new file or a closed window."""
         if self._timer is not None:
             self._leave(context)
-            print(f"{self.bl_label}: stopped, for the file or the window was closed", file=sys.stderr)
+            print(f"{self.bl_label}: stopped because the file or the window was closed", file=sys.stderr)
 
 
 def _status(stop, words, share=None):

@@ -132,7 +132,7 @@ def waiting(context):
 
 
 def is_in_object_mode(operator, context, what):
-    """For its poll; says so where it is in another mode."""
+    """Whether the mode is Object Mode; the operator's poll says so where it is not."""
     if context.mode == "OBJECT":
         return True
     operator.poll_message_set(f"{what} in Object Mode: leave this mode first")
@@ -140,7 +140,7 @@ def is_in_object_mode(operator, context, what):
 
 
 def has_target(operator, context):
-    """For its poll in a 3D viewport: whether the active object can be touched, or leads to one that can."""
+    """Whether the active object of a viewport can be touched, or leads to one that can; poll says why not."""
     if context.area is None or context.area.type != "VIEW_3D":  # a script may name one
         return True
     try:
@@ -154,7 +154,7 @@ def has_target(operator, context):
 
 
 def is_unlocked(operator, context):
-    """For its poll: whether the probe or patch near the active object can be changed; says so where not."""
+    """Whether the probe or patch near the active object can be changed; the operator's poll says why not."""
     lock = lock_of(context.view_layer.objects.active)
     if lock is not None:
         operator.poll_message_set(lock)

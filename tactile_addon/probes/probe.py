@@ -85,7 +85,7 @@ def targets():
 
 
 def forget_targets():
-    """To be called where probes may have come or gone, or changed their targets."""
+    """Has `targets` look again, where probes may have come or gone, or changed their targets."""
     global _targets
     _targets = None
 

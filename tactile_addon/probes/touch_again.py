@@ -76,7 +76,7 @@ def adopt(probe, touched, depsgraph, complete):
 
 
 def stand_by(probe, outdated, complete):
-    """Where there is no touch now: has the patch stay where it was, and say whether it is outdated."""
+    """Has the patch stay where it was, and say whether it is outdated, where there is no touch now."""
     settings, patch = probe.tactile_probe, patch_of(probe)
     if complete:
         anchor.settle(probe, _extent_of(probe))

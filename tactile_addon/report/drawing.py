@@ -23,7 +23,7 @@ def triangles(points, corners, colors, marks=()):
 
 def dots(points, colors):
     """Dots at points (n, 2), later ones above earlier ones, in colors (n, 3 or 4)."""
-    place, radius = _fitted(points), max(2.0, 0.7 * PIXELS / np.sqrt(max(len(points), 1)))
+    place, radius = _fitted(points), max(2.0, 0.9 * PIXELS / np.sqrt(max(len(points), 1)))
     return _picture(
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{_hex(color)}"/>'
         for (x, y), color in zip(place(points), colors, strict=True)
@@ -51,15 +51,19 @@ def histogram(values, weights, limit, label):
     return f'<svg viewBox="0 0 {width} {HEIGHT + 24}" width="{width}">{"".join([*bars, *ticks])}</svg>'
 
 
-def scale(limit, label):
-    """The colors from -limit to limit with their values."""
-    fills = shades(np.linspace(-1.0, 1.0, 64), 1.0)
+def scale(limit, label, low=-1.0):
+    """The colors from `low` times the limit to it, with their values."""
+    fills = shades(np.linspace(low, 1.0, 64), 1.0)
     boxes = [
         f'<rect x="{5 * i}" y="0" width="5.5" height="12" fill="{_hex(f)}"/>' for i, f in enumerate(fills)
     ]
     words = [
         f'<text x="{x}" y="27" text-anchor="{anchor}">{label(at * limit)}</text>'
-        for x, at, anchor in ((0, -1.0, "start"), (PIXELS // 2, 0.0, "middle"), (PIXELS, 1.0, "end"))
+        for x, at, anchor in (
+            (0, low, "start"),
+            (PIXELS // 2, 0.5 * (low + 1.0), "middle"),
+            (PIXELS, 1.0, "end"),
+        )
     ]
     return f'<svg viewBox="0 0 {PIXELS} 32" width="{PIXELS}">{"".join([*boxes, *words])}</svg>'
 

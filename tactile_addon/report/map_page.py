@@ -50,7 +50,8 @@ def _errors(mesh, record, unit):
         return []
     weights, std = np.ones(known.sum()), float(np.median(values(mesh, "height_std")[known]))
     words = (
-        "Shares of the vertices by the error of the touch nearest to them. The last bar counts all beyond."
+        "Shares of the vertices by the error of the touch nearest to them. The last bar counts all "
+        "larger errors."
     )
     return [
         page.section("Errors", parts.spread(errors[known], weights, unit, words)),

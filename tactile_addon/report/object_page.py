@@ -11,7 +11,7 @@ from . import drawing, page, parts, views
 TOLERANCES = (0.5, 1.0, 2.0, 5.0)
 WORDS = {
     "deviation": "deviation, red outside of the mesh",
-    "height_std": "standard deviation of the surface, which is above 0",
+    "height_std": "standard deviation",
 }
 
 
@@ -21,18 +21,21 @@ def object_page(obj):
     record = obj[patch_record.ATLAS_RECORD].to_dict()
     was_touched = "touches" in record
     sections = [
-        page.verdict(f"{object_summary(record)}. {record['message']}", record["is_closed"]),
+        page.verdict(
+            f"{object_summary(record)}. {record['message']}", record["is_closed"] and record["status"] == "ok"
+        ),
         _pictures(obj.data, unit_of(record), "deviation" if was_touched else "height_std"),
         *(_deviations(obj.data, record) if was_touched else ()),
         *parts.ending(object_table_rows(record), record),
     ]
-    return page.page(f"{obj.name}: the surface of {record['source']}", sections)
+    return page.page(f"{obj.name}: the surface of a whole object", sections)
 
 
 def _pictures(mesh, unit, shown):
     shown_values = values(mesh, shown).astype(float)
     limit = symmetric_range(shown_values, parts.LEAST_RANGE)
-    scale = page.figure(drawing.scale(limit, parts.label(1, unit)), WORDS[shown])
+    low = 0.0 if shown in patch_record.POSITIVE else -1.0
+    scale = page.figure(drawing.scale(limit, parts.label(1, unit), low), WORDS[shown])
     return page.section("Pictures", *views.three_sides(mesh, shades(shown_values, limit)), scale)
 
 
@@ -40,7 +43,7 @@ def _deviations(mesh, record):
     unit, off = unit_of(record), values(mesh, "deviation").astype(float)
     areas = parts.vertex_areas(values(mesh, "position").astype(float), parts.corners(mesh))
     reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
-    words = "Shares of the area by its distance from the mesh. The outermost bars count all beyond."
+    words = "Shares of the area by its distance from the mesh. The outermost bars count all larger distances."
     return [
         page.section("Deviations", parts.spread(off, areas, unit, words)),
         page.section("Tolerance bands", parts.bands(off, areas, record["height_std"], unit, reaches)),

@@ -46,7 +46,7 @@ def bands(values, weights, std, unit, reaches):
                 f"{100.0 * due:g} %",
             )
         )
-    return page.table(rows, ("band", "", "within it", "due, if normal"))
+    return page.table(rows, ("band", "", "within it", "expected, if normal"))
 
 
 def ending(rows, record):

@@ -66,10 +66,14 @@ def _deviations(patch, r, record):
     if _has_mesh(record):
         points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
         words = (
-            "Shares of the patch's area by its distance from the mesh. The outermost bars count all beyond."
+            "Shares of the patch's area by its distance from the mesh. The outermost bars count all "
+            "larger distances."
         )
         off = values(patch.data, "deviation").astype(float)
         return Deviations(off, parts.vertex_areas(points, corners), words)
     x, y, z = r.contacts.T
-    words = "Shares of the contacts by the patch's height above them. The outermost bars count all beyond."
+    words = (
+        "Shares of the contacts by the patch's height above them. The outermost bars count all "
+        "larger distances."
+    )
     return Deviations(r.height(x, y) - z, np.ones(len(x)), words)

@@ -8,6 +8,7 @@ from ..scene.mesh_data import values
 from . import drawing, page
 
 MOST_DOTS = 4000  # in a picture
+DARKEST = 0.45  # of its color, that a dot has where the surface turns away
 # Words, the axes to the right and up, the axis of sight and its sign toward the viewer.
 VIEWS = (
     ("from the front", (0, 2), 1, -1.0),
@@ -23,7 +24,9 @@ def three_sides(mesh, colors):
     mesh.vertices.foreach_get("normal", normals.ravel())
     mixed = np.random.default_rng(0).permutation(len(points))
     for words, axes, sight, sign in VIEWS:
-        facing = mixed[sign * normals[mixed, sight] > 0.0][:MOST_DOTS]
+        toward = sign * normals[:, sight]
+        facing = mixed[toward[mixed] > 0.0][:MOST_DOTS]
         order = facing[np.argsort(sign * points[facing, sight])]
         if len(order):
-            yield page.figure(drawing.dots(points[order][:, axes], colors[order]), words)
+            light = DARKEST + (1.0 - DARKEST) * toward[order, None]  # else a shape in pale colors is unseen
+            yield page.figure(drawing.dots(points[order][:, axes], light * colors[order]), words)

@@ -20,7 +20,7 @@ def children_of(obj):
 
 
 def add(child):
-    """To be called for a new object that has got a parent, or may have."""
+    """Notes a new object that has got a parent, or may have."""
     if _remembered and child.parent is not None:
         _remembered.setdefault(child.parent, []).append(child)
 

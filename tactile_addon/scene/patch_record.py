@@ -95,7 +95,7 @@ def _is_whole(mesh):
 
 
 def mark_failed(patch, why):
-    """The patch is that of an earlier touch, for the last one failed."""
+    """The patch is from an earlier touch, because the last one failed."""
     _outdate(patch, {"message": f"This patch is from an earlier touch, because the last one failed. {why}"})
 
 

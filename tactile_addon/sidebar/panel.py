@@ -111,8 +111,9 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
 
     def draw_active(self, context, layout, obj):
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
-        if found is not None and found.tactile_probe.message:
-            draw_sentence(context, layout, found.tactile_probe.message, "ERROR")
+        failed = "" if found is None else found.tactile_probe.message
+        if failed:
+            draw_sentence(context, layout, failed, "ERROR")
         if patch is None:
             return
         record = probe.record_of(patch)
@@ -121,8 +122,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             return
         unit = units.unit_of(context.scene, record["radius"])
         is_outdated = record["status"] == "outdated"
-        # What has failed stands above already.
-        if not is_outdated or found is None or not found.tactile_probe.message:
+        if not (is_outdated and failed):  # what has failed stands above already
             draw_sentence(context, layout, verdict(record, unit), ICONS.get(record["status"], "ERROR"))
         if is_outdated and found is not None:
             layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
@@ -137,12 +137,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         if found is None:
             layout.prop_search(patch, "tactile_target", context.scene, "objects")
             layout.operator(TACTILE_OT_register.bl_idname, icon="SNAP_ON")
-        if "registration" in record:
-            draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
-        if "verification" in record:
-            column = layout.column()
-            column.active = not is_outdated
-            _draw_verification(context, column, record["verification"], unit)
+        _draw_comparison(context, layout, record, unit)
         if found is not None:
             draw_rows(context, layout, plane_rows(record, unit), active=not is_outdated)
 
@@ -155,8 +150,10 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
-        layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER").new = True
         record = obj[patch_record.ATLAS_RECORD]
+        if "touches" in record:  # measured contacts have no mesh to touch
+            row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")
+            row.new = True
         draw_sentence(context, layout, record["message"], ICONS.get(record["status"], "ERROR"))
         _draw_colors(context, layout, obj, "tactile_colors")
         draw_rows(context, layout.box(), object_rows(record))
@@ -219,7 +216,14 @@ def _draw_shown(layout, found, patch):
         row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)
 
 
-def _draw_verification(context, layout, found, unit):
+def _draw_comparison(context, layout, record, unit):
+    """Where the patch was put on a mesh, and how far it is off one, as far as either is known."""
+    if "registration" in record:
+        draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
+    if "verification" not in record:
+        return
+    found, layout = record["verification"], layout.column()
+    layout.active = record["status"] != "outdated"
     layout.label(text=found["target"], icon="MESH_DATA", translate=False)
     column = layout.column(align=True)
     for label, *values in verification_table(found, unit):

@@ -50,7 +50,7 @@ MENUS = (("VIEW3D_MT_object", _draw_in_object), ("VIEW3D_MT_mesh_add", _draw_in_
 
 
 def manual_map():
-    """For Online Manual in the context menus: the pages that come with the extension, one a section."""
+    """The pages that come with the extension, one per section, for Online Manual in context menus."""
     folder = Path(__file__).resolve().parents[2] / "manual"
     pages = {
         "bpy.ops.tactile.pick": "the-first-patch.html",

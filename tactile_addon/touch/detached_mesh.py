@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mesh to be touched many times, whatever happens to the scene meanwhile; and what has happened."""
 
+import math
 import zlib
 
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
+from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object
 
 
 class DetachedMesh(PlacedMesh):
@@ -17,7 +18,9 @@ class DetachedMesh(PlacedMesh):
 
     name, matrix : of the object, its transform
     points, normals : (n, 3), of the vertices; has_face : (n,), which of them are in a face
-    size : as in MeshSurface; spacing : how far apart neighboring float32 numbers are at most, in the mesh
+    faces : (m, 3), indices of the first vertices of each
+    size : the longest edge of the box around all faces, in the world
+    spacing : how far apart neighboring float32 numbers are at most, in the mesh
     """
 
     def __init__(self, obj, depsgraph):
@@ -28,15 +31,19 @@ class DetachedMesh(PlacedMesh):
         # No reference to the object: somebody may delete it.
         self.name, self._uid = obj.name, obj.session_uid
         self._checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
-        self.size = size_of(evaluated, linear)
         farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
         self.spacing = farthest * np.finfo(np.float32).eps
         normals = np.empty_like(co)
         mesh.vertex_normals.foreach_get("vector", normals.ravel())
         corners = np.empty(len(mesh.loops), dtype=np.int32)
         mesh.loops.foreach_get("vertex_index", corners)
+        starts = np.empty(len(mesh.polygons), dtype=np.int32)
+        mesh.polygons.foreach_get("loop_start", starts)
+        self.faces = corners[starts[:, None] + np.arange(3)]
         self.has_face = np.zeros(len(co), dtype=bool)
         self.has_face[corners] = True
+        # What is loose cannot be touched, and may be far off.
+        self.size = float((np.ptp(co[self.has_face], axis=0) * np.linalg.norm(linear, axis=0)).max())
         self.points, self.normals = co @ linear.T, normals @ np.linalg.inv(linear)
         self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1, keepdims=True), 1e-30)
         try:
@@ -71,9 +78,14 @@ class DetachedMesh(PlacedMesh):
         return np.array(self.matrix.translation)
 
     def project(self, location):
-        """A point of the mesh near a place, and the unit normal there."""
+        """A point of the mesh near a place, the unit normal there, and the distance."""
         point, normal = self._nearest(self._to_local(location))
-        return self._to_world(point), self._normal_to_world(normal)
+        if point is None:
+            raise ValueError("The location is too far away to be measured: set it on the surface")
+        if not any(normal):
+            raise ValueError("The location is on a face of no area: move it, or dissolve degenerate faces")
+        point = self._to_world(point)
+        return point, self._normal_to_world(normal), math.dist(location, point)
 
     def _nearest(self, local):
         return self._tree.find_nearest(local)[:2]

@@ -179,16 +179,24 @@ def require_lengths(name, size, extent, step, noise):
 
 def _reference_point(name, surface, location, extent, step):
     """The point of the surface nearest to the location, and the normal there."""
+    point, normal = nearest_point(name, surface, location, extent or AWAY * surface.size)
+    require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
+    return point, normal
+
+
+def nearest_point(name, surface, location, farthest):
+    """The point of a surface nearest to a location, and the normal there.
+
+    Raises ValueError, with a sentence, where it is farther than that.
+    """
     if not np.isfinite(location).all():
         raise ValueError("The location has coordinates that are not finite: set it on the surface")
     point, normal, distance = surface.project(location)
-    farthest = extent or AWAY * surface.size
     if distance > farthest:
         raise ValueError(
             f'The location is {length(distance)} away from "{name}", farther than {length(farthest)}: '
             "move it to the surface"
         )
-    require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
     return point, normal
 
 

@@ -102,6 +102,11 @@ def table(rows):
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 
 
+def many(count, one, several):
+    """So many of something, as in "1 touch"."""
+    return f"{count} {one if count == 1 else several}"
+
+
 def sentence(error):
     """The words of an exception, as a sentence begins, in one line: names may hold more."""
     words = " ".join(str(error).split())
@@ -140,7 +145,7 @@ def _verified_rows(found, unit):
 
 
 def registration_summary(found):
-    """Where a patch was put, in a sentence."""
+    """A sentence that says where a patch was put."""
     residual = found["residuals"][found["pose"] - 1]
     words = f'The contacts are {length(residual)} off "{found["target"]}" (root mean square)'
     if not found["is_ambiguous"]:

@@ -8,7 +8,14 @@ from bpy.props import FloatVectorProperty, IntProperty
 from ..probes import probe
 from ..probes.in_slices import InSlices
 from ..probes.number_fields import dragged
-from ..probes.operators import fields_of, is_in_object_mode, make_active, report_error, target_object
+from ..probes.operators import (
+    fields_of,
+    has_target,
+    is_in_object_mode,
+    make_active,
+    report_error,
+    target_object,
+)
 from ..scene import patch_record
 from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
 from . import whole_mesh
@@ -56,7 +63,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return is_in_object_mode(cls, context, "Objects are touched")
+        return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
 
     def invoke(self, context, event):
         if bpy.app.background:
@@ -95,18 +102,19 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
             yield
 
     def _done(self):
+        if self._touches.is_stopped:
+            self.stop = "Drop It"
         return self._touches.words, self._touches.share
 
     def _check(self, context):
         self._touches.surface.require_source(context)
 
     def _stopped(self, context):
-        """Esc joins what there is so far; once more, and nothing is kept."""
+        """Esc joins what there is so far; once more, or when that is meshed, and nothing is kept."""
         if self._touches.is_stopped or not self._touches.found:
             self._leave(context)
             return {"CANCELLED"}
         self._touches.stop()
-        self.stop = "Drop It"
         return {"RUNNING_MODAL"}
 
     def _leave(self, context):

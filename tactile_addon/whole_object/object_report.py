@@ -5,7 +5,7 @@
 import bpy
 
 from ..touch import units
-from ..touch.wording import table
+from ..touch.wording import many, table
 
 
 def unit_of(record):
@@ -21,7 +21,9 @@ def object_readable(record):
 def object_table_rows(record):
     """(label, value) of all that a whole object has to say."""
     unit, off = unit_of(record), _off(record, "mean")
-    how = f"{record['touches']} times" if "touches" in record else f"{record['contacts']} contacts"
+    how = (
+        many(record["touches"], "time", "times") if "touches" in record else f"{record['contacts']} contacts"
+    )
     return _known(
         ("touched" if "touches" in record else "measured", f"{record['source']}, {how}"),
         ("surface", _surface(record)),
@@ -39,7 +41,8 @@ def object_summary(record):
     """What is found of a whole object, in a sentence."""
     std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
-        return f"{record['touches']} touches; {_surface(record)}; {_off(record, 'mean')} off on average"
+        touches = many(record["touches"], "touch", "touches")
+        return f"{touches}; {_surface(record)}; {_off(record, 'mean')} off on average"
     return f"{record['patches']} patches of {record['contacts']} contacts; {_surface(record)}; ± {std}"
 
 
@@ -69,7 +72,7 @@ def _surface(record):
     if record["is_closed"]:
         return "closed all round"
     if record.get("uncovered"):
-        return f"open, with {record['uncovered']} places from which it could go on"
+        return f"open, with {many(record['uncovered'], 'place', 'places')} from which it could go on"
     return "open where nothing was felt"
 
 

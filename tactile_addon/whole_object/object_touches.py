@@ -2,14 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches that grow over an object, step by step, with nothing changed in the scene."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from ... import core
 from ..touch.detached_mesh import DetachedMesh
+from ..touch.touch_object import AWAY, nearest_point
 from ..touch.units import length
+from ..touch.wording import many
 from .whole_surface import WholeSurface
 
 TOLERANCE_SHARE = 1.0 / 500.0  # of the object's size, where no tolerance is given
+LARGEST_TOLERANCE, LONGEST_EDGE = 0.1, 0.5  # of the size: beyond, no patch and no triangle fits
+SHORTEST_EDGE = 1e-3  # of the size: some millions of triangles
 STARTS = 20  # places that are tried where no place to begin is given
 REACH = 0.05  # of the object's size, that the target is looked for along the normal
 AT_ONCE = 2000  # vertices whose deviation from the target is measured in a step
@@ -39,15 +45,43 @@ class ObjectTouches:
                 raise ValueError(f"The {name} is a length of 0 or more, got {length(value)}")
         self.surface = DetachedMesh(obj, depsgraph)
         self.tolerance = tolerance or max(TOLERANCE_SHARE * self.surface.size, noise)
-        if self.tolerance < noise:
-            raise ValueError(
-                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: use a larger one"
-            )
+        self._require_lengths(noise, edge)
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
         self.found, self.done, self.uncovered = [], 0, 0
         self.words, self.share = "Looking for a place to begin", None
         self.is_stopped = False
-        self._location = location
+        self._start = None
+        if location is not None:
+            at = np.subtract(location, self.surface.origin)
+            self._start = nearest_point(obj.name, self.surface, at, AWAY * self.surface.size)
+
+    def _require_lengths(self, noise, edge):
+        """Raises ValueError, with a sentence, for lengths that nothing on this object can have."""
+        name, size, tolerance = self.surface.name, self.surface.size, self.tolerance
+        if tolerance < noise:
+            raise ValueError(
+                f"The tolerance {length(tolerance)} is below the noise {length(noise)}: use a larger one"
+            )
+        for what, value, most in (
+            ("noise", noise, LARGEST_TOLERANCE),
+            ("tolerance", tolerance, LARGEST_TOLERANCE),
+            ("edge length", edge, LONGEST_EDGE),
+        ):
+            if value > most * size:
+                raise ValueError(
+                    f'The {what} {length(value)} is larger than {length(most * size)}, {most:g} of "{name}": '
+                    "use a smaller one"
+                )
+        if tolerance < self.surface.spacing:
+            raise ValueError(
+                f'The tolerance {length(tolerance)} is finer than the coordinates of "{name}", which are '
+                f"{length(self.surface.spacing)} apart in single precision: use a larger one"
+            )
+        if 0.0 < edge < SHORTEST_EDGE * size:
+            raise ValueError(
+                f"The edge length {length(edge)} is smaller than {length(SHORTEST_EDGE * size)}, "
+                f'{SHORTEST_EDGE:g} of "{name}": use a larger one'
+            )
 
     def steps(self):
         """Does all of it; a generator, which yields each few hundredths of a second."""
@@ -64,6 +98,7 @@ class ObjectTouches:
 
     def _started(self):
         """The steps of core and what the first of them said; raises ValueError where none can begin."""
+        why = "no face has an area"
         for point, outward in self._places():
             steps = core.touch_all_over(
                 self.surface,
@@ -78,27 +113,29 @@ class ObjectTouches:
                 return steps, next(steps)
             except ValueError as error:
                 why = error
-        raise ValueError(f"Touching could not begin: choose another location ({why})")
+        raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
 
     def _places(self):
         """Where the touches may begin, and the normal there."""
-        if self._location is not None:
-            at = np.subtract(self._location, self.surface.origin)
-            yield self.surface.project(at)[:2]
+        if self._start is not None:
+            yield self._start
             return
-        candidates = np.flatnonzero(self.surface.has_face)
-        chosen = np.random.default_rng(self.seed).permutation(candidates)[:STARTS]
-        yield from zip(self.surface.points[chosen], self.surface.normals[chosen], strict=True)
+        faces = np.random.default_rng(self.seed).permutation(self.surface.faces)[:STARTS]
+        for middle in self.surface.points[faces].mean(axis=1):  # beside all creases between faces
+            with suppress(ValueError):  # a face of no area
+                yield self.surface.project(middle)[:2]
 
     def _note(self, state):
         self.found += [exploration.result for exploration in state.found]
         self.done, self.uncovered = state.done, state.uncovered
-        self.words = f"{state.done} touches, {state.uncovered} places to go on from"
+        touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
+        self.words, self.share = f"{touches}, {places} to go on from", None
         if state.joining is not None:
-            self.words, self.share = f"Joining {len(self.found)} patches", 0.5 * state.joining
+            self.words = f"Joining {many(len(self.found), 'patch', 'patches')}"
+            self.share = 0.5 * state.joining
 
     def _shown(self):
-        self.words = "Meshing"
+        self.words, self.is_stopped = "Meshing", True
         for share in self.whole.steps(self.edge):
             self.share = 0.5 + 0.4 * share
             yield

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..scene import colors, patch_object, patch_record
+from ..scene import colors, patch_object, patch_record, undo
 from ..scene.mesh_data import emission, fill
 from ..scene.viewports import show_colors
 
@@ -22,6 +22,8 @@ class GrowingPatches:
         obj = bpy.data.objects.new(mesh.name, mesh)
         obj.show_in_front, obj.matrix_world = True, Matrix.Translation(surface.origin)
         scene.collection.objects.link(obj)  # in none of its own, which might be left empty
+        with undo.after_step():  # of which there is one when it ends
+            undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
         self._uid, self._patches = obj.session_uid, []
         show_colors()
@@ -70,7 +72,7 @@ def _fan():
 
 def insert(scene, name, whole, report):
     """Adds the surface of a WholeSurface, of what has that name, to the scene; returns the object."""
-    mesh = bpy.data.meshes.new(f"{name} Touched")
+    mesh = bpy.data.meshes.new(f"{name} {'Touched' if 'touches' in report else 'Joined'}")
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin), True
     patch_object.collection(scene).objects.link(obj)

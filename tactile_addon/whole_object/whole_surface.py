@@ -33,6 +33,8 @@ class WholeSurface:
             except StopIteration as end:
                 self.mesh = end.value
                 break
+        if not len(self.mesh.triangles):
+            raise ValueError("The patches are too small for triangles of that edge length: use a shorter one")
         points, normals = self.mesh.vertices, self.mesh.normals
         self.deviation, parts = np.zeros(len(points)), []
         for start in range(0, len(points), AT_ONCE):

@@ -116,7 +116,9 @@ def test_a_changed_option_version_or_object_is_refused(command, tmp_path):
     before = rows_of(tmp_path / "set")
     code, _, error = command(*words, "--extent", "5%")
     assert code == 2
-    assert error.startswith("cluster: extent: this data set was begun with auto, and it is now 5%: take that")
+    assert error.startswith(
+        "cluster: extent: this data set was begun with auto, and it is now 5%: use the same"
+    )
     manifest = tmp_path / "set" / "manifest.json"
     kept = manifest.read_text()
     manifest.write_text(kept.replace('"scipy": "', '"scipy": "0.'))
@@ -130,7 +132,7 @@ def test_a_changed_option_version_or_object_is_refused(command, tmp_path):
     code, _, error = command(*words)
     assert (
         code == 2
-        and "has changed since this data set was begun, or cannot be read any more: put the old" in error
+        and "has changed since this data set was begun, or can no longer be read: put the old" in error
     )
     assert rows_of(tmp_path / "set") == before
     assert json.loads(manifest.read_text()) == json.loads(kept)
@@ -140,7 +142,7 @@ def test_the_same_object_twice_is_touched_once(command, tmp_path):
     write_ball(tmp_path / "one.ply")
     write_ball(tmp_path / "two.ply")
     code, output, error = command(tmp_path, "--touches", "4", "--output", tmp_path / "set")
-    assert code == 0 and output.startswith("1 objects, 4 touches")
+    assert code == 0 and output.startswith("1 object, 4 touches")
     assert "two.ply) is the same as one (" in error
 
 

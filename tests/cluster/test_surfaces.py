@@ -138,12 +138,12 @@ def test_a_second_run_does_what_is_missing_and_other_options_are_refused(surface
     assert "of 2 blocks are there already" in said.err and said.out.startswith("3 objects, ")
     assert rows_of(surfaces / "set", "surfaces") == before
     assert whole(surfaces, *address, "--seed", "1") == 2
-    assert "seed: this data set was begun with 0, and it is now 1: take that" in capfd.readouterr().err
+    assert "seed: this data set was begun with 0, and it is now 1: use the same" in capfd.readouterr().err
 
 
 def test_touches_are_not_mixed_with_surfaces(command, surfaces):
     code, _, error = command(surfaces / "objects", "--output", surfaces / "set")
-    assert code == 2 and "take that again, or another folder" in error
+    assert code == 2 and "use the same again, or another folder" in error
     assert not (surfaces / "set" / "touches").exists()
 
 

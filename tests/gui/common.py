@@ -196,7 +196,7 @@ def undo():
 SAID = {
     undo: "",
     delete_target: '"Egg" is gone, so touching was stopped',
-    enter_edit_mode: "The touching was stopped, for Object Mode was left",
+    enter_edit_mode: "Touching was stopped because Object Mode was left",
     move_target: "was moved while it was touched: start again",
     change_mesh: "was changed while it was touched: start again",
 }

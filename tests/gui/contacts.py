@@ -7,6 +7,7 @@ keyboard. A drop itself comes from the desktop: here it is the operator that Ble
 pictures are for eyes: drop.png, drop_menu.png and the window at the end.
 """
 
+import math
 import os
 import sys
 from pathlib import Path
@@ -41,6 +42,48 @@ def write_contacts():
     head = ["ply", "format ascii 1.0", f"element vertex {len(rows)}", *(f"property {p}" for p in properties)]
     lines = [*head, "end_header", *(" ".join(row) for row in rows)]
     (FOLDER / "contacts.ply").write_text("\n".join(lines) + "\n")
+
+
+def write_rasters():
+    """Writes the rows of a bump, without normals, as two files; what names them."""
+    for name, rows in (("even.csv", range(0, 17, 2)), ("odd.csv", range(1, 17, 2))):
+        lines = ["curve,x,y,z"]
+        for row in rows:
+            y = row / 8.0 - 1.0
+            for x in (i / 30.0 - 1.0 for i in range(61)):
+                lines.append(f"stroke {row},{x},{y},{0.3 * math.exp(-(x * x + y * y) / 0.3)}")
+        (FOLDER / name).write_text("\n".join(lines) + "\n")
+    return {"directory": str(FOLDER), "files": [{"name": "even.csv"}, {"name": "odd.csv"}], "whole": True}
+
+
+def several_files():
+    """Contacts of one object in two files: the dialog, what it says without the outer side, the surface."""
+    given, before = write_rasters(), data_blocks()
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.import_contacts("INVOKE_DEFAULT", True, filepath=str(FOLDER / "even.csv"), **given)
+    yield 1
+    gui.shot(FOLDER / "join_dialog.png")
+    gui.xdo("key", "Return")
+    yield 2
+    said = "Some contacts have no normals, and nothing tells their outer side: set outward"
+    check("two files without normals ask for the outer side", said in last_report(), last_report())
+    check("... and leave nothing", data_blocks() == before, data_blocks())
+    gui.xdo("key", "Escape", "mousemove", 600, 400)
+    yield 0.5
+    bpy.ops.tactile.import_contacts("EXEC_DEFAULT", True, outward=(0, 0, 1), **given)
+    yield 1
+    surface = next((obj for obj in bpy.data.objects if "tactile_object" in obj), None)
+    if check("... with it they are one surface", surface is not None, last_report()):
+        look(surface.location, (0.4, -1, 0.8), 4.0)
+    gui.sidebar()
+    yield 1
+    gui.sidebar("Tactile")
+    yield 2
+    gui.shot(FOLDER / "join_surface.png")
+    gui.xdo("mousemove", 600, 400, "sleep", 0.2, "key", "ctrl+z")
+    yield 1
+    check("... which one Ctrl Z takes away", data_blocks() == before, data_blocks())
 
 
 def steps():
@@ -81,6 +124,7 @@ def steps():
     check("... and Escape leaves the scene", len(bpy.data.objects) == count, data_blocks())
     gui.xdo("mousemove", 600, 400)
     yield 0.5
+    yield from several_files()
 
 
 gui.play(steps())

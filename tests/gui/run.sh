@@ -65,7 +65,7 @@ GUI_ARGS="$out/scene.blend" step "the verification's checks" \
   $gui shot tests/gui/verify.py "$out/verify.png"
 GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the stability map's checks" \
   $gui shot tests/gui/stability.py "$out/stability.png"
-GUI_TIMEOUT=300 GUI_ARGS="$out/scene.blend" step "the checks of whole objects" \
+GUI_TIMEOUT=600 GUI_ARGS="$out/scene.blend" step "the checks of whole objects" \
   $gui shot tests/gui/whole_object.py "$out/whole_object.png"
 GUI_ARGS="$out/scene.blend" step "the contacts' checks" \
   $gui shot tests/gui/contacts.py "$out/contacts.png"

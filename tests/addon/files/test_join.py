@@ -73,10 +73,11 @@ def joined(bpy, paths, **options):
 
 def test_contacts_of_three_files_become_one_closed_surface(empty, three_files):
     surface, record = joined(empty, three_files, tolerance=0.02)
-    assert surface.name == "part0.csv and 2 more Touched"
+    assert surface.name == "part0.csv and 2 more Joined"
     assert (record["source"], record["contacts"]) == ("part0.csv and 2 more", 3000)
     assert empty.context.view_layer.objects.active == surface
     assert record["is_closed"]
+    assert record["message"] == "The patches reach the tolerance wherever there are contacts."
     assert "deviation_mean" not in record
     place = np.array(surface.matrix_world)[:3, 3]
     off = np.linalg.norm(positions(surface.data) + place - CENTER, axis=1) - RADIUS
@@ -104,6 +105,7 @@ def test_where_no_normals_were_measured_the_outer_side_is_asked_for(empty, two_h
     for outward, flip in (((0, 0, 1), False), ((0, 0, -1), True)):
         surface, record = joined(empty, two_halves, outward=outward, flip=flip, tolerance=4e-3)
         assert not record["is_closed"]
+        assert record["message"].endswith("wherever there are contacts.") is (record["status"] == "ok")
         normals = np.empty(3 * len(surface.data.vertices), dtype=np.float32)
         surface.data.vertices.foreach_get("normal", normals)
         assert (normals.reshape(-1, 3)[:, 2] > 0.2).all()

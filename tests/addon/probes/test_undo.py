@@ -6,6 +6,8 @@ There an operator's step of undo is stored before any handler sees what it has d
 stores the step itself.
 """
 
+from types import SimpleNamespace
+
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
@@ -102,7 +104,8 @@ def test_undo_leaves_a_patch_where_it_was_that_a_handler_had_made_before_the_ste
     by_hand(empty, empty.ops.object.delete)
     rest(empty)
     in_panel(empty, probe, "rotation_euler", (0.1, 0.2, 0.3))
-    empty.ops.ed.undo_push(message="stored")
+    rest(empty)
+    rest(empty)
     in_panel(empty, "Sphere", "show_name", True)
     step(empty, "undo")
     patch = empty.data.objects["Sphere Patch"]
@@ -158,3 +161,15 @@ def test_undo_of_a_deleted_target_gives_others_back_what_they_had_of_it(empty, e
     assert empty.data.objects["Child"].parent == ball
     assert empty.data.objects["Wrapped"].modifiers["Wrap"].target == ball
     assert settings_of(empty, probe).target == ball
+
+
+def test_undo_leaves_no_pointer_to_patches_that_are_still_growing(empty, extension, probe):
+    rest(empty)
+    rest(empty)
+    patches = extension.tactile_addon.whole_object.whole_mesh.GrowingPatches
+    growing = patches(empty.context.scene, SimpleNamespace(name="Sphere", origin=(0.0, 0.0, 0.0)))
+    assert "Sphere Touches" in empty.data.objects
+    empty.ops.ed.undo()
+    assert pointers(empty)
+    assert "Sphere Touches" not in empty.data.objects
+    growing.remove()

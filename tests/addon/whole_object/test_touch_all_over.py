@@ -53,6 +53,16 @@ def test_colors_show_what_is_chosen(empty, ball):
             "The tolerance 1 cm is below the noise",
         ),
         ({"edge": float("nan")}, "The edge is a length of 0 or more, got"),
+        ({"tolerance": 1.0}, 'The tolerance 1 m is larger than 0.4 m, 0.1 of "Sphere": use a smaller one'),
+        ({"noise": 1.0}, "The noise 1 m is larger than"),
+        ({"edge": 5.0}, "The edge length 5 m is larger than 2 m"),
+        ({"edge": 1e-3}, 'The edge length 1 mm is smaller than 4 mm, 0.001 of "Sphere": use a larger one'),
+        (
+            {"tolerance": 1e-9},
+            r"The tolerance .* is finer than the coordinates of .* apart in single precision",
+        ),
+        ({"location": (50.0, 0.0, 0.0)}, r'The location is 48 m away from "Sphere", farther than 0\.5 m'),
+        ({"location": (float("nan"), 0.0, 0.0)}, "The location has coordinates that are not finite"),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_is_left(empty, ball, inputs, message):
@@ -69,12 +79,62 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball):
     assert record["uncovered"] > 0
 
 
-def test_nothing_begins_at_the_corners_of_a_sheet(empty):
-    empty.ops.mesh.primitive_plane_add(size=2.0)
+def faces_of(bpy, vertices, faces):
+    """An active object of these."""
+    mesh = bpy.data.meshes.new("Faces")
+    mesh.from_pydata(vertices, [], faces)
+    obj = bpy.data.objects.new("Faces", mesh)
+    bpy.context.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    bpy.context.view_layer.update()
+    return obj
+
+
+def test_nothing_begins_where_no_face_has_an_area(empty):
+    faces_of(empty, [(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)])
     before = datablocks(empty)
-    with pytest.raises(RuntimeError, match="Touching could not begin: choose another location"):
-        empty.ops.tactile.touch_all_over(tolerance=1e-3)  # it has no other vertices
+    message = r"Touching could not begin: choose another location or tolerance \(no face has an area\)"
+    with pytest.raises(RuntimeError, match=message):
+        empty.ops.tactile.touch_all_over(tolerance=1e-3)
     assert datablocks(empty) == before
+
+
+@pytest.mark.parametrize("shape", ["cube", "plane"])
+def test_faces_without_vertices_inside_are_begun_in_their_middle(empty, shape):
+    getattr(empty.ops.mesh, f"primitive_{shape}_add")(size=2.0)
+    assert touched(empty, most=5)[1]["patches"] >= 4
+
+
+def test_what_is_loose_is_no_part_of_the_object(empty, ball):
+    ball.data.vertices.add(1)
+    ball.data.vertices[-1].co = (1e3, 0.0, 0.0)
+    ball.data.update()
+    assert touched(empty, most=2)[1]["size"] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("scale", [(-1.0, 1.0, 1.0), (1.0, 2.0, 3.0), (1e-5, 1e-5, 1e-5), (1e5, 1e5, 1e5)])
+def test_a_scaled_object_is_touched_as_it_is(empty, ball, scale):
+    ball.scale = scale
+    ball.rotation_euler = (0.4, 0.5, 0.6)
+    empty.context.view_layer.update()
+    surface, record = touched(empty, tolerance=5e-3 * max(np.abs(scale)))
+    assert record["is_closed"]
+    inverse = np.linalg.inv(np.array(ball.matrix_world))[:3, :3]
+    assert np.linalg.norm(positions(surface.data) @ inverse.T, axis=1) == pytest.approx(2.0, abs=0.03)
+    corners = positions(surface.data)[np.array([p.vertices for p in surface.data.polygons])]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.einsum("ni,ni->n", normals, corners.mean(axis=1)) > 0.0).all()
+
+
+def test_modifiers_and_the_active_of_several_count(empty, ball):
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=1.0, location=(9, 0, 0))
+    other = empty.context.object
+    other.modifiers.new("Displace", "DISPLACE").strength = 0.5
+    ball.select_set(True)
+    surface, record = touched(empty, tolerance=0.01)
+    assert record["source"] == other.name
+    assert tuple(surface.location) == (9.0, 0.0, 0.0)
+    assert np.linalg.norm(positions(surface.data), axis=1) == pytest.approx(1.25, abs=0.03)
 
 
 def test_a_probe_or_a_place_says_where_to_begin(empty, ball):

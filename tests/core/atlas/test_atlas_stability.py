@@ -61,6 +61,42 @@ def test_a_tenth_of_outlying_contacts_is_ignored():
     assert np.median(np.abs(off)) < 4e-3
 
 
+class BadNormals:
+    """Normals are off by a fifth of a radian."""
+
+    def __init__(self, solid):
+        self.solid, self.rng = solid, np.random.default_rng(0)
+
+    def ray_cast(self, origin, direction, distance):
+        hit = self.solid.ray_cast(origin, direction, distance)
+        if hit is None:
+            return None
+        normal = np.add(hit[1], self.rng.normal(0.0, 0.14, 3))
+        return hit[0], tuple(normal / np.linalg.norm(normal))
+
+
+def test_bad_normals_are_found_to_be_bad():
+    solid = solids.ball()
+    atlas = core.explore_object(
+        BadNormals(solid), solid.start, solid.outward, tolerance=8e-3, noise=1e-3, rng=0
+    )
+    mesh = atlas.mesh(0.15)
+    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).mean() < 1e-3
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+
+
+def test_of_two_shells_the_outer_one_is_felt_and_closed():
+    def distance(x, y, z):
+        out = math.hypot(x, y, z)
+        return max(out - 1.0, 0.8 - out)
+
+    solid = solids.Solid(distance, (0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+    atlas = explored(solid)
+    mesh = atlas.mesh(0.15)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).max() < 0.02
+
+
 def test_both_sides_of_a_wall_stay_apart():
     solid = solids.block(1.0, 0.8, 0.05)
     atlas = explored(solid, tolerance=4e-3, most=150)

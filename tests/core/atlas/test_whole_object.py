@@ -28,7 +28,7 @@ def ring():
 
 @pytest.fixture(scope="module")
 def block():
-    return explored(solids.block())
+    return explored(solids.block(), tolerance=2e-2)
 
 
 def test_a_ball_is_closed_and_as_near_as_asked(ball):
@@ -68,6 +68,26 @@ def test_edges_join_neighbors_along_curves_on_the_surface(ball):
     curves = np.vstack([edge.curve for edge in ball.edges])
     assert np.abs(np.linalg.norm(curves, axis=1) - 1.0).mean() < 1e-3
     assert np.degrees(np.mean(np.concatenate([edge.angle for edge in ball.edges]))) < 1.0
+
+
+def test_neighbors_agree_on_normals_and_bends_where_they_meet(ring):
+    assert np.degrees(np.mean(np.concatenate([edge.angle for edge in ring.edges]))) < 0.5
+    bends, charts = [], ring.charts
+    for edge in ring.edges:
+        for node in edge.nodes:
+            each = np.full(len(edge.curve), node)
+            x, y, _ = charts.local(edge.curve, np.arange(len(each)), each).T
+            bends.append(charts.curvatures(x, y, each)[0])
+    one, other = np.concatenate(bends[::2]), np.concatenate(bends[1::2])
+    assert np.abs(one - other).mean() < 0.2 * np.ptp(one)
+
+
+def test_patches_are_as_certain_as_asked(ball, ring):
+    for atlas in (ball, ring):
+        assert atlas.charts.mean_stds.max() <= atlas.tolerance
+        assert [
+            node["mean_height_std"] for node in atlas.to_dict()["nodes"]
+        ] == atlas.charts.mean_stds.tolist()
 
 
 def test_a_torus_has_one_handle(ring):
@@ -212,3 +232,19 @@ def test_edges_in_steps_are_the_edges(block):
     assert again.edges is again.edges
     assert [e.nodes for e in again.edges] == [e.nodes for e in block.edges]
     assert list(again.bounding()) == []
+
+
+@pytest.mark.parametrize("answer", [None, False])
+def test_false_while_patches_are_joined_ends_the_touching(answer):
+    """Without it, patches that are less certain than the tolerance are touched again."""
+    solid, joining = solids.ring(), []
+    steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=8e-3, noise=8e-3, rng=0)
+    state = next(steps)
+    try:
+        while True:
+            joining.append(state.joining is not None)
+            state = steps.send(answer if joining[-1] else None)
+    except StopIteration as end:
+        assert len(end.value.patches) > 30
+    since = joining[joining.index(True) :]
+    assert all(since) is (answer is False)

@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Smoothing splines: what they reproduce, what outlying contacts and wrong normals do, their deviations."""
+
+import numpy as np
+import pytest
+
+from core.patch.smoothing_spline import SIDE, bases, smoothing_spline
+
+HALF = 1.3
+
+
+def wavy(x, y):
+    """Heights and slopes of a surface that no quadric is."""
+    z = 0.2 * x**2 - 0.1 * x * y + 0.1 * np.sin(2.0 * x + y)
+    slope = 0.2 * np.cos(2.0 * x + y)
+    return z, 0.4 * x - 0.1 * y + slope, -0.1 * x + 0.5 * slope
+
+
+def touched(height, rng, count=300, noise=0.0, turned=0.0):
+    """Contacts and normals of a height field in the unit disk."""
+    angle, out = rng.uniform(0.0, 2.0 * np.pi, count), np.sqrt(rng.uniform(0.0, 1.0, count))
+    x, y = out * np.cos(angle), out * np.sin(angle)
+    z, zx, zy = height(x, y)
+    normals = np.column_stack([-zx, -zy, np.ones(count)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals += rng.normal(0.0, 1.0, (count, 3)) * turned
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.column_stack([x, y, z + rng.normal(0.0, 1.0, count) * noise]), normals
+
+
+def fitted(contacts, normals, noise=5e-4):
+    return smoothing_spline(contacts, normals, np.ones(len(contacts)), HALF, noise)
+
+
+def misses(spline, height, rng):
+    """What the spline is off, and the deviations of the nearest knots."""
+    x, y, _ = touched(height, rng, 200)[0].T
+    off = bases(x, y, HALF)[0] @ spline.coefficients.ravel() - height(x, y)[0]
+    knots = np.rint((np.array([x, y]) / HALF + 1.0) * 0.5 * (SIDE - 1)).astype(int)
+    return off, spline.stds[knots[0], knots[1]]
+
+
+def test_a_quadric_is_reproduced():
+    def height(x, y):
+        return 0.3 * x**2 - 0.2 * x * y + 0.1 * y + 0.05, 0.6 * x - 0.2 * y, 0.1 - 0.2 * x
+
+    rng = np.random.default_rng(0)
+    off, _ = misses(fitted(*touched(height, rng)), height, rng)
+    assert np.abs(off).max() < 1e-5
+
+
+def test_slopes_are_those_of_the_heights():
+    rng = np.random.default_rng(1)
+    coefficients, step = rng.normal(size=SIDE**2), 1e-5
+    x, y = rng.uniform(-1.0, 1.0, (2, 50))
+    _, along_x, along_y = (basis @ coefficients for basis in bases(x, y, HALF))
+
+    def height(x, y):
+        return bases(x, y, HALF)[0] @ coefficients
+
+    expected = (height(x + step, y) - height(x - step, y)) / (2.0 * step)
+    assert along_x == pytest.approx(expected, abs=1e-6)
+    expected = (height(x, y + step) - height(x, y - step)) / (2.0 * step)
+    assert along_y == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_tenth_of_outlying_contacts_is_ignored():
+    rng = np.random.default_rng(2)
+    contacts, normals = touched(wavy, rng, noise=1e-3)
+    clean, _ = misses(fitted(contacts, normals, 1e-3), wavy, np.random.default_rng(3))
+    contacts[::10, 2] += 0.2
+    off, _ = misses(fitted(contacts, normals, 1e-3), wavy, np.random.default_rng(3))
+    assert np.abs(off).mean() < 1.5 * np.abs(clean).mean()
+
+
+def test_normals_help_as_far_as_they_are_true():
+    def error(turned):
+        rng = np.random.default_rng(4)
+        contacts, normals = touched(wavy, rng, 100, 3e-3, turned)
+        return np.abs(misses(fitted(contacts, normals, 3e-3), wavy, rng)[0]).mean()
+
+    exact, worse, none = error(0.0), error(0.05), error(3.0)
+    assert exact < 0.6 * none
+    assert exact < worse < none
+
+
+@pytest.mark.parametrize("given", [3e-3, 1e-3])
+def test_deviations_are_true_even_if_noise_is_said_to_be_less(given):
+    scores = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        spline = fitted(*touched(wavy, rng, 150, 3e-3, 0.05), given)
+        off, stds = misses(spline, wavy, rng)
+        scores.append(np.mean(np.abs(off) <= 1.645 * stds))
+    assert 0.8 <= np.mean(scores) <= 0.99
