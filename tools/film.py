@@ -20,7 +20,7 @@ STROKES, TURNS = 7, 15  # pictures a curve, and pictures of the turn
 SHORT, LONG = 90, 1500  # milliseconds
 CAPTIONS = (
     "A finger slides along three curves",
-    "The patch from these curves alone, by Gaussian curvature",
+    "From them alone: the patch, by Gaussian curvature",
     "Turn the planes, and the patch follows",
 )
 CURVE, FINGER = (0.02, 0.02, 0.02, 1.0), (0.9, 0.35, 0.02, 1.0)

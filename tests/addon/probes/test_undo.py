@@ -104,7 +104,8 @@ def test_undo_leaves_a_patch_where_it_was_that_a_handler_had_made_before_the_ste
     by_hand(empty, empty.ops.object.delete)
     rest(empty)
     in_panel(empty, probe, "rotation_euler", (0.1, 0.2, 0.3))
-    empty.ops.ed.undo_push(message="stored")
+    rest(empty)
+    rest(empty)
     in_panel(empty, "Sphere", "show_name", True)
     step(empty, "undo")
     patch = empty.data.objects["Sphere Patch"]

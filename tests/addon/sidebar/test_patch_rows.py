@@ -197,22 +197,42 @@ def test_a_value_that_has_no_room_beside_its_label_stands_below_it(extension, wi
     assert [text for text, _ in layout.drawn] == ["Shape Index", "0.57", *line]
 
 
-def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty, ball):
-    probe, _ = ball
-    assert empty.ops.tactile.verify() == {"FINISHED"}
-    probe.tactile_probe.live = False
+def drawn_of(bpy, extension, obj):
+    """What the panel of the result draws of an object: (text, whether it is drawn as usual)."""
     context = SimpleNamespace(
-        view_layer=empty.context.view_layer,
-        scene=empty.context.scene,
+        view_layer=bpy.context.view_layer,
+        scene=bpy.context.scene,
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
         region=SimpleNamespace(width=300),
         space_data=SimpleNamespace(shading=SimpleNamespace(type="MATERIAL")),
     )
+    layout = Layout()
+    extension.tactile_addon.sidebar.panel.TACTILE_PT_result.draw_active(None, context, layout, obj)
+    return layout.drawn
+
+
+def test_what_a_registration_has_found_stays_in_the_panel(extension, empty):
+    empty.ops.mesh.primitive_monkey_add()
+    empty.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 3
+    empty.context.view_layer.update()
+    place = {"location": (0.0, -0.7, 0.5), "extent": 0.4}
+    assert empty.ops.tactile.reconstruct(target="Suzanne", **place) == {"FINISHED"}
+    patch = empty.context.object
+    assert not any("root mean square" in text for text, _ in drawn_of(empty, extension, patch))
+    patch.location.x += 3.0
+    empty.context.view_layer.update()
+    assert empty.ops.tactile.register(target="Suzanne") == {"FINISHED"}
+    words = " ".join(text for text, _ in drawn_of(empty, extension, patch))
+    assert '"Suzanne" (root mean square)' in words
+
+
+def test_the_numbers_of_an_earlier_touch_are_gray_below_a_title(extension, empty, ball):
+    probe, _ = ball
+    assert empty.ops.tactile.verify() == {"FINISHED"}
+    probe.tactile_probe.live = False
 
     def drawn():
-        layout = Layout()
-        extension.tactile_addon.sidebar.panel.TACTILE_PT_result.draw_active(None, context, layout, probe)
-        return layout.drawn
+        return drawn_of(empty, extension, probe)
 
     numbers = ("κ1", "κ2", "Height", "Curvedness", "Overlap")
     assert "Last Touch" not in dict(drawn())
