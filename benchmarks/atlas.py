@@ -33,6 +33,7 @@ SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
 NOISE, COMPARED, POINTS, MOST = 0.0005, 0.001, 2500, 1500
 EDGE = 0.01
+FINE = 0.0002  # tolerance and noise at which 1000 touches are not enough
 BLURRED = np.radians(10.0)  # deviation of normals
 
 
@@ -293,7 +294,7 @@ def print_memory():
         thing = Scanned("lemon")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     atlas = core.explore_object(
-        thing, thing.start, thing.outward, tolerance=NOISE, noise=NOISE, most=1000, rng=0
+        thing, thing.start, thing.outward, tolerance=FINE, noise=FINE, most=1000, rng=0
     )
     atlas.mesh(EDGE)
     took = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
@@ -305,7 +306,7 @@ def draw(numbers):
     import matplotlib
 
     matplotlib.use("agg")
-    from matplotlib import pyplot
+    from matplotlib import pyplot, ticker
 
     figure, axes = pyplot.subplots(1, 2, figsize=(10, 4.2), sharey=True, layout="constrained")
     for name in dict.fromkeys(n[0] for n in numbers):
@@ -317,6 +318,10 @@ def draw(numbers):
     axes[0].legend(frameon=False)
     for axis in axes:
         axis.grid(alpha=0.3, which="both")
+        for ticks in (axis.xaxis, axis.yaxis):
+            ticks.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+            ticks.set_major_formatter("{x:g}")
+            ticks.set_minor_formatter(ticker.NullFormatter())
     figure.suptitle("Whole objects: how near, by touches and by time", weight="bold")
     folder = ROOT / "build" / "charts"
     folder.mkdir(parents=True, exist_ok=True)
