@@ -123,10 +123,10 @@ def agreeing(atlas):
         angles += edge.angle.tolist()
         bends, variance = [], 0.0
         for node in edge.nodes:
-            each = np.full(len(edge.curve), node)
-            x, y, _ = atlas.charts.local(edge.curve, np.arange(len(each)), each).T
-            bends.append(atlas.charts.curvatures(x, y, each)[0])
-            variance += atlas.patches[node].gaussian_curvature_std ** 2
+            r = atlas.patches[node]
+            x, y, _ = ((edge.curve - r.frame.origin) @ r.frame.axes).T
+            bends.append(r.patch.derivatives(x, y).gaussian_curvature)
+            variance += r.gaussian_curvature_std**2
         alike += (np.abs(bends[0] - bends[1]) <= 1.645 * np.sqrt(variance)).tolist()
     return np.degrees(np.mean(angles or [0.0])), np.mean(alike or [1.0])
 

@@ -7,7 +7,7 @@ cubic B-spline, which is C2 and off the patch by less than the residual's own gr
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector
-from ..patch.differential_geometry import Derivatives
 from ..patch.smoothing_spline import SIDE, weights_at
 
 MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
@@ -136,33 +135,23 @@ class Charts:
 
     def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
         """Heights, slopes and deviations (m,) at local (x, y)."""
-        h, hx, hy = self._derivatives(x, y, node, ((0, 0), (1, 0), (0, 1)))
         pitch = 2.0 * self.halves[node] / (SIDE - 1)
-        nearest = np.clip(np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp), 0, SIDE - 1)
-        return h, hx, hy, self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]]
-
-    def _derivatives(
-        self, x: Array, y: Array, node: NDArray[np.intp], orders: Sequence[tuple[int, int]]
-    ) -> list[Array]:
-        """Derivatives (m,) of the heights at local (x, y), of each of the orders in x and y."""
-        pitch = 2.0 * self.halves[node] / (SIDE - 1)
-        (column, *by_x), (row, *by_y) = weights_at(x / pitch), weights_at(y / pitch)
-        found, flat = [np.zeros(len(x)) for _ in orders], self.heights.reshape(-1)
-        start = (node * SIDE + column - 1) * SIDE + row - 1
+        (column, by_x, slopes_x), (row, by_y, slopes_y) = weights_at(x / pitch), weights_at(y / pitch)
+        start, flat = (node * SIDE + column - 1) * SIDE + row - 1, self.heights.reshape(-1)
+        h, hx, hy = np.zeros((3, len(x)))
         for i in range(4):
             taps = flat[start[:, None] + (i * SIDE + np.arange(4))]
-            across = [np.einsum("mk,mk->m", taps, by_y[k]) for k in range(max(j for _, j in orders) + 1)]
-            for total, (along, beside) in zip(found, orders, strict=True):
-                total += by_x[along][:, i] * across[beside]
-        return [
-            total / pitch ** (along + beside) for total, (along, beside) in zip(found, orders, strict=True)
-        ]
-
-    def curvatures(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Gaussian and mean curvature (m,) of patches above local (x, y), in 1/length^2 and 1/length."""
-        orders = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)
-        d = Derivatives(np.zeros_like(x), *self._derivatives(x, y, node, orders))
-        return d.gaussian_curvature / self.radii[node] ** 2, d.mean_curvature / self.radii[node]
+            across = np.einsum("mk,mk->m", taps, by_y)
+            h += by_x[:, i] * across
+            hx += slopes_x[:, i] * across
+            hy += by_x[:, i] * np.einsum("mk,mk->m", taps, slopes_y)
+        nearest = np.clip(np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp), 0, SIDE - 1)
+        return (
+            h,
+            hx / pitch,
+            hy / pitch,
+            self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]],
+        )
 
     @cached_property
     def mean_stds(self) -> Array:

@@ -170,23 +170,22 @@ def bases(x: Array, y: Array, half: float) -> list[Any]:
     ]
 
 
-def weights_at(at: Array) -> tuple[Any, Array, Array, Array]:
+def weights_at(at: Array) -> tuple[Any, Array, Array]:
     """The knot before places (m,) in steps from the middle; weights (m, 4) of four knots and their slopes."""
     at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - ROUNDING)
     knot = at.astype(np.intp)
     powers = np.vander(at - knot, 4, increasing=True)
-    values, slopes, bends = _tables()
-    return knot, powers @ values, powers[:, :3] @ slopes, powers[:, :2] @ bends
+    values, slopes = _tables()
+    return knot, powers @ values, powers[:, :3] @ slopes
 
 
 @cache
-def _tables() -> tuple[Array, Array, Array]:
+def _tables() -> tuple[Array, Array]:
     values = (
         np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]])
         / 6.0
     )
-    slopes = values[1:] * np.array([[1.0], [2.0], [3.0]])
-    return values, slopes, slopes[1:] * np.array([[1.0], [2.0]])
+    return values, values[1:] * np.array([[1.0], [2.0], [3.0]])
 
 
 @cache
