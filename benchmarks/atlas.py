@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whole objects: how far the surface of all touches is off, after how many touches and seconds, beside peers.
 
-`python -m benchmarks.atlas [--only NAME] [--finest T] [--no-peers]`, from the root of a checkout; bpy to read
+`python -m benchmarks.atlas [--only NAME] [--finest T] [--peers NAME]`, from the root of a checkout; bpy to read
 the scans and to cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a noise of .0005.
 Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the
 object from the mesh, what share of these the field's 90 % interval holds, the angle of normals across edges
@@ -267,10 +267,12 @@ def elsewhere(thing, which, where, tolerance):
     return [thing.name, where, str(len(found)), f"{100 * covered:.1f}", three(off), f"{seconds:.1f}"]
 
 
-def compared(thing, found, cells, tolerance):
-    """Lines of the second table and of the third."""
+def compared(thing, found, cells, tolerance, some):
+    """Lines of the second table and of the third; with some peers only, none of bad normals and other places."""
     others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]]
-    others += peers(thing, found)
+    others += peers(thing, found, some)
+    if some:
+        return others, []
     badly = Blurred(thing)
     cells, _, again = row(badly, tolerance)
     others.append(
@@ -332,7 +334,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", default="", help="objects with this in their names")
     parser.add_argument("--finest", type=float, default=min(TOLERANCES), help="tolerance (%(default)s)")
-    parser.add_argument("--no-peers", action="store_true", help="nor random places")
+    parser.add_argument("--peers", default="", help="those with that in their names, and no other places")
     parser.add_argument("--memory", action="store_true", help="of 1000 touches, and no more")
     options = parser.parse_args()
     if options.memory:
@@ -347,14 +349,14 @@ def main():
             cells, number, found = row(thing, tolerance)
             rows.append(cells)
             numbers.append(number)
-            if tolerance == COMPARED and not options.no_peers:
-                lines = compared(thing, found, cells, tolerance)
+            if tolerance == COMPARED:
+                lines = compared(thing, found, cells, tolerance, options.peers)
                 others += lines[0]
                 random += lines[1]
     head = "object|tolerance|touches|contacts|s touch, join|s mesh|% covered|mean / median / 95 %|within 90 %"
     table([*head.split("|"), "angle at edges", "K alike", "open edges / Euler / pieces"], rows)
-    if others:
-        table(["object", "method", "setting", "mean / median / 95 %", "s"], others, left=3)
+    table(["object", "method", "setting", "mean / median / 95 %", "s"], others, left=3)
+    if random:
         table(["object", "places", "touches", "% covered", "mean / median / 95 %", "s touch"], random, left=2)
     draw(numbers)
     print(f"Lengths in permille of the size; CPU seconds, {machine('bpy', 'numpy', 'scipy')}.")

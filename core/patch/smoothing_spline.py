@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import Array
 
 SIDE = 21  # knots along each axis, evenly spaced over [-half, half]
-ROUGHNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # sizes of third derivatives
+ROUGHNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # sizes of third derivatives
 NOISES = (1.0, 2.0, 4.0, 8.0)  # times the least noise
 SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # of normals: facets have some of that
 FIRST = 3, 0, 2  # of each of these
