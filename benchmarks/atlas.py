@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whole objects: how far the surface of all touches is off, after how many touches and seconds, beside peers.
 
-`python -m benchmarks.atlas [--only NAME] [--finest T] [--peers NAME]`, from the root of a checkout; bpy to read
-the scans and to cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a noise of .0005.
+`python -m benchmarks.atlas [--only NAME] [--finest T] [--peers NAME]`, from the root of a checkout; bpy to
+read the scans and cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a noise of .0005.
 Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the
 object from the mesh, what share of these the field's 90 % interval holds, the angle of normals across edges
 and the share of their points where K is alike within 90 %, and what the mesh is; (b) peers on the contacts of
@@ -268,7 +268,7 @@ def elsewhere(thing, which, where, tolerance):
 
 
 def compared(thing, found, cells, tolerance, some):
-    """Lines of the second table and of the third; with some peers only, none of bad normals and other places."""
+    """Lines of the second table and of the third; with some peers only, just those of the objects as they are."""
     others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]]
     others += peers(thing, found, some)
     if some:
