@@ -268,7 +268,7 @@ def elsewhere(thing, which, where, tolerance):
 
 
 def compared(thing, found, cells, tolerance, some):
-    """Lines of the second table and of the third; with some peers only, just those of the objects as they are."""
+    """Lines of the second table and of the third; with some peers only, those of the object as it is."""
     others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]]
     others += peers(thing, found, some)
     if some:
