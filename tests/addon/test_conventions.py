@@ -3,6 +3,7 @@
 """What users of Blender expect of extensions: tooltips, reasons, units, a manual, a tab of their choice."""
 
 import re
+import tomllib
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -67,7 +68,22 @@ def test_what_cannot_run_says_why(empty):
     empty.context.view_layer.objects.active = empty.data.objects["Sphere"]
     empty.ops.object.mode_set(mode="EDIT")
     assert refused("pick") == "Points are picked in Object Mode: leave this mode first"
+    window = empty.context.window_manager.windows[0]
+    view = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    with empty.context.temp_override(window=window, area=view):
+        assert refused("reconstruct") == "Patches are fitted in Object Mode: leave this mode first"
+        assert refused("import_contacts") == "Contacts are imported in Object Mode: leave this mode first"
     empty.ops.object.mode_set(mode="OBJECT")
+    empty.ops.object.camera_add()
+    with empty.context.temp_override(window=window, area=view):
+        assert refused("reconstruct") == "Select the mesh object to touch"
+
+
+def test_the_manifest_names_whose_work_ships_and_what_it_is_for(extension, empty):
+    text = (Path(extension.__file__).parent / "blender_manifest.toml").read_text(encoding="utf-8")
+    manifest = tomllib.loads(text)
+    assert "2003 SciPy Developers" in manifest["copyright"]  # scipy is in the wheels
+    assert "Import-Export" in manifest["tags"]
 
 
 def test_online_manual_opens_the_page_that_comes_along_at_the_place(extension, empty):
