@@ -179,7 +179,7 @@ class Atlas:
         K and H are means over the polynomials (1) of the touches there, each with its patch's weight in the
         blended surface; the others follow from these. Where there is no patch, all are 0.
 
-        On faceted balls and tori they are 1.7 to 4 times as near to the truth as those of the joined patches.
+        Joined patches follow facets: their second derivatives are rougher than the polynomials'.
         """
         gauss, mean = _blended_curvatures(self, points, normals)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # of the difference of kappa1 and kappa2
