@@ -19,6 +19,7 @@ from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .field import blended
 
+# python -m benchmarks.atlas chose these.
 FACING = 0.75  # cosine of the angle between a contact's normal and the patch's there, at least
 LIKELY = 2.0  # deviations of a patch, as many as a contact is off it at most that weighs 1
 BEYOND = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain

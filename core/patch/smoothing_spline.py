@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arguments import Array
 
+# python -m benchmarks.atlas chose these.
 SIDE = 21  # knots along each axis, evenly spaced over [-half, half]
 ROUGHNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # sizes of third derivatives
 NOISES = (1.0, 2.0, 4.0, 8.0)  # times the least noise
@@ -117,7 +118,7 @@ def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solutio
 
 
 def _equations(bases: list[Any], weights: Array, values: Array) -> _Equations:
-    """Of bases (n, SIDE^2) with the columns of values (n, k)."""
+    """The least squares of the bases (n, SIDE^2) times coefficients to the columns of values (n, k)."""
     matrix = sum(basis.T @ basis.multiply(weights[:, None]) for basis in bases)
     right = sum(basis.T @ (weights * column) for basis, column in zip(bases, values.T, strict=True))
     square = float(weights @ (values**2).sum(axis=1))
@@ -125,7 +126,7 @@ def _equations(bases: list[Any], weights: Array, values: Array) -> _Equations:
 
 
 def _student(misses: Array, std: float) -> Array:
-    """Weights of what is off by so much."""
+    """The weights of contacts that are off by so much."""
     ratios = misses / max(std, 1.4826 * float(np.median(misses)))
     return np.where(ratios > OUTLYING, (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
 
