@@ -121,17 +121,11 @@ class Frontier:
     def uncovered(self) -> list[Place]:
         """Places where a touch would bring something, but there was none, or it brought nothing."""
         self._forget_covered()
-        return [place for _, _, place in sorted(self.queue)] + self._still_open(self.left)
-
-    def _still_open(self, places: list[Place]) -> list[Place]:
-        """Those of places that no patch has come to cover."""
-        points, normals = (np.array([getattr(p, name) for p in places]) for name in ("point", "normal"))
-        covered = self.is_covered(points.reshape(-1, 3), normals.reshape(-1, 3)).tolist()
-        return [place for place, gone in zip(places, covered, strict=True) if not gone]
+        return [place for _, _, place in sorted(self.queue)] + still_open(self.left, self.charts)
 
     def _forget_covered(self) -> None:
         """Places that patches have come to cover, all at once."""
-        still = {id(place) for place in self._still_open([place for _, _, place in self.queue])}
+        still = {id(place) for place in still_open([place for _, _, place in self.queue], self.charts)}
         self.queue = [entry for entry in self.queue if id(entry[2]) in still]
         heapq.heapify(self.queue)
 
@@ -216,6 +210,14 @@ def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
     on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
     found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
     return found
+
+
+def still_open(places: Sequence[Place], charts: Charts | None) -> list[Place]:
+    """Those of places that no patch covers."""
+    if charts is None or not places:
+        return list(places)
+    points, normals = (np.array([getattr(p, name) for p in places]) for name in ("point", "normal"))
+    return [place for place, gone in zip(places, covered(charts, points, normals), strict=True) if not gone]
 
 
 def side_of(surface: Surface, point: Array, outward: Array, reach: float) -> float:

@@ -15,7 +15,7 @@ from ..exploration.one_touch import Exploration
 from ..exploration.side_by_side import exploring
 from ..exploration.touches import explore
 from .charts import Charts
-from .frontier import Frontier, covered, side_of
+from .frontier import Frontier, covered, side_of, still_open
 from .join import Table, joined
 from .object_atlas import Atlas
 
@@ -166,8 +166,9 @@ def _joined(run: _Run, more: bool) -> Steps:
         more = yield from _all_over(run, more)
     gone = [i for i, contact in zip(rough, missing, strict=True) if contact is None]
     kept = np.setdiff1d(np.arange(len(run.found)), gone)
-    patches = tuple(run.found[i].result for i in kept)
-    return Atlas(patches, charts.chosen(kept), run.tolerance, uncovered)
+    patches, charts = tuple(run.found[i].result for i in kept), charts.chosen(kept)
+    # Patches alone may be off at their rims by so much that others seem not to cover them.
+    return Atlas(patches, charts, run.tolerance, tuple(still_open(uncovered, charts)))
 
 
 def _charts(

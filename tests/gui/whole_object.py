@@ -243,7 +243,7 @@ def steps():
     yield from by_click()
     yield from by_escape()
     yield from while_it_is_meshed()
-    yield from disturbed("whole", start, is_clean, surfaces, tolerance=5e-4)
+    yield from disturbed("whole", start, is_clean, surfaces, tolerance=7e-4)
     yield from afterwards()
 
 
