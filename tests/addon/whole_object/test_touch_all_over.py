@@ -117,7 +117,7 @@ def test_a_scaled_object_is_touched_as_it_is(empty, ball, scale):
     ball.scale = scale
     ball.rotation_euler = (0.4, 0.5, 0.6)
     empty.context.view_layer.update()
-    surface, record = touched(empty, tolerance=5e-3 * max(np.abs(scale)))
+    surface, record = touched(empty, tolerance=2.5e-3 * max(np.abs(scale)))
     assert record["is_closed"]
     inverse = np.linalg.inv(np.array(ball.matrix_world))[:3, :3]
     assert np.linalg.norm(positions(surface.data) @ inverse.T, axis=1) == pytest.approx(2.0, abs=0.03)
