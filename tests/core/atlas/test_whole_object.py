@@ -11,7 +11,6 @@ import pytest
 import core
 from tests import solids
 
-
 RING = solids.ring(small=0.5)
 
 

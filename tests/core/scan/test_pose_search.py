@@ -83,7 +83,7 @@ def off(pose, r, point, turn=TURN):
 
 
 def test_contours_are_found_on_a_shape_without_symmetry():
-    surface, vertices, faces = bumpy()
+    surface, _, _ = bumpy()
     r, poses = touch(surface), bumpy_poses()
     place, angle = off(poses[0], r, surface.point)
     assert place < 0.05
