@@ -86,6 +86,7 @@ class Residual:
         at_q = self.signed(q)
 
         def covariances(p: Array) -> tuple[Array, Array]:
+            """Those of (..., n, m), and those of (..., n, n)."""
             if p is self.places:  # at which the places tell all of k
                 terms = monomials(p[:, 0], p[:, 1], TERMS).T
                 left = solved(self.factor, np.vstack([terms, self.places_factor.T])).T
