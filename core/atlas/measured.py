@@ -12,7 +12,7 @@ from ..arguments import Array, list_of, number, unit_vector
 from ..contours.contour import Contour
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
-from .frontier import FACING
+from .field import FACING
 from .join import charts_of
 from .object_atlas import Atlas
 
