@@ -13,7 +13,7 @@ from ..contours.contour import Contour
 from ..exploration.side_by_side import result_of
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
-from .frontier import FACING
+from .field import FACING
 from .join import charts_of
 from .object_atlas import Atlas
 
