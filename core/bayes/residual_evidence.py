@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether contacts ask for a residual, how large it is, and what they say of it.
 
-Where a sextic describes the contacts to their accuracy there is none; nor where it describes most of them,
+Where a sextic describes the contacts to their noise there is none; nor where it describes most of them,
 and makes all as likely, with outliers, as a residual does. Otherwise its variances and the noise follow from
 the marginal likelihood on a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
 """

@@ -318,7 +318,7 @@ def test_a_stroke_may_be_a_contour_and_brings_its_noise():
         outward=SURFACES["pear"].normal,
         strokes=[Contour(points[:40], noise=0.2), Contour(points[40:])],
     )
-    assert r.accuracy == one.accuracy == pytest.approx(0.2 / r.radius)
+    assert r.noise == one.noise == pytest.approx(0.2 / r.radius)
     assert np.array_equal(r.height(1.0, 2.0), one.height(1.0, 2.0))
 
 
