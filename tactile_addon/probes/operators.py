@@ -20,7 +20,7 @@ from ..touch.settings import (
 from ..touch.touch_object import completed, touch
 from ..touch.wording import fit_summary, sentence
 from .number_fields import dragged, fields
-from .probe import lock_of, probe_of, record_of
+from .probe import lock_of, patch_near, probe_of, record_of
 
 
 @dragged
@@ -151,6 +151,14 @@ def has_target(operator, context):
     if obj.type != "MESH":
         operator.poll_message_set("Select the mesh object to touch")
     return obj.type == "MESH"
+
+
+def has_patch(operator, context, hint):
+    """Whether the active object is a patch, its probe or its contours; the operator's poll gives the hint."""
+    found = patch_near(context.view_layer.objects.active) is not None
+    if not found:
+        operator.poll_message_set(hint)
+    return found
 
 
 def is_unlocked(operator, context):

@@ -23,13 +23,7 @@ from core import (
 from core.reconstruction.strokes import LEAST_STRIPS, STRIPS, means
 
 EXTENT = 10.0
-SURFACES = {
-    "ellipsoid": surfaces.ellipsoid(35, 25, 20, 0.6, 0.5),
-    "torus": surfaces.torus(40, 20, 0.6),
-    "pear": surfaces.pear(),
-    "saddle": surfaces.saddle(),
-    "sphere": surfaces.sphere(25),
-}
+SURFACES = surfaces.FIVE
 
 
 @cache
