@@ -26,14 +26,14 @@ from .join import charts_of
 
 RIM = 24  # places of a rim
 INSIDE = 1.0  # of a domain's radius: farther out a place is not covered
-REACHES = (0.35, 0.12, 0.04)  # of the radius, that the finger goes on; the first that finds what is new
-DISK_REACHES = 3.0  # of these, the radius of the disk around it that tells how much, at most the patch's
-SLIVER = 0.03  # of the disk: less is bridged by what blends patches
+REACHES = (0.35, 0.12, 0.04)  # shares of the radius that the finger goes on, until it finds anything new
+DISK_REACHES = 3.0  # times this: the radius of the disk, at most the patch's, in which that is measured
+SLIVER = 0.03  # share of the disk: the blend of patches bridges less
 TRIES = 3  # touches that a place of a rim is worth
 TOUCHES_APART = 2.2  # radii between touches that are made side by side
-LOW = 0.1  # of the radius, that the finger is above a place when it comes down
-ABOVE = 0.6  # of the radius, that the finger is above what it feels around
-HAIR = 0.02  # of a reach, that the finger is above the surface
+LOW = 0.1  # share of the radius: how high above a place the finger is when it comes down
+ABOVE = 0.6  # share of the radius: how high the finger is above what it feels around a contact
+HAIR = 0.02  # share of a reach: how high the finger is above the surface
 
 
 Contact = tuple[Vector, Vector]  # a point of the surface and its outward normal
@@ -61,11 +61,11 @@ class Next(NamedTuple):
 
 @dataclass(eq=False)
 class Frontier:
-    """What was felt, and the places of its rims, by an area that touches there bring at most.
+    """What was felt, and a queue of the places on its rims, by the area that a touch there can bring at most.
 
     side : 1 where the surface's normals are on the side of the finger, -1 where they are on the other
 
-    What a touch brings only becomes less, so that no other need be asked anew before it is the first.
+    What a place can bring only shrinks as patches come, so it is measured again only once it is the first.
     """
 
     surface: Surface
@@ -76,19 +76,19 @@ class Frontier:
     left: list[Place] = field(default_factory=list)
 
     def add(self, r: Reconstruction) -> None:
-        """A patch that was felt."""
+        """Takes in a patch that was felt, with the places of its rim."""
         chart = charts_of([r], deviations=False)
         self.charts = chart if self.charts is None else self.charts.joined(chart)
         for place in rim_of(chart, r):
             self.push(place, np.pi * r.radius**2)
 
     def push(self, place: Place, gain: float) -> None:
-        """A place of a rim whose touch may bring so much."""
+        """Queues a place of a rim by the area that a touch there may bring."""
         self.pushed += 1
         heapq.heappush(self.queue, (-gain, self.pushed, place))
 
     def tried(self, touch: Next) -> None:
-        """What was touched: its place is looked at again."""
+        """Queues the place of a touch that was made once more: something may be left beyond it."""
         self.push(replace(touch.place, tries=touch.place.tries + 1), touch.gain)
 
     def taking(self, count: int) -> Generator[None, None, list[Next]]:
@@ -174,14 +174,14 @@ class Frontier:
         return bool(self.is_covered(np.array([point]), np.array([normal]))[0])
 
     def is_covered(self, points: Array, normals: Array) -> NDArray[np.bool_]:
-        """Which of (k, 3) do."""
+        """Which of the places (k, 3) do so."""
         assert self.charts is not None
         return covered(self.charts, points, normals)
 
     def around(self, contact: Contact, place: Place, radius: float) -> tuple[float, Contact]:
         """The area of a disk around a contact that is not covered, and the contact in the middle of that.
 
-        By rays onto a disk around the contact: beyond an edge there is nothing to add.
+        Rays onto a disk around the contact measure it: beyond an edge there is nothing to add.
         """
         point, normal = contact
         down = scaled(normal, -1.0)
@@ -212,7 +212,7 @@ def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
 
 
 def still_open(places: Sequence[Place], charts: Charts | None) -> list[Place]:
-    """Those of places that no patch covers."""
+    """The places that no patch covers."""
     if charts is None or not places:
         return list(places)
     points, normals = (np.array([getattr(p, name) for p in places]) for name in ("point", "normal"))

@@ -19,13 +19,13 @@ from .frontier import Frontier, covered, side_of, still_open
 from .join import Table, joined
 from .object_atlas import Atlas
 
-MOST = 1000
-FIRST_EXTENT = 300.0  # times the tolerance, that half curves of the first touch may become
-SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
-SMALL = 5.0  # times it, that a patch is wide at least
+MOST = 1000  # touches, unless the caller says otherwise
+FIRST_EXTENT = 300.0  # times the tolerance: the longest half curve of the first touch
+SIZE = 1.5  # times the tolerance: how uncertain a patch may be before its neighbors are known
+SMALL = 5.0  # times it: a patch of a smaller radius is not kept
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
-AGAIN = 2  # times that patches less certain than the tolerance are touched again
-LARGER = 2.0  # times the patch where it begins, that a touch may become
+AGAIN = 2  # how often patches less certain than the tolerance are touched again
+LARGER = 2.0  # times the radius of the patch where it begins: how far a touch may reach
 
 Contact = tuple[Array, Array]  # a point and its normal, (3,) each
 
@@ -118,7 +118,7 @@ class _Run:
         return self.now([first])
 
     def now(self, new: Sequence[Exploration] = ()) -> Progress:
-        """How far it is."""
+        """The Progress so far, with new touches."""
         return Progress(self.done, len(self.frontier.queue), tuple(new))
 
     def touch(self, contacts: Sequence[Contact], farthest: float) -> Generator[None, None, list[Exploration]]:
@@ -134,7 +134,7 @@ class _Run:
         return new
 
     def missing(self, charts: Charts, rough: list[int]) -> list[Contact | None]:
-        """For each of these patches the contact in the middle of those that no other covers, if there are."""
+        """For each of these patches the contact in the middle of those that no other covers, or None."""
         others = charts.chosen(np.setdiff1d(np.arange(len(self.found)), rough))
         found: list[Contact | None] = []
         for i in rough:

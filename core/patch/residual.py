@@ -216,10 +216,8 @@ def own_variance(p: Array, variances: Array) -> Array:
 
 
 def _maternes(distance: Array) -> list[Array]:
-    """M of distances (...), which are used up, over each of LENGTHS; the shorter's by the other's.
-
-    What is worked on is passed over memory as seldom as can be.
-    """
+    """M of distances (...), which are used up, over each of LENGTHS; the shorter's by the other's."""
+    # In place, for passes over memory take most of the time.
     short, long = LENGTHS.tolist()
     a = np.multiply(distance, math.sqrt(3.0) / long, out=distance)
     decay, ratio = np.exp(-a), long / short
