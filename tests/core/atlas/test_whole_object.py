@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import core
+from core.atlas.charts import Charts
 from tests import solids
 
 RING = solids.ring(small=0.5)
@@ -236,9 +237,10 @@ def test_edges_in_steps_are_the_edges(ring):
 
 
 @pytest.mark.parametrize("answer", [None, False])
-def test_false_while_patches_are_joined_ends_the_touching(answer):
-    """Without it, patches that are less certain than the tolerance are touched again."""
-    solid, joins = solids.ring(), False
+def test_false_while_patches_are_joined_ends_the_touching(answer, monkeypatch):
+    """Without it, patches that are less certain than the tolerance are touched again: here the first are."""
+    monkeypatch.setattr(Charts, "less_certain_than", lambda charts, tolerance: [0, 1, 2])
+    solid, joins = solids.ball(), False
     steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=8e-3, noise=8e-3, rng=0)
     state = next(steps)
     try:
@@ -246,7 +248,7 @@ def test_false_while_patches_are_joined_ends_the_touching(answer):
             joins = joins or state.joining is not None
             state = steps.send(answer if joins else None)
     except StopIteration as end:
-        assert len(end.value.patches) > 30
+        assert len(end.value.patches) > 5
         assert answer is False
     else:
         assert answer is None
