@@ -61,10 +61,12 @@ class Search:
 
     @property
     def seconds(self):
+        """How long it has been searching."""
         return perf_counter() - self._begun
 
     @property
     def poses(self):
+        """The core.Poses that were found; raises the error with which the search ended."""
         if self._error is not None:
             raise self._error
         return self._found

@@ -87,6 +87,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
 
 
 def report_error(operator, error):
+    """Has an operator say what is wrong, and end."""
     operator.report({"ERROR"}, sentence(error))
     return {"CANCELLED"}
 

@@ -13,7 +13,7 @@ import bpy
 
 _is_late = False
 _added = set()  # session_uids of objects and collections that were added
-_replaced = {}  # those of meshes, by those of the copies that have taken their place
+_replaced = {}  # session_uids of meshes, by those of the copies that have taken their place
 _links = []  # what was taken out: a function that puts it back, and session_uids
 
 
@@ -41,7 +41,7 @@ def note_copied(obj, mesh):
 
 
 def take_out():
-    """To be called before undo and redo."""
+    """Unlinks what was added; to be called before undo and redo."""
     _links.clear()
     if not (_added or _replaced):
         return
@@ -70,7 +70,7 @@ def _give_back_meshes():
 
 
 def put_back():
-    """To be called after undo and redo, and where another file was opened."""
+    """Links again what is still there; to be called after undo and redo, and in another file."""
     for function, *numbers in reversed(_links):
         function(*numbers)
     _links.clear()
@@ -111,6 +111,6 @@ def _found(datablocks, number):
 
 
 def _collections():
-    """All of them by their session_uids, and those of scenes by these scenes'."""
+    """All collections by their session_uids, and each scene's own by that of the scene."""
     found = {collection.session_uid: collection for collection in bpy.data.collections}
     return found | {scene.session_uid: scene.collection for scene in bpy.data.scenes}
