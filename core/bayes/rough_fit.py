@@ -166,8 +166,8 @@ def _put(found: RoughFit, place: int, residual: Residual) -> None:
 def _projection() -> tuple[Array, Array]:
     """Points (n, 2) and weights (27, n) that take the heights there to the nearest polynomial's coefficients.
 
-    To degree 2 those of the quartic nearest over the disk of QUARTIC_SHARE; the others nearest to what these
-    leave over DISK.
+    Up to degree 2 it is the quartic nearest over the disk of QUARTIC_SHARE; the other terms are nearest to
+    what these leave over DISK.
     """
     x, y, shares = nodes()
     whole, root = np.column_stack([x, y]), np.sqrt(shares)

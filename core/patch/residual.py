@@ -86,7 +86,7 @@ class Residual:
         at_q = self.signed(q)
 
         def covariances(p: Array) -> tuple[Array, Array]:
-            """Those of (..., n, m), and those of (..., n, n)."""
+            """Covariances of heights at p with those at q, (..., n, m), and with each other, (..., n, n)."""
             if p is self.places:  # at which the places tell all of k
                 terms = monomials(p[:, 0], p[:, 1], TERMS).T
                 left = solved(self.factor, np.vstack([terms, self.places_factor.T])).T
@@ -97,7 +97,7 @@ class Residual:
         return covariances
 
     def _covariance(self, p: Array, at_p: Array, q: Array, at_q: Array) -> Array:
-        """By what `signed` gives of the points."""
+        """The covariances of heights, from what `signed` gives of the points."""
         covariance, told = kernel(p, q, self.variances), at_p.copy()
         told[..., : len(self.places)] *= -1.0
         covariance += told @ np.swapaxes(at_q, -1, -2)

@@ -104,8 +104,8 @@ class Reconstruction:
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height of the surface at local (x, y), in their shape.
 
-        Of "bayes" it is the posterior's mean, a sextic and the residual, whatever the patch's degree; of the
-        paper's methods that of the patch.
+        For "bayes" it is the posterior's mean, a sextic and the residual, whatever the patch's degree; for
+        the paper's methods that of the patch.
         """
         return self.geometry.height(x, y)
 

@@ -112,7 +112,7 @@ def target_object(context, name):
 
 
 def fields_of(context, name):
-    """By which of its properties an operator shows lengths, for what it touches, as number_fields.fields."""
+    """The properties by which an operator shows lengths, for what it touches: see number_fields.fields."""
     try:
         return fields(max(target_object(context, name).dimensions))
     except ValueError:

@@ -159,7 +159,7 @@ def _fill_patch(obj, touched):
 def _follow(obj, touched):
     """Moves the vertices that are there, each at its place in the domain, to the patch of another touch.
 
-    Of its values only those that the colors show are brought up to date: a gesture shows no others.
+    Only the values that the colors show are brought up to date: a gesture shows no others.
     """
     result, mesh = touched.result, obj.data
     plane = result.domain.points_at(values(mesh, PLACE)[:, :2])

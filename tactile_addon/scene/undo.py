@@ -29,13 +29,13 @@ def after_step():
 
 
 def note_added(datablock):
-    """To be called for a new object or collection that is linked to what was there before."""
+    """Notes a new object or collection that is linked to what was there before."""
     if _is_late:
         _added.add(datablock.session_uid)
 
 
 def note_copied(obj, mesh):
-    """To be called for an object that got a copy of `mesh` in its place."""
+    """Notes an object that got a copy of `mesh` in its place."""
     if _is_late:
         _replaced[obj.data.session_uid] = mesh.session_uid
 
