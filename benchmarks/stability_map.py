@@ -40,9 +40,9 @@ def measure(bpy, clock, faces, spacing):
         bpy.data.objects.remove(painted)
     whole, spent = runs[[seconds for seconds, _ in runs].index(median_low([seconds for seconds, _ in runs]))]
     parts = [spent["tracking"], spent["fit"] + spent["noting"] - spent["error"], spent["error"]]
-    parts.append(whole - sum(parts) - spent["snapshot"])
+    parts.append(whole - sum(parts) - spent["detached"])
     cells = [f"{1e3 * seconds / count:.2f}" for seconds in parts]
-    return [f"{faces}", f"{count}", f"{count / whole:.0f}", *cells, f"{spent['snapshot']:.2f}"]
+    return [f"{faces}", f"{count}", f"{count / whole:.0f}", *cells, f"{spent['detached']:.2f}"]
 
 
 def main():
@@ -52,7 +52,7 @@ def main():
     import bpy
 
     addon, clock = extension.tactile_addon, Clock()
-    clock.wrap(addon.touch.detached_mesh.DetachedMesh, "__init__", "snapshot")
+    clock.wrap(addon.touch.detached_mesh.DetachedMesh, "__init__", "detached")
     for name, stage in (("track", "tracking"), ("reconstruct_many", "fit"), ("with_height_stds", "fit")):
         clock.wrap(addon.stability_map.stability.core, name, stage)
     clock.wrap(addon.stability_map.stability.StabilityMap, "_note", "noting")

@@ -44,7 +44,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     )
 
     stop = "Stop and Keep"
-    meanwhile = {"PASS_THROUGH"}  # the touches are in a snapshot
+    meanwhile = {"PASS_THROUGH"}  # a detached mesh is touched
 
     @classmethod
     def poll(cls, context):

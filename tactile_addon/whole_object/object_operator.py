@@ -57,7 +57,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     )
 
     stop = "Stop Touching and Keep"
-    meanwhile = {"PASS_THROUGH"}  # the touches are in a snapshot
+    meanwhile = {"PASS_THROUGH"}  # a detached mesh is touched
     _growing = None
 
     @classmethod
