@@ -26,7 +26,7 @@ def ball():
 
 @pytest.fixture(scope="module")
 def ring():
-    return explored(RING, noise=1e-3)
+    return explored(RING, noise=1e-3, tolerance=8e-3)
 
 
 @pytest.fixture(scope="module")

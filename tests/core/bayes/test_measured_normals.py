@@ -3,6 +3,7 @@
 """Measured normals as slopes in the Bayesian fit: they show what curves alone cannot."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ EXACT = [
 ]
 
 
+@cache
 def touched(surface, noise=0.0, seed=0):
     return surface.track(PLANES, noise=noise, rng=seed)
 
