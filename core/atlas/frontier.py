@@ -36,18 +36,22 @@ ABOVE = 0.6  # of the radius, that the finger is above what it feels around
 HAIR = 0.02  # of a reach, that the finger is above the surface
 
 
+Hit = tuple[Sequence[float], Sequence[float]]  # what a surface answers
 Contact = tuple[Vector, Vector]  # a point of the surface and its outward normal
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place on a rim, with the normal and the way ahead, (3,) each; and the size of its patch."""
+    """A place on a rim, with the normal and the way ahead, (3,) each; and the size of its patch.
+
+    tried : where touches that went on from it were, (3,) each
+    """
 
     point: Vector
     normal: Vector
     ahead: Vector
     radius: float
-    tries: int = 0
+    tried: tuple[Vector, ...] = ()
 
 
 class Next(NamedTuple):
@@ -64,22 +68,25 @@ class Frontier:
     """What was felt, and the places of its rims, by an area that touches there bring at most.
 
     side : 1 where the surface's normals are on the side of the finger, -1 where they are on the other
+    least : the area that a touch has to bring
+    left : places where touches brought nothing
 
     What a touch brings only becomes less, so that no other need be asked anew before it is the first.
     """
 
     surface: Surface
     side: float
+    least: float = 0.0
     charts: Charts | None = None
     queue: list[tuple[float, int, Place]] = field(default_factory=list)
     pushed: int = 0
     left: list[Place] = field(default_factory=list)
 
-    def add(self, r: Reconstruction) -> None:
-        """A patch that was felt."""
+    def add(self, r: Reconstruction, goes_on: bool = True) -> None:
+        """A patch that was felt, and whether others go on from its rim."""
         chart = charts_of([r], deviations=False)
         self.charts = chart if self.charts is None else self.charts.joined(chart)
-        for place in rim_of(chart, r):
+        for place in rim_of(chart, r) if goes_on else ():
             self.push(place, np.pi * r.radius**2)
 
     def push(self, place: Place, gain: float) -> None:
@@ -89,7 +96,8 @@ class Frontier:
 
     def tried(self, touch: Next) -> None:
         """What was touched: its place is looked at again."""
-        self.push(replace(touch.place, tries=touch.place.tries + 1), touch.gain)
+        place, at = touch.place, vector_of(touch.point)
+        self.push(replace(place, tried=(*place.tried, at)), touch.gain)
 
     def taking(self, count: int) -> Generator[None, None, list[Next]]:
         """The touches that bring most, at most so many, far from each other; none where all is covered.
@@ -105,6 +113,9 @@ class Frontier:
             if any(_is_near(place, other) for other in found):
                 aside.append(entry)
                 continue
+            if len(place.tried) >= TRIES:
+                self.left.append(place)
+                continue
             yield
             touch = self.beyond(place)
             if touch is None:
@@ -117,10 +128,19 @@ class Frontier:
             heapq.heappush(self.queue, entry)
         return found
 
-    def uncovered(self) -> list[Place]:
-        """Places where a touch would bring something, but there was none, or it brought nothing."""
-        self._forget_covered()
-        return [place for _, _, place in sorted(self.queue)] + still_open(self.left, self.charts)
+    def uncovered(self, charts: Charts) -> Generator[None, None, list[Place]]:
+        """Places where a touch would bring something beside joined patches, but there was none, or in vain.
+
+        Patches alone may be off at their rims by so much that others seem not to cover them. Yields before
+        each place where touches were in vain.
+        """
+        self.charts = charts
+        found = still_open([place for _, _, place in sorted(self.queue)], charts)
+        for place in still_open(self.left, charts):
+            yield
+            if self.beyond(place) is not None:
+                found.append(place)
+        return found
 
     def _forget_covered(self) -> None:
         """Places that patches have come to cover, all at once."""
@@ -130,44 +150,41 @@ class Frontier:
 
     def beyond(self, place: Place) -> Next | None:
         """The touch that goes on from a place; None where it would bring nothing."""
-        if place.tries >= TRIES:
-            self.left.append(place)
-            return None
         for share in REACHES:
             contact = self.ahead(place, share * place.radius)
             if contact is None or self.covered(*contact):
                 continue
             radius = min(1.0, DISK_REACHES * share) * place.radius
             gain, middle = self.around(contact, place, radius)
-            if gain > SLIVER * math.pi * radius**2:
+            if gain > max(SLIVER * math.pi * radius**2, self.least):
                 return Next(np.array(middle[0]), np.array(middle[1]), gain, place)
         return None
 
-    def felt(self, hit: tuple[Sequence[float], Sequence[float]]) -> Contact:
-        """A hit with the normal on the side of the finger."""
-        return vector_of(np.asarray(hit[0])), scaled(vector_of(np.asarray(hit[1])), self.side)
+    def felt(self, hit: Hit | None, way: Vector) -> Contact | None:
+        """The contact of a ray that goes that way; none at the back of a surface: there the finger is inside."""
+        if hit is None:
+            return None
+        normal = scaled(vector_of(hit[1]), self.side)
+        return (vector_of(hit[0]), normal) if dot(normal, way) < 0.0 else None
 
     def ahead(self, place: Place, s: float) -> Contact | None:
         """The first contact of a finger that goes s ahead from a place, then down, back and up."""
         up, down, t = place.normal, scaled(place.normal, -1.0), place.ahead
         height = min(s, LOW * place.radius)
         for start in (0.0, -0.5 * s):  # the patch may end a little beyond its surface
-            found = self.toward(along(along(place.point, up, height), t, start), down, 2.0 * height)
+            above = along(along(place.point, up, height), t, start)
+            found = self.felt(self.surface.ray_cast(above, down, 2.0 * height), down)
             if found is not None:
                 break
         else:
             return None
         at = along(found[0], up, HAIR * place.radius)
         for way, length in ((t, s), (down, 1.5 * s), (scaled(t, -1.0), 2.5 * s), (up, 1.5 * s)):
-            if self.surface.ray_cast(at, way, length) is not None:
-                return self.toward(at, way, length)
+            hit = self.surface.ray_cast(at, way, length)
+            if hit is not None:
+                return self.felt(hit, way)
             at = along(at, way, length)
         return None
-
-    def toward(self, start: Vector, way: Vector, length: float) -> Contact | None:
-        """The first contact on a ray; none at the back of a surface: there the finger would be inside."""
-        hit = self.surface.ray_cast(start, way, length)
-        return None if hit is None or dot(self.felt(hit)[1], way) >= 0.0 else self.felt(hit)
 
     def covered(self, point: Vector, normal: Vector) -> bool:
         """Whether a place lies inside a patch that faces its way."""
@@ -190,15 +207,13 @@ class Frontier:
         hits = [contact]
         for offset in disk_around(normal, place.ahead) * radius:
             start = along(along(point, normal, height), vector_of(offset), 1.0)
-            hit = self.surface.ray_cast(start, down, height + ABOVE * radius)
-            felt = None if hit is None else self.felt(hit)
+            felt = self.felt(self.surface.ray_cast(start, down, height + ABOVE * radius), down)
             if felt is not None and dot(felt[1], normal) > FACING:
                 hits.append(felt)
         points, normals = np.array([h[0] for h in hits]), np.array([h[1] for h in hits])
         new = np.flatnonzero(~self.is_covered(points, normals))
-        off = points[new] - points[new].mean(axis=0)
-        middle = hits[new[np.argmin((off**2).sum(axis=1))]]
-        return len(new) / (DISK + 1) * math.pi * radius**2, middle
+        area = len(new) / (DISK + 1) * math.pi * radius**2
+        return area, hits[new[_between(points[new], place.tried)]]
 
 
 def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
@@ -223,12 +238,20 @@ def side_of(surface: Surface, point: Array, outward: Array, reach: float) -> flo
     """1 where the surface's normals at a point are on the side of `outward`, -1 where on the other."""
     up = vector_of(outward)
     hit = surface.ray_cast(along(vector_of(point), up, reach), scaled(up, -1.0), 2.0 * reach)
-    return 1.0 if hit is None else math.copysign(1.0, dot(vector_of(np.asarray(hit[1])), up))
+    return 1.0 if hit is None else math.copysign(1.0, dot(vector_of(hit[1]), up))
 
 
 def _is_near(place: Place, touch: Next) -> bool:
     room = APART * max(place.radius, touch.place.radius)
     return math.dist(place.point, touch.point) < room
+
+
+def _between(points: Array, tried: Sequence[Vector]) -> int:
+    """Which of the points (n, 3) is in the middle of them, or farthest from where touches were in vain."""
+    if not tried:
+        return int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
+    apart = points[:, None] - np.array(tried)
+    return int(np.argmax((apart**2).sum(axis=2).min(axis=1)))
 
 
 def rim_of(chart: Charts, r: Reconstruction) -> list[Place]:
