@@ -39,7 +39,7 @@ def test_intervals_count_in_that_waviness_and_noise_are_estimates(count, freedom
     system = linear_system.linear_system(contacts, weights, expected, contacts[:, :0])
     data = evidence.restricted(system.equations)
     hyper = linear_system.hyperparameters(system, data, np.array([2e-3]))
-    found = linear_system.posterior(expected, system, data, hyper, weights).covariance[0]
+    found = linear_system.posterior(expected, system, data.triangle, hyper, weights).covariance[0]
     alone = np.linalg.inv(linear_system._precision(system, hyper.variances, hyper.noise)[0])
     assert found == pytest.approx(freedom / (freedom - 2.0) * alone, rel=1e-6)
 
