@@ -161,7 +161,7 @@ class Frontier:
         return None
 
     def felt(self, hit: Hit | None, way: Vector) -> Contact | None:
-        """The contact of a ray that goes that way; none at the back of a surface: there the finger is inside."""
+        """The contact of a ray that goes that way; none at its back: there the finger is inside."""
         if hit is None:
             return None
         normal = scaled(vector_of(hit[1]), self.side)
