@@ -16,8 +16,8 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, edges_of, node_dict
 from .charts import Charts
-from .field import AGREE, FACING, LAYER, blended, node_weights
-from .frontier import INSIDE, Place
+from .field import AGREE, FACING, INSIDE, LAYER, blended, node_weights
+from .frontier import Place
 from .meshing import SMALLEST, Mesh, meshed
 
 VERSION = 1  # of the graph as data

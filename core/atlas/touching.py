@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
-from ..contours.finger import Surface
+from ..contours.contour import tangent_of, vector_of
+from ..contours.finger import Surface, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.side_by_side import exploring
 from ..exploration.touches import explore
 from .charts import Charts
-from .field import FACING
-from .frontier import Frontier, covered, side_of
+from .field import FACING, covered
+from .frontier import Frontier
 from .join import Table, joined
 from .object_atlas import Atlas
 
@@ -113,8 +114,9 @@ class _Run:
     def first(self, point: Array, up: Array) -> Progress:
         """The touch from which all others go on; raises ValueError where there is none."""
         first = explore(self.surface, point, up, farthest=FIRST * self.tolerance, **self.wanted)
-        side, least = side_of(self.surface, point, up, first.step), np.pi * (NARROW * self.tolerance) ** 2
-        self.frontier = Frontier(self.surface, side, least)
+        p, n = vector_of(point), vector_of(up)
+        side = first_contact(self.surface, p, n, tangent_of(n, None), first.step)[2]
+        self.frontier = Frontier(self.surface, side, np.pi * (NARROW * self.tolerance) ** 2)
         self.frontier.add(first.result)
         self.found, self.done = [first], 1
         return self.now(new=[first])
