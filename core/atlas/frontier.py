@@ -20,7 +20,7 @@ from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface
 from ..reconstruction.result import Reconstruction
-from .charts import DISK, Charts, disk_around
+from .charts import DISK_PLACES, Charts, disk_around
 from .field import FACING, INSIDE, covered
 from .join import charts_of
 
@@ -30,7 +30,7 @@ DISK_REACHES = 3.0  # of these, the radius of the disk around it that tells how 
 SLIVER = 0.03  # of the disk: less is bridged by what blends patches
 TRIES = 3  # touches that a place of a rim is worth
 LOOK = 7  # more places that are looked at with the first
-APART = 2.2  # radii between touches that are made side by side
+TOUCHES_APART = 2.2  # radii between touches that are made side by side
 LOW = 0.1  # of the radius, that the finger is above a place when it comes down
 ABOVE = 0.6  # of the radius, that the finger is above what it feels around
 HAIR = 0.02  # of a reach, that the finger is above the surface
@@ -176,7 +176,7 @@ class Frontier:
     def _touch(self, place: Place, share: float, hits: list[Contact], new: NDArray[np.intp]) -> Next | None:
         """The touch in the middle of those of a disk's contacts that are new, if it brings enough."""
         disk = math.pi * (min(1.0, DISK_REACHES * share) * place.radius) ** 2
-        area = len(new) / (DISK + 1) * disk
+        area = len(new) / (DISK_PLACES + 1) * disk
         if area <= max(SLIVER * disk, self.least):
             return None
         point, outward = hits[new[_between(np.array([hits[i][0] for i in new]), place.tried)]]
@@ -237,7 +237,7 @@ def still_open(places: Sequence[Place], charts: Charts | None) -> list[Place]:
 
 
 def _is_near(place: Place, touch: Next) -> bool:
-    room = APART * max(place.radius, touch.place.radius)
+    room = TOUCHES_APART * max(place.radius, touch.place.radius)
     return math.dist(place.point, touch.point) < room
 
 

@@ -22,9 +22,9 @@ from .join import Table, joined
 from .object_atlas import Atlas
 
 MOST = 1000
-FIRST = 300.0  # times the tolerance, that half curves of the first touch may become
+FIRST_EXTENT = 300.0  # times the tolerance, that half curves of the first touch may become
 SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
-LEAST = 5.0  # times it, that a patch is wide at least from which others go on
+SMALL = 5.0  # times it, that a patch is wide at least from which others go on
 NARROW = 1.0  # times it, that a patch is wide at least where a touch was in vain before
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
 AGAIN = 2  # times that patches less certain than the tolerance are touched again
@@ -82,7 +82,7 @@ def _all_over(run: "_Run", more: bool) -> Generator[Progress, bool | None, bool]
             break
         farthest = LARGER * max(touch.place.radius for touch in chosen)
         contacts = [(touch.point, touch.outward) for touch in chosen]
-        least = [NARROW if touch.place.tried else LEAST for touch in chosen]
+        least = [NARROW if touch.place.tried else SMALL for touch in chosen]
         new, more = yield from _told(run.touch(contacts, farthest, least), run.now)
         for touch in chosen:
             run.frontier.tried(touch)
@@ -113,7 +113,7 @@ class _Run:
 
     def first(self, point: Array, up: Array) -> Progress:
         """The touch from which all others go on; raises ValueError where there is none."""
-        first = explore(self.surface, point, up, farthest=FIRST * self.tolerance, **self.wanted)
+        first = explore(self.surface, point, up, farthest=FIRST_EXTENT * self.tolerance, **self.wanted)
         p, n = vector_of(point), vector_of(up)
         side = first_contact(self.surface, p, n, tangent_of(n, None), first.step)[2]
         self.frontier = Frontier(self.surface, side, np.pi * (NARROW * self.tolerance) ** 2)
@@ -139,7 +139,7 @@ class _Run:
             if isinstance(e, ValueError) or e.result.frame.axes[:, 2] @ up < FACING:
                 continue  # at an edge a fit may end on its other side
             if e.result.radius >= times * self.tolerance:
-                self.frontier.add(e.result, goes_on=e.result.radius >= LEAST * self.tolerance)
+                self.frontier.add(e.result, goes_on=e.result.radius >= SMALL * self.tolerance)
                 new.append(e)
                 yield
         self.found += new
@@ -181,7 +181,7 @@ def _joined(run: _Run, more: bool) -> Steps:
         if not (again and chosen and more):
             break
         farthest = float(charts.radii[rough].max())
-        new, more = yield from _told(run.touch(chosen, farthest, [LEAST] * len(chosen)), run.now)
+        new, more = yield from _told(run.touch(chosen, farthest, [SMALL] * len(chosen)), run.now)
         more = (yield run.now(new=new)) is not False and more
         more = yield from _all_over(run, more)
     gone = [i for i, contact in zip(rough, missing, strict=True) if contact is None]
