@@ -52,7 +52,7 @@ def node_dict(r: Reconstruction, std: float) -> dict[str, Any]:
 
 
 def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
-    """All pairs that share a boundary, each with that of the patch on which it is seen from more rays.
+    """All pairs that share a boundary, each as seen from that of the two patches of which more rays cross it.
 
     Yields the share that is done.
     """
@@ -74,7 +74,7 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
 
 
 def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:
-    """From the ray after the widest gap on."""
+    """Crossings in the order of their rays, from the one after the widest gap on."""
     rays = ray[which]
     gaps = np.diff(rays, append=rays[0] + RAYS)
     start = int(np.argmax(gaps)) + 1

@@ -21,13 +21,13 @@ from .field import FACING, blended
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # cosine of the angle between a contact's normal and the patch's there, at least
-UNDOUBTED = 2.0  # deviations of a patch, as many as a contact is off it at most that weighs 1
-LOOSER = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain
-FARTHEST = 3.0  # times that, a contact is of another wall
-LEAST_NOISE = 5e-4  # of the radius, at least
+UNDOUBTED = 2.0  # deviations of a patch: a contact that is off by fewer weighs 1
+LOOSER = 5.0  # how much larger they are a radius beyond the rim, where a patch alone is less certain
+FARTHEST = 3.0  # times that: a contact farther off is of another wall
+LEAST_NOISE = 5e-4  # share of the radius
 PATCHES_AT_ONCE, PLACES_AT_ONCE = 4, 1500  # patches, and contacts or other places of all, in a step
-KNOTS_WITHIN = 1.3  # of a domain's radius, as far as heights are asked at knots
-MOVED = 0.03  # of the radius, that a patch is at most
+KNOTS_WITHIN = 1.3  # times a domain's radius: how far out heights are asked at knots
+MOVED = 0.03  # share of the radius: a place of a patch is moved by less
 
 Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
 Joining = Generator[float, None, Charts]
@@ -40,9 +40,9 @@ def joined(
     noise: float,
     known: dict[int, tuple[int, Table]],
 ) -> Joining:
-    """The charts of patches with all contacts, of which `charts` have but their own; yields the share done.
+    """The charts of patches by all contacts on them; `charts` know but their own. Yields the share done.
 
-    known : tables of patches that were joined before, and of how many contacts; is changed
+    known : for patches that were joined before, the number of contacts and the table; changed in place
     """
     points, normals, owner = _contacts(contours)
     parts = []
@@ -121,7 +121,7 @@ def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[
 
 
 def charts_of(results: Sequence[Reconstruction], deviations: bool = True) -> Charts:
-    """Patches alone as tables; or without their deviations, which cost most."""
+    """Patches alone as tables; without their deviations where these, which cost most, are not asked for."""
     return stacked(results, [table_of(r, deviations) for r in results])
 
 
@@ -156,13 +156,13 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
 
 
 def _square(r: Reconstruction) -> tuple[Array, float]:
-    """The domain's radii, and half the side of the square of knots: with some beside for the spline."""
+    """The domain's radii, and half the side of the square of knots, which leaves a margin for the spline."""
     rim = _rim(r)
     return rim, float(1.05 * MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 5)
 
 
 def _rim(r: Reconstruction) -> Array:
-    """The domain's radii (AZIMUTHS,), in unit radius, nowhere farther than curves beside went.
+    """The domain's radii (AZIMUTHS,), in unit radius, nowhere larger than the curves on either side are long.
 
     Between ends at very different distances the spline swings out to where nothing was felt.
     """
@@ -175,7 +175,7 @@ def _rim(r: Reconstruction) -> Array:
 
 
 def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
-    """Deviations (SIDE, SIDE) from every other knot: they are smooth, and cost the most."""
+    """Deviations (SIDE, SIDE), found at every other knot: they are smooth, and cost the most."""
     coarse = slice(None, None, 2)
     x, y = x.reshape(SIDE, SIDE)[coarse, coarse], y.reshape(SIDE, SIDE)[coarse, coarse]
     return between(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

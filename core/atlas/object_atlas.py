@@ -124,7 +124,7 @@ class Atlas:
         return distance, std
 
     def _far(self, points: Array) -> tuple[Array, Array]:
-        """By the nearest sample: on the side that it faces, as far as it is."""
+        """Distances and deviations (n,) by the nearest sample: positive on the side that it faces."""
         samples = self._samples
         away, nearest = samples.tree.query(points)
         ahead = np.einsum("ni,ni->n", points - samples.points[nearest], samples.normals[nearest])
