@@ -72,7 +72,7 @@ class Touch:
     is_grown : whether what makes curves grow is the fit that is asked for
     """
 
-    follow: Callable[..., Feel]
+    follow: Callable[..., Callable[[float], list[Contour]]]
     point: Array
     reference: Array
     planes: tuple[SamplingPlane, ...]
@@ -111,9 +111,8 @@ class Touch:
 
     def _grown(self) -> Steps:
         """The touch that is as large as it can be trusted."""
-        between = max(self.step or 0.0, self.farthest / FELT)
-        feel = self.follow(self.planes, step=between)
-        fits = grown(feel, self.point, self.farthest, between, self.largest_std)
+        least = self.step or 0.0
+        fits = grown(self._feeling(), self.farthest, max(least, self.farthest / FELT), least)
         contours = next(fits)
         while True:
             answer = yield Ask(contours, growing=not self.is_grown)
@@ -127,6 +126,19 @@ class Touch:
             # These contacts are others than those felt.
             return (yield from self._of_reaches(largest, np.floor(largest.counts / STRETCH).astype(np.intp)))
         return found
+
+    def _feeling(self) -> Feel:
+        """What is felt along the planes, with any step; it goes on from where it was."""
+        feels: dict[float, Callable[[float], list[Contour]]] = {}
+
+        def felt(step: float, length: float) -> Felt:
+            """Half curves of a length."""
+            if step not in feels:
+                feels[step] = self.follow(self.planes, step=step)
+            contours = feels[step](min(length, self.farthest))
+            return Felt(contours, self.point, step, self.largest_std, partial=length < self.farthest)
+
+        return felt
 
     def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
         """The touch with half curves of so many of the contacts that were felt; with these where they do."""
