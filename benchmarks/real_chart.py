@@ -25,6 +25,7 @@ def draw(scores, seconds, automatic):
     methods = list(next(iter(next(iter(scores.values())).values())))
     counts = sorted({cell[0] for of in scores.values() for cell in of})
     figure, axes = plot.plt.subplots(1, 3, figsize=(9.5, 3.8), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.12)
     rows = []
     for method, (name, color, mark) in zip(methods, STYLES, strict=True):
         means = [_mean(scores, method, planes) for planes in counts]

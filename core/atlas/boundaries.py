@@ -12,7 +12,7 @@ from ..arguments import Array
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts, Pairs
-from .field import DIFFER, LAYER, node_weights
+from .field import FACING, LAYER, node_weights
 
 TURNS, OUTWARD = 32, 16  # rays from the middle of each patch, and places on each
 
@@ -93,7 +93,7 @@ def _crossings(charts: Charts, node: int) -> _Crossing:
     pairs = charts.pairs(points)
     weights = node_weights(charts, pairs)
     cosine = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
-    wall = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > DIFFER)
+    wall = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > FACING)
     own = pairs.node == node
     mine = np.bincount(pairs.place[own], weights[own], len(points))
     best, which = _strongest(pairs, np.where(wall & ~own, weights, 0.0), len(points))

@@ -21,12 +21,11 @@ from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, DISK, Charts, disk_around
+from .field import FACING, LAYER
 from .join import charts_of
 
 RIM = 24  # places of a rim
 INSIDE = 1.0  # of a domain's radius: farther out a place is not covered
-LAYER = 0.15  # of the radius, that a covered place is off its patch at most
-FACING = 0.34  # cosine of the angle between the normals there, at least
 REACHES = (0.35, 0.12, 0.04)  # of the radius, that the finger goes on; the first that finds what is new
 DISK_REACHES = 3.0  # of these, the radius of the disk around it that tells how much, at most the patch's
 SLIVER = 0.03  # of the disk: less is bridged by what blends patches

@@ -17,17 +17,16 @@ from ..contours.contour import Contour
 from ..patch.smoothing_spline import SIDE, between, smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
-from .field import blended
+from .field import FACING, blended
 
 # python -m benchmarks.atlas chose these.
-FACING = 0.75  # cosine of the angle between a contact's normal and the patch's there, at least
+ALIGNED = 0.75  # cosine of the angle between a contact's normal and the patch's there, at least
 LIKELY = 2.0  # deviations of a patch, as many as a contact is off it at most that weighs 1
-BEYOND = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain
+LOOSER = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain
 FARTHEST = 3.0  # times that, a contact is of another wall
 NOISE = 5e-4  # of the radius, at least
 AT_ONCE, LOOK = 4, 1500  # patches, and contacts or other places of all, in a step
 NEAR = 1.3  # of a domain's radius, as far as heights are asked at knots
-OPPOSED = 0.34  # cosine of the angle of the surface to a patch, below which they are not made to agree
 MOVED = 0.03  # of the radius, that a patch is at most
 
 Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
@@ -73,9 +72,9 @@ def _joined_table(
     rim, half = _square(r)
     least = max(noise / r.radius, NOISE)
     likely = np.hypot(least, LIKELY * r.mean_height_std / r.radius)
-    likely = likely * (1.0 + BEYOND * np.maximum(some.share - 1.0, 0.0))
+    likely = likely * (1.0 + LOOSER * np.maximum(some.share - 1.0, 0.0))
     off = np.abs(some.distance) / (r.radius * likely)
-    facing = np.einsum("mi,mi->m", some.normal, normals[some.place]) > FACING
+    facing = np.einsum("mi,mi->m", some.normal, normals[some.place]) > ALIGNED
     on = own[some.place] | ((off < FARTHEST) & facing)
     place = some.place[on]
     local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
@@ -106,8 +105,8 @@ def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
     points, _ = charts.world(node, x, y)
     field = blended(charts, points)
     up = np.einsum("ki,ki->k", field.normal, charts.axes[node, :, 2])
-    move = -field.distance / np.maximum(up, OPPOSED) / charts.radii[node]
-    on = (field.node >= 0) & (up > OPPOSED) & (np.abs(move) < MOVED)
+    move = -field.distance / np.maximum(up, FACING) / charts.radii[node]
+    on = (field.node >= 0) & (up > FACING) & (np.abs(move) < MOVED)
     return np.where(on, move, 0.0)
 
 

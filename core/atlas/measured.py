@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An atlas of contacts that were measured, as a robot's rasters: no surface is asked, no touch chosen."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from ..arguments import Array, list_of, number, unit_vector
 from ..contours.contour import Contour
+from ..exploration.side_by_side import result_of
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
-from .frontier import FACING
+from .field import FACING
 from .join import charts_of
 from .object_atlas import Atlas
 
@@ -35,17 +36,34 @@ def atlas_of(
 
     outward : (3,), on the outer side of all contacts; required where some have no normals that face outward
     tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
-    noise : accuracy of a contact; None for the contours' own
+    noise : standard deviation of a contact; None for the contours' own
 
     Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, and if no
     contacts carry a patch.
+    """
+    steps = cover_contacts(contours_or_strokes, outward=outward, tolerance=tolerance, noise=noise)
+    atlas: Atlas = result_of(steps)
+    return atlas
+
+
+def cover_contacts(
+    contours_or_strokes: Sequence[ArrayLike | Contour],
+    *,
+    outward: ArrayLike | None = None,
+    tolerance: float | None = None,
+    noise: float | None = None,
+) -> Generator[float, None, Atlas]:
+    """What `atlas_of` does, in steps: yields the share of the contacts that is covered, returns the Atlas.
+
+    Arguments and errors are those of `atlas_of`; the errors come with the first steps.
     """
     from scipy.spatial import cKDTree
 
     points, normals, own = _contacts(contours_or_strokes, outward)
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = own if noise is None else number("noise", noise, least=0.0)
-    found = _patches(_Cloud(points, normals, cKDTree(points), noise, largest))
+    yield 0.0
+    found = yield from _patches(_Cloud(points, normals, cKDTree(points), noise, largest))
     return Atlas(tuple(found), charts_of(found), largest)
 
 
@@ -110,7 +128,7 @@ class _Cloud(NamedTuple):
             best, radius = r, STRETCH * radius
         return best
 
-    def least_radius(self) -> float:
+    def least_radius(self) -> Generator[float, None, float]:
         """At which half of some contacts carry a patch: rasters have theirs in lines. Raises ValueError."""
         some = np.linspace(0, len(self.points) - 1, SOME).astype(np.intp)
         radius = float(np.median(self.tree.query(self.points[some], FIRST)[0][:, -1]))
@@ -118,15 +136,16 @@ class _Cloud(NamedTuple):
             if sum(self.patch(i, radius) is not None for i in some.tolist()) * 2 >= SOME:
                 return radius
             radius *= STRETCH
+            yield 0.0
         raise ValueError(
             "contours_or_strokes: expected contacts all around at least one of them, got "
             f"{len(self.points)} without"
         )
 
 
-def _patches(cloud: _Cloud) -> list[Reconstruction]:
+def _patches(cloud: _Cloud) -> Generator[float, None, list[Reconstruction]]:
     """Patches at contacts that none so far covers, one after the other, each as large as it may be."""
-    radius = cloud.least_radius()
+    radius = yield from cloud.least_radius()
     left, found = np.ones(len(cloud.points), dtype=bool), []
     for i in range(len(left)):
         if not left[i]:
@@ -137,4 +156,5 @@ def _patches(cloud: _Cloud) -> list[Reconstruction]:
         left[near] &= cloud.normals[near] @ cloud.normals[i] < FACING
         if r is not None:
             found.append(r)
+        yield 1.0 - float(left.mean())
     return found

@@ -16,8 +16,8 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, edges_of, node_dict
 from .charts import Charts
-from .field import AGREE, DIFFER, LAYER, blended, node_weights
-from .frontier import FACING, INSIDE, Place
+from .field import AGREE, FACING, LAYER, blended, node_weights
+from .frontier import INSIDE, Place
 from .meshing import SMALLEST, Mesh, meshed
 
 VERSION = 1  # of the graph as data
@@ -219,7 +219,7 @@ def _blended_curvatures(atlas: Atlas, points: Array, normals: Array) -> tuple[Ar
     charts = atlas.charts
     pairs = charts.pairs(points)
     facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
-    weights = node_weights(charts, pairs) * np.clip((facing - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
+    weights = node_weights(charts, pairs) * np.clip((facing - FACING) / (AGREE - FACING), 0.0, 1.0)
     radii = charts.radii[pairs.node]
     weights *= np.abs(pairs.distance) < LAYER * radii
     x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T * radii

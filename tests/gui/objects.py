@@ -35,6 +35,7 @@ from common import (
 SCAN = os.environ.get("TACTILE_SCAN", "")
 TARGET = Path(SCAN).stem or "Suzanne"
 SIZE = 2.7  # of Suzanne
+UPRIGHT = 0.75  # extents from the point to the handle of the tilt
 
 
 def suzanne():
@@ -279,6 +280,7 @@ def handles():
         turned = probe().tactile_probe.azimuths[0] - azimuth
         check(f"{obj.name} active, the handles are there", abs(turned - 0.4) < 0.05, turned)
     picture("handles")
+    yield from tilt_seen_steeply(axes)
     select(probe())
     look(axes.translation, axes.col[2].xyz, 6.0 * extent(probe()))
     yield 1
@@ -300,6 +302,24 @@ def handles():
     yield from until(is_complete)
     moved = probe().matrix_world.translation - before
     check("... and one Ctrl Z takes it back", moved.length < 1e-5 * max(1.0, before.length), moved)
+
+
+def tilt_seen_steeply(axes):
+    """A drag where the handle of the tilt is, seen so that a pixel would tilt the active plane by much."""
+    select(probe())
+    settings, up = probe().tactile_probe, axes.col[2].xyz
+    azimuth = settings.azimuths[settings.active_plane]
+    along = math.cos(azimuth) * axes.col[0].xyz + math.sin(azimuth) * axes.col[1].xyz
+    look(axes.translation, up + 0.5 * up.cross(along) + 0.1 * along, 6.0 * extent(probe()))
+    yield 1
+    tilts = settings.tilts[:]
+    at = gui.view_point(axes.translation + UPRIGHT * extent(probe()) * up)
+    picture("tilt_seen_steeply")
+    gui.drag(at, (at[0] + 40, at[1] + 15))
+    yield 1
+    yield from until(is_complete)
+    now = probe().tactile_probe.tilts[:]
+    check("seen steeply, a drag above the point tilts nothing", now == tilts, (tilts, now))
 
 
 def edges():
