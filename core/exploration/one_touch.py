@@ -32,6 +32,7 @@ from .growth import (
 # benchmarks.amount judges the first, benchmarks.speed --base what adding planes costs.
 NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
 HELPS = 0.1  # Share of it that one more plane must take off.
+QUIET = 1.0  # of it: where contacts scatter by less, twice as many take nothing noticeable off
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,9 +200,10 @@ class Touch:
 def is_enough(r: Reconstruction) -> bool:
     """Whether twice as many contacts would take less than NOTICEABLE off the mean deviation of the height.
 
-    They would tell nothing where that is less than a polynomial may be off.
+    They would tell nothing where that is less than a polynomial may be off, nor where it is more than
+    contacts scatter: then it is what no contact tells that makes it large.
     """
-    if r.mean_height_std <= MISFIT * r.radius:
+    if r.mean_height_std <= MISFIT * r.radius or r.uncertainty.noise * r.radius <= QUIET * r.mean_height_std:
         return True
     (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
     if r.residual is None:

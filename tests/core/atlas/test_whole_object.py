@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import core
+from core.atlas.charts import Charts
 from tests import solids
 
 
@@ -234,8 +235,10 @@ def test_edges_in_steps_are_the_edges(block):
 
 
 @pytest.mark.parametrize("answer", [None, False])
-def test_false_while_patches_are_joined_ends_the_touching(answer):
-    """Without it, patches that are less certain than the tolerance are touched again."""
+def test_false_while_patches_are_joined_ends_the_touching(answer, monkeypatch):
+    """Without it, patches that are less certain than the tolerance, here than a quarter, are touched again."""
+    less = Charts.less_certain_than
+    monkeypatch.setattr(Charts, "less_certain_than", lambda self, tolerance: less(self, 0.25 * tolerance))
     solid, joining = solids.ring(), []
     steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=8e-3, noise=8e-3, rng=0)
     state = next(steps)
