@@ -25,13 +25,13 @@ from ..reconstruction.status import DOUBTFUL_STD
 # benchmarks.amount judges the numbers of contacts, benchmarks.extents how far curves grow.
 # Numbers of contacts of the longest half curve: the first that is enough is taken.
 CONTACT_COUNTS = (12, 24, 48)
-LEAST = 4  # contacts of the shortest half curve
+SHORTEST = 4  # contacts of the shortest half curve
 FELT = 96  # steps of a half curve as long as may be
 SEEDS = ((24, 1), (12, 1), (6, 2), (3, 4))  # Steps that a half curve may begin with, and contacts in each.
 DENSE_DOUBT = 1.2  # of one with more contacts than steps, up to which none is tried that is shorter still
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
 STRETCH = 1.5  # A half curve grows by this factor at once.
-NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
+NEARLY_ENDED = 0.75  # of what ends growth: where twice as long is in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
 TOO_ROUGH = 0.0068  # Roughness of contacts whose fit ends growth, in all but three of a hundred
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
@@ -143,12 +143,17 @@ def grown(feel: Feel, farthest: float, step: float, least: float) -> Fits:
     known: list[Grown] = []
     found = yield from _seed(feel, step, least, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
-    noisy = found.result.accuracy > MISFIT and found is not known[-1]
-    if not (noisy or (found.felt.step == step and found.doubt <= 1.0)):
+    if found.result.accuracy > MISFIT and found is not known[-1]:
+        return (yield from _longer(feel, farthest, found, np.inf, np.inf))
+    if found.felt.step < step or found.doubt > 1.0:
         return found
-    doubtful = np.inf if noisy else min((t.length for t in known if t.spread > 1.0), default=np.inf)
     longest = (found.counts == np.minimum(SEEDS[0][0], found.felt.whole)).all()
-    most = np.inf if noisy else 1.0 if longest else NEAR
+    doubtful = min((trial.length for trial in known if trial.spread > 1.0), default=np.inf)
+    return (yield from _longer(feel, farthest, found, 1.0 if longest else NEARLY_ENDED, doubtful))
+
+
+def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: float) -> Fits:
+    """The same, longer, as long as the mean deviation is not above `most`, and shorter than `doubtful`."""
     accepted, felt, growing = [found], found.felt, np.full(found.counts.shape, True)
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
@@ -156,9 +161,8 @@ def grown(feel: Feel, farthest: float, step: float, least: float) -> Fits:
         if length >= doubtful:
             break
         if (felt.open & (longer > felt.whole)).any():
-            felt = feel(
-                felt.step, min(length + felt.step, farthest)
-            )  # one more, so that where they end shows
+            further = min(length + felt.step, farthest)  # by one more, so that where they end shows
+            felt = feel(felt.step, further)
         try:
             trial = yield from tried(felt, np.minimum(longer, felt.whole))
         except DegenerateCurvesError:
@@ -221,7 +225,7 @@ def stride_of(counts: Counts) -> int:
 
 
 def spacing(reaches: Array | Counts, count: int) -> float:
-    """A step that gives the longest of half curves (c, 2) some `count` contacts, the shortest LEAST."""
+    """A step that gives the longest of half curves (c, 2) some `count` contacts, the shortest SHORTEST."""
     longest = float(reaches.max())
     shortest = float(np.where(reaches > 0, reaches, longest).min())
-    return min(longest / count, max(shortest / LEAST, longest / CONTACT_COUNTS[-1]))
+    return min(longest / count, max(shortest / SHORTEST, longest / CONTACT_COUNTS[-1]))

@@ -19,7 +19,7 @@ from ..reconstruction.result import Reconstruction
 from .growth import (
     CONTACT_COUNTS,
     FELT,
-    LEAST,
+    SHORTEST,
     STRETCH,
     Counts,
     Feel,
@@ -192,9 +192,9 @@ class Touch:
                 raise r
             misfits = felt.misfits(counts, r)
             worst = int(np.argmax(misfits))
-            if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * LEAST:
+            if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * SHORTEST:
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
-            counts.flat[worst] = max(2 * LEAST, int(counts.flat[worst] / STRETCH) // 2 * 2)
+            counts.flat[worst] = max(2 * SHORTEST, int(counts.flat[worst] / STRETCH) // 2 * 2)
 
 
 def is_enough(r: Reconstruction) -> bool:
