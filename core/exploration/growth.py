@@ -30,7 +30,8 @@ FELT = 96  # steps of a half curve as long as may be
 SEEDS = ((24, 1), (12, 1), (6, 2), (3, 4))  # Steps that a half curve may begin with, and contacts in each.
 DENSE_DOUBT = 1.2  # of one with more contacts than steps, up to which none is tried that is shorter still
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
-STRETCH = 1.5  # A half curve grows by this factor at once.
+STRETCH = 1.5  # A half curve grows by this factor at once, by its square where it is in next to no doubt,
+EASY = 0.1  # of what ends growth.
 NEARLY_ENDED = 0.75  # of what ends growth: where twice as long is in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
 TOO_ROUGH = 0.0068  # Roughness of contacts whose fit ends growth, in all but three of a hundred
@@ -154,9 +155,11 @@ def grown(feel: Feel, farthest: float, step: float, least: float) -> Fits:
 
 def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: float) -> Fits:
     """The same, longer, as long as the mean deviation is not above `most`, and shorter than `doubtful`."""
-    accepted, felt, growing = [found], found.felt, np.full(found.counts.shape, True)
+    accepted, felt, growing, quick = [found], found.felt, np.full(found.counts.shape, True), True
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
-        longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
+        quick = quick and found.doubt <= EASY
+        stretched = np.ceil((STRETCH**2 if quick else STRETCH) * found.counts)
+        longer = np.where(growing, stretched, found.counts).astype(np.intp)
         length = float(longer.max()) * felt.step
         if length >= doubtful:
             break
@@ -167,7 +170,9 @@ def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: fl
             trial = yield from tried(felt, np.minimum(longer, felt.whole))
         except DegenerateCurvesError:
             break
-        if trial.misfits.max() > 1.0:  # the half curve that is explained worst ends here
+        if quick and trial.doubt > 1.0:
+            quick = False
+        elif trial.misfits.max() > 1.0:  # the half curve that is explained worst ends here
             growing.flat[np.argmax(np.where(growing, trial.misfits, -1.0))] = False
         elif trial.spread > max(1.0, found.spread):
             break
