@@ -18,6 +18,7 @@ from .boundaries import Edge, edges_of, node_dict
 from .charts import Charts
 from .field import AGREE, DIFFER, LAYER, blended, node_weights
 from .frontier import FACING, INSIDE, Place
+from .join import Felt, felt_by, told
 from .meshing import SMALLEST, Mesh, meshed
 
 VERSION = 1  # of the graph as data
@@ -117,7 +118,7 @@ class Atlas:
         inf where that is at an open rim, so that something unfelt might be nearer.
         """
         p = finite_array("points", points, (None, 3), LARGEST)
-        field = blended(self.charts, p)
+        field = told(self.charts, self._felt, p)
         distance, std, far = field.distance.copy(), field.std.copy(), np.flatnonzero(field.node < 0)
         if len(far):
             distance[far], std[far] = self._far(p[far])
@@ -129,6 +130,10 @@ class Atlas:
         away, nearest = samples.tree.query(points)
         ahead = np.einsum("ni,ni->n", points - samples.points[nearest], samples.normals[nearest])
         return np.copysign(away, ahead), samples.stds[nearest]
+
+    @cached_property
+    def _felt(self) -> Felt:
+        return felt_by(self.patches, self.charts)
 
     @cached_property
     def _samples(self) -> _Samples:
@@ -192,7 +197,7 @@ class Atlas:
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """What `mesh` does, in steps: yields the share that is done, and returns the mesh."""
-        return meshed(self.charts, number("edge", edge, above=0.0))
+        return meshed(self.charts, self._felt, number("edge", edge, above=0.0))
 
     def to_dict(self) -> dict[str, Any]:
         """The graph as a dict of numbers, words, lists and dicts, as JSON has them, in the caller's unit.
