@@ -14,7 +14,7 @@ from ..arguments import LARGEST, Array, finite_array, number
 from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
-from .boundaries import Edge, edges_of, node_dict
+from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
 from .field import AGREE, DIFFER, LAYER, blended, node_weights
 from .frontier import FACING, INSIDE, Place
@@ -67,6 +67,16 @@ class Atlas:
         """What `edges` does, in steps: yields the share that is done, after which `edges` are known."""
         if "edges" not in vars(self):
             vars(self)["edges"] = yield from edges_of(self.charts)  # where cached_property looks
+
+    def bends(self, edge: Edge) -> tuple[Array, Array]:
+        """Gaussian curvatures (2, m) of both patches along their boundary, and standard deviations there.
+
+        They are those of the touches' polynomials, which know less of them at a rim than at the point.
+        """
+        curvatures, stds = zip(
+            *(gaussian_curvature_of(self.patches[node], edge.curve) for node in edge.nodes), strict=True
+        )
+        return np.array(curvatures), np.array(stds)
 
     @property
     def status(self) -> str:
