@@ -184,7 +184,12 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
         known[rough[-1].tobytes()] = yield from tried(felt, rough[-1])
     if not known and error is not None:
         raise error
-    return min(known.values(), key=lambda trial: (trial.doubt, trial.counts.max()))
+    best = min(known.values(), key=lambda trial: (trial.doubt, trial.counts.max()))
+    if best.doubt <= 1.0:
+        return best
+    # What growth does not go on from may be sure all the same: then the longest is.
+    enough = [trial for trial in known.values() if trial.sure and trial.misfits.max() <= 1.0]
+    return max((best, *enough), key=lambda trial: trial.counts.max())
 
 
 def tried(felt: Felt, counts: Counts) -> Fits:

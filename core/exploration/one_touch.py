@@ -28,10 +28,12 @@ from .growth import (
     grown,
     spacing,
 )
+from .taps import Tapped, beside
 
 # benchmarks.amount judges the first, benchmarks.speed --base what adding planes costs.
 NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
 HELPS = 0.1  # Share of it that one more plane must take off.
+SHORTER = 1.25  # A half curve beside what contradicts a fit is shortened by this factor at once.
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,7 @@ class Touch:
     Lengths are None where they are to be chosen, the tolerance where no planes are to be added.
     reference : columns e1, n and e1 x n, which azimuths are measured by
     largest_std : a length, that curves may grow to
+    tap : taps between the curves of a fit, see taps.py
     is_grown : whether what makes curves grow is the fit that is asked for
     """
 
@@ -82,6 +85,7 @@ class Touch:
     tolerance: float | None
     most_planes: float
     largest_std: float | None
+    tap: Callable[[Reconstruction], Tapped]
     is_grown: bool
 
     def steps(self) -> Steps:
@@ -99,6 +103,8 @@ class Touch:
             except ValueError:  # nothing can be felt along that one: what was felt so far stays
                 break
             stds.append(found.result.mean_height_std)
+        if self.extent is None and found.result.taps is None:
+            found, _ = self._tapped(found)
         return replace(found, stds=tuple(stds))
 
     def _of_extent(self, extent: float) -> Steps:
@@ -122,11 +128,36 @@ class Touch:
             except StopIteration as end:
                 largest: Grown = end.value
                 break
-        found = yield from self._of_reaches(largest, largest.counts)
+        counts = largest.counts
+        found = yield from self._of_reaches(largest, counts)
         if largest.sure and found.result.status != "ok" and self.is_grown:
             # These contacts are others than those felt.
-            return (yield from self._of_reaches(largest, np.floor(largest.counts / STRETCH).astype(np.intp)))
-        return found
+            counts = np.floor(counts / STRETCH).astype(np.intp)
+            found = yield from self._of_reaches(largest, counts)
+        return (yield from self._agreeing(largest, counts, found))
+
+    def _agreeing(self, largest: Grown, counts: Counts, found: Exploration) -> Steps:
+        """The touch with curves so much shorter that no tap between them contradicts it; or as it is."""
+        r, (found, where) = found.result, self._tapped(found)
+        if not (len(where) and self.is_grown and r.status == "ok"):
+            return found
+        shorter = found
+        while len(where):
+            worst, counts = beside(shorter.result, where), counts.copy()
+            counts.flat[worst] = (counts.flat[worst] / SHORTER).astype(np.intp)
+            if counts.flat[worst].min() < LEAST:
+                break
+            try:
+                shorter, where = self._tapped((yield from self._of_reaches(largest, counts)))
+            except DegenerateCurvesError:
+                break
+        return shorter if shorter.result.status == "ok" else found
+
+    def _tapped(self, found: Exploration) -> tuple[Exploration, Array]:
+        """The touch with what taps say of it, and the places where they contradict it, (k, 2)."""
+        r = found.result
+        taps, where = self.tap(r)
+        return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std)), where
 
     def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
         """The touch with half curves of so many of the contacts that were felt; with these where they do."""
@@ -181,7 +212,7 @@ class Touch:
             worst = int(np.argmax(misfits))
             if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * LEAST:
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
-            counts.flat[worst] = max(2 * LEAST, int(counts.flat[worst] / STRETCH) // 2 * 2)
+            counts.flat[worst] = (counts.flat[worst] / SHORTER).astype(np.intp)
 
 
 def is_enough(r: Reconstruction) -> bool:
