@@ -185,9 +185,9 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
     if not known and error is not None:
         raise error
     best = min(known.values(), key=lambda trial: (trial.doubt, trial.counts.max()))
-    if best.doubt <= 1.0:
+    if best.doubt <= 1.0 or felt.largest_std is not None:
         return best
-    # What growth does not go on from may be sure all the same: then the longest is.
+    # Growth does not go on from any, but the longest that is sure is as good as a short one in less doubt.
     enough = [trial for trial in known.values() if trial.sure and trial.misfits.max() <= 1.0]
     return max((best, *enough), key=lambda trial: trial.counts.max())
 

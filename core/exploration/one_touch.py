@@ -88,6 +88,11 @@ class Touch:
     tap: Callable[[Reconstruction], Tapped]
     is_grown: bool
 
+    @property
+    def is_tapped(self) -> bool:
+        """Whether the finger taps between the curves: not where they are as long as asked for."""
+        return self.extent is None and self.largest_std is None
+
     def steps(self) -> Steps:
         """The touch, with planes added while they help: they are for a better patch, not for a larger one."""
         found = yield from (self._grown() if self.extent is None else self._of_extent(self.extent))
@@ -103,7 +108,7 @@ class Touch:
             except ValueError:  # nothing can be felt along that one: what was felt so far stays
                 break
             stds.append(found.result.mean_height_std)
-        if self.extent is None and found.result.taps is None:
+        if self.is_tapped and found.result.taps is None:
             found, _ = self._tapped(found)
         return replace(found, stds=tuple(stds))
 
@@ -134,7 +139,7 @@ class Touch:
             # These contacts are others than those felt.
             counts = np.floor(counts / STRETCH).astype(np.intp)
             found = yield from self._of_reaches(largest, counts)
-        return (yield from self._agreeing(largest, counts, found))
+        return (yield from self._agreeing(largest, counts, found)) if self.is_tapped else found
 
     def _agreeing(self, largest: Grown, counts: Counts, found: Exploration) -> Steps:
         """The touch with curves so much shorter that no tap between them contradicts it; or as it is."""

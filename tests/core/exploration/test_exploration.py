@@ -115,6 +115,31 @@ def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
     assert explore(surfaces.plane()).result.status == "ok"
 
 
+@pytest.mark.parametrize("largest_std", [None, 1.0])
+def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, monkeypatch):
+    """A longer one is as good as a short one in less doubt, where no deviation is asked for."""
+    spreads, sure = {24: 1.7, 12: 1.4, 6: 1.3, 3: 1.1}, {24: False, 12: True, 6: True, 3: False}
+
+    class Trial(growth.Grown):
+        @property
+        def sure(self):
+            return sure[int(self.counts.max())]
+
+    def tried(felt, counts):
+        yield from ()
+        return Trial(felt, counts, 1, np.zeros((3, 2)), spreads[int(counts.max())], None)
+
+    class Felt:
+        whole = np.full((3, 2), 24)
+        roughness = staticmethod(lambda counts: 0.0)
+
+    monkeypatch.setattr(growth, "tried", tried)
+    felt = Felt()
+    felt.largest_std = largest_std
+    found = side_by_side.result_of(growth._seed(felt, {}))
+    assert found.counts.max() == (12 if largest_std is None else 3)
+
+
 def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():
     found = explore(surfaces.plane(), noise=0.01, rng=0)
     assert found.extent == pytest.approx(30.0)

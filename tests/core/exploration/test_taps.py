@@ -152,8 +152,9 @@ def test_many_are_judged_as_each_is():
         assert one.result.taps.off == pytest.approx(other.result.taps.off, rel=1e-9)
 
 
-def test_an_extent_that_is_given_is_not_tapped():
-    assert explore(Sector(-4.0), extent=20.0).result.taps is None
+@pytest.mark.parametrize("more", [{"extent": 20.0}, {"largest_std": 0.1}])
+def test_curves_as_long_as_asked_for_are_not_tapped_between(more):
+    assert explore(Sector(-4.0), **more).result.taps is None
 
 
 def test_planes_that_are_added_are_tapped_between():
