@@ -33,7 +33,7 @@ from .taps import Tapped, beside
 # benchmarks.amount judges the first, benchmarks.speed --base what adding planes costs.
 NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
 HELPS = 0.1  # Share of it that one more plane must take off.
-SHORTER = 1.25  # A half curve beside what contradicts a fit is shortened by this factor at once.
+SHORTER = 1.15  # A half curve beside what contradicts a fit is shortened by this factor at once.
 
 
 @dataclass(frozen=True, eq=False)
