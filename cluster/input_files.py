@@ -28,7 +28,7 @@ def _files(path: Path) -> Iterator[Path]:
     elif path.suffix.lower() == LIST:
         for line in path.read_text(encoding="utf-8").splitlines():
             if line.strip().lower().endswith(LIST):
-                raise ValueError(f'objects: expected files and folders in the list "{path}", got another list')
+                raise ValueError(f'objects: expected files or folders in the list "{path}", got a list')
             if line.strip():
                 yield from _files(path.parent / line.strip())
     elif path.suffix.lower() in KINDS:

@@ -7,7 +7,7 @@ convex body has negative curvatures under its outward normal.
 """
 
 from .atlas.boundaries import Edge
-from .atlas.measured import atlas_of
+from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh
 from .atlas.object_atlas import Atlas, NextTouch
 from .atlas.touching import Progress, explore_object, touch_all_over
@@ -67,6 +67,7 @@ __all__ = [
     "atlas_of",
     "azimuth_of",
     "common_point",
+    "cover_contacts",
     "distances",
     "explore",
     "explore_many",

@@ -45,7 +45,9 @@ COMMANDS = {
     "fit": Command("import_contacts", patch_record.RECORD, readable, {}),
     "table": Command("", "", lambda report: f"{report['rows']} rows written", {}),
     "object": Command("touch_all_over", patch_record.ATLAS_RECORD, object_readable, {"progress": True}),
-    "join": Command("import_contacts", patch_record.ATLAS_RECORD, object_readable, {"whole": True}),
+    "join": Command(
+        "import_contacts", patch_record.ATLAS_RECORD, object_readable, {"whole": True, "progress": True}
+    ),
     "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
 }
 # What the operators take as it is given.

@@ -55,11 +55,11 @@ class Exact:
         (x, y, z), (u, v, w) = map(float, origin), map(float, direction)
         t = float(distance) * SHARES
         f = self.level(x + u * t, y + v * t, z + w * t)
-        crossing = np.flatnonzero(np.sign(f[:-1]) * np.sign(f[1:]) <= 0)
-        if not len(crossing):
+        crosses = f[:-1] * f[1:] <= 0.0
+        first = int(crosses.argmax())
+        if not crosses[first]:
             return None
-        a, b = t[crossing[0] : crossing[0] + 2].tolist()
-        fa, fb = f[crossing[0] : crossing[0] + 2].tolist()
+        (a, b), (fa, fb) = t[first : first + 2].tolist(), f[first : first + 2].tolist()
         for _ in range(60):
             if fa == fb or abs(b - a) < 1e-15 * distance:
                 break
@@ -75,6 +75,20 @@ class Exact:
         hit = np.array([x + u * b, y + v * b, z + w * b])
         g = self.gradient(hit)
         return hit, g / math.sqrt(g @ g)
+
+    def crossings(self, starts, direction, distance):
+        """The first crossings along parallel rays (m, 3), bisected; NaN where there is none."""
+
+        def level(gone):
+            return self.level(*(starts.T[..., None] + np.multiply.outer(direction, gone)))
+
+        f, rows = level(distance * SHARES[None]), np.arange(len(starts))
+        crosses = f[:, :-1] * f[:, 1:] <= 0.0
+        first = crosses.argmax(axis=1)
+        before, gone = f[rows, first, None], distance * SHARES[first, None]
+        for half in 0.5 ** np.arange(1, 51) * distance * SHARES[1]:
+            gone = np.where(level(gone + half) * before > 0.0, gone + half, gone)
+        return np.where(crosses[rows, first, None], starts + gone * direction, np.nan)
 
 
 def plane():
@@ -140,12 +154,22 @@ def graph(terms):
     """z = sum c x^i y^j over {(i, j): c}, i + j >= 2, touched at the origin."""
 
     def partial(dx, dy):
-        left = [
-            (float(c) * math.perm(i, dx) * math.perm(j, dy), i - dx, j - dy)
-            for (i, j), c in terms.items()
-            if i >= dx and j >= dy
-        ]
-        return lambda x, y: sum((c * x**i * y**j for c, i, j in left), 0.0 * x * y)
+        """A derivative by Horner's scheme, in y and then in x: rays ask for it many times."""
+        rows = []
+        for i in range(max(i for i, _ in terms), dx - 1, -1):
+            of_y = range(max((j for k, j in terms if k == i), default=0), dy - 1, -1)
+            rows.append([math.perm(i, dx) * math.perm(j, dy) * float(terms.get((i, j), 0.0)) for j in of_y])
+
+        def value(x, y):
+            total = 0.0 * x * y
+            for row in rows:
+                along_y = 0.0
+                for c in row:
+                    along_y = along_y * y + c
+                total = total * x + along_y
+            return total
+
+        return value
 
     height, along_x, along_y = partial(0, 0), partial(1, 0), partial(0, 1)
     hessian = [
@@ -222,7 +246,8 @@ def heights_over(surface, r, count=200):
     """Points of a reconstruction's domain (m, 2), and the surface's heights there in its frame, by rays."""
     points, _ = r.domain.grid(count)
     starts = r.frame.to_world(np.column_stack([points, np.full(len(points), r.radius)]))
-    hits = [surface.ray_cast(start, -r.frame.axes[:, 2], 2 * r.radius)[0] for start in starts]
+    hits = surface.crossings(starts, -r.frame.axes[:, 2], 2.0 * r.radius)
+    assert np.isfinite(hits).all()
     return points, r.frame.to_local(hits)[:, 2]
 
 

@@ -12,9 +12,9 @@ from ..arguments import Array
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts, Pairs
-from .field import DIFFER, LAYER, node_weights
+from .field import FACING, LAYER, node_weights
 
-TURNS, OUTWARD = 32, 16  # rays from the middle of each patch, and places on each
+RAYS, RAY_PLACES = 32, 16  # rays from the middle of each patch, and places on each
 
 
 class Edge(NamedTuple):
@@ -76,35 +76,35 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
 def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:
     """From the ray after the widest gap on."""
     rays = ray[which]
-    gaps = np.diff(rays, append=rays[0] + TURNS)
+    gaps = np.diff(rays, append=rays[0] + RAYS)
     start = int(np.argmax(gaps)) + 1
     return which[start:] + which[:start]
 
 
 def _crossings(charts: Charts, node: int) -> _Crossing:
     """Where a patch gives way to another, on rays from its middle."""
-    turns = 2.0 * np.pi * np.arange(TURNS) / TURNS
-    out = MARGIN * np.arange(1, OUTWARD + 1) / (OUTWARD + 1)
+    turns = 2.0 * np.pi * np.arange(RAYS) / RAYS
+    out = MARGIN * np.arange(1, RAY_PLACES + 1) / (RAY_PLACES + 1)
     rays = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    each = np.full(TURNS, node)
+    each = np.full(RAYS, node)
     unit = 1.0 / np.maximum(charts.shares(rays[:, 0], rays[:, 1], each), 1e-9)
     xy = (rays * unit[:, None])[:, None] * out[:, None]
-    points, normals = charts.world(np.full(TURNS * OUTWARD, node), *xy.reshape(-1, 2).T)
+    points, normals = charts.world(np.full(RAYS * RAY_PLACES, node), *xy.reshape(-1, 2).T)
     pairs = charts.pairs(points)
     weights = node_weights(charts, pairs)
     cosine = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
-    wall = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > DIFFER)
+    wall = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > FACING)
     own = pairs.node == node
     mine = np.bincount(pairs.place[own], weights[own], len(points))
     best, which = _strongest(pairs, np.where(wall & ~own, weights, 0.0), len(points))
-    ratio = np.log(np.maximum(best, 1e-300) / np.maximum(mine, 1e-300)).reshape(TURNS, OUTWARD)
+    ratio = np.log(np.maximum(best, 1e-300) / np.maximum(mine, 1e-300)).reshape(RAYS, RAY_PLACES)
     lost = ratio > 0.0
     ray = np.flatnonzero(lost.any(axis=1))
     at = lost[ray].argmax(axis=1)
     before = np.maximum(at - 1, 0)
     a, b = np.where(at > 0, ratio[ray, before], 0.0), ratio[ray, at]
     share = np.clip(-a / np.where(b - a > 0.0, b - a, 1.0), 0.0, 1.0)
-    place = ray * OUTWARD + at
+    place = ray * RAY_PLACES + at
     flat = (1.0 - share)[:, None] * xy[ray, before] + share[:, None] * xy[ray, at]
     point, _ = charts.world(np.full(len(ray), node), *flat.T)
     angle = np.arccos(np.clip(cosine[which[place]], -1.0, 1.0))

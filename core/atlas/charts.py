@@ -22,7 +22,7 @@ from ..patch.smoothing_spline import SIDE, weights_at
 MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
 AZIMUTHS = 96  # samples of a domain's radius
 REACH = 0.5  # of the radius, that a place may be off its patch
-DISK = 36  # places of a disk around a place
+DISK_PLACES = 36  # places of a disk around a place
 CHUNK = 200_000  # pairs at once
 
 
@@ -224,9 +224,9 @@ def _catmull_rom(t: Array) -> Array:
 
 
 def disk_around(normal: Vector, ahead: Vector) -> Array:
-    """Places (DISK, 3) spread evenly over the unit disk across a normal: a sunflower's."""
-    i = np.arange(DISK) + 0.5
-    turn, out = math.pi * (3.0 - math.sqrt(5.0)) * i, np.sqrt(i / DISK)
+    """Places (DISK_PLACES, 3) spread evenly over the unit disk across a normal: a sunflower's."""
+    i = np.arange(DISK_PLACES) + 0.5
+    turn, out = math.pi * (3.0 - math.sqrt(5.0)) * i, np.sqrt(i / DISK_PLACES)
     e1 = np.cross(normal, ahead)
     if not np.linalg.norm(e1) > 1e-3:
         e1 = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])

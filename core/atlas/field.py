@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from .charts import MARGIN, Charts, Pairs
 
-BEYOND = 0.999  # of MARGIN, at which a weight stays: no more than that is one beyond it
+OUTERMOST = 0.999  # of MARGIN, at which a weight stays: no more than that is one beyond it
 FLOOR = 1e-3  # of the radius, that no deviation is taken below in a weight
-AGREE, DIFFER = 0.64, 0.34  # cosines of 50 and 70 degrees: between them a patch fades out of a blend
-LAYER = 0.15  # of the radius, that patches of one wall may differ in height at most
+AGREE, FACING = 0.64, 0.34  # cosines of 50 and 70 degrees: a patch fades out of a blend, faces another way
+LAYER = 0.15  # of the radius, that what is of one wall may differ in height at most
 SLANT = 0.5  # and of the distance from it
 WALLS = 3  # that meet at a place
 WELL_INSIDE = 0.8  # of a domain's radius
@@ -67,7 +67,7 @@ _Wall = tuple[Blend, Array]  # with a point of it (k, 3), the nearest that its p
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
     """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), u the share of MARGIN times the domain's radius."""
-    u = np.minimum(pairs.share / MARGIN, BEYOND)
+    u = np.minimum(pairs.share / MARGIN, OUTERMOST)
     floor = FLOOR * charts.radii[pairs.node]
     weights: Array = (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (pairs.std**2 + floor**2)
     return weights
@@ -83,7 +83,7 @@ def _wall(
     nearest = _first(place, np.abs(distance) + 0.5 * LAYER * radius * out**2, len(points))
     r = nearest[place]
     cosine = np.einsum("mi,mi->m", normal, normal[r])
-    agree = np.clip((cosine - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
+    agree = np.clip((cosine - FACING) / (AGREE - FACING), 0.0, 1.0)
     agree *= agree * (3.0 - 2.0 * agree)
     room = LAYER * np.maximum(radius, radius[r]) + SLANT * np.abs(distance[r])
     agree *= np.clip(1.0 - ((distance - distance[r]) / room) ** 2, 0.0, 1.0) ** 2
@@ -123,6 +123,7 @@ def _mean(
     """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
 
     def total(values: Array) -> Array:
+        """Weighted sums (count,) of what the pairs at each place say."""
         return np.bincount(place, w * values, count).astype(np.float64)  # of nothing: whole numbers
 
     some = total(np.ones(len(w)))

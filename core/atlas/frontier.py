@@ -20,18 +20,17 @@ from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface
 from ..reconstruction.result import Reconstruction
-from .charts import AZIMUTHS, DISK, Charts, disk_around
+from .charts import AZIMUTHS, DISK_PLACES, Charts, disk_around
+from .field import FACING, LAYER
 from .join import charts_of
 
 RIM = 24  # places of a rim
 INSIDE = 1.0  # of a domain's radius: farther out a place is not covered
-LAYER = 0.15  # of the radius, that a covered place is off its patch at most
-FACING = 0.34  # cosine of the angle between the normals there, at least
 REACHES = (0.35, 0.12, 0.04)  # of the radius, that the finger goes on; the first that finds what is new
 DISK_REACHES = 3.0  # of these, the radius of the disk around it that tells how much, at most the patch's
 SLIVER = 0.03  # of the disk: less is bridged by what blends patches
 TRIES = 3  # touches that a place of a rim is worth
-APART = 2.2  # radii between touches that are made side by side
+TOUCHES_APART = 2.2  # radii between touches that are made side by side
 LOW = 0.1  # of the radius, that the finger is above a place when it comes down
 ABOVE = 0.6  # of the radius, that the finger is above what it feels around
 HAIR = 0.02  # of a reach, that the finger is above the surface
@@ -199,7 +198,7 @@ class Frontier:
         new = np.flatnonzero(~self.is_covered(points, normals))
         off = points[new] - points[new].mean(axis=0)
         middle = hits[new[np.argmin((off**2).sum(axis=1))]]
-        return len(new) / (DISK + 1) * math.pi * radius**2, middle
+        return len(new) / (DISK_PLACES + 1) * math.pi * radius**2, middle
 
 
 def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
@@ -228,7 +227,7 @@ def side_of(surface: Surface, point: Array, outward: Array, reach: float) -> flo
 
 
 def _is_near(place: Place, touch: Next) -> bool:
-    room = APART * max(place.radius, touch.place.radius)
+    room = TOUCHES_APART * max(place.radius, touch.place.radius)
     return math.dist(place.point, touch.point) < room
 
 

@@ -17,17 +17,16 @@ from ..contours.contour import Contour
 from ..patch.smoothing_spline import SIDE, between, smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
-from .field import blended
+from .field import FACING, blended
 
 # python -m benchmarks.atlas chose these.
-FACING = 0.75  # cosine of the angle between a contact's normal and the patch's there, at least
-LIKELY = 2.0  # deviations of a patch, as many as a contact is off it at most that weighs 1
-BEYOND = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain
+ALIGNED = 0.75  # cosine of the angle between a contact's normal and the patch's there, at least
+UNDOUBTED = 2.0  # deviations of a patch, as many as a contact is off it at most that weighs 1
+LOOSER = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain
 FARTHEST = 3.0  # times that, a contact is of another wall
-NOISE = 5e-4  # of the radius, at least
-AT_ONCE, LOOK = 4, 1500  # patches, and contacts or other places of all, in a step
-NEAR = 1.3  # of a domain's radius, as far as heights are asked at knots
-OPPOSED = 0.34  # cosine of the angle of the surface to a patch, below which they are not made to agree
+LEAST_NOISE = 5e-4  # of the radius, at least
+PATCHES_AT_ONCE, PLACES_AT_ONCE = 4, 1500  # patches, and contacts or other places of all, in a step
+KNOTS_WITHIN = 1.3  # of a domain's radius, as far as heights are asked at knots
 MOVED = 0.03  # of the radius, that a patch is at most
 
 Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
@@ -47,8 +46,8 @@ def joined(
     """
     points, normals, owner = _contacts(contours)
     parts = []
-    for start in range(0, len(points), LOOK):
-        part = charts.pairs(points[start : start + LOOK])
+    for start in range(0, len(points), PLACES_AT_ONCE):
+        part = charts.pairs(points[start : start + PLACES_AT_ONCE])
         parts.append(part._replace(place=start + part.place))
         yield 0.0
     pairs = Pairs(*(np.concatenate(values) for values in zip(*parts, strict=True)))
@@ -61,7 +60,7 @@ def joined(
             table = _joined_table(r, some, points, normals, owner == i, noise)
             known[i] = len(some.place), table
         tables.append(known[i][1])
-        if len(tables) % AT_ONCE == 0:
+        if len(tables) % PATCHES_AT_ONCE == 0:
             yield len(tables) / len(results)
     return (yield from _agreed(stacked(results, tables)))
 
@@ -71,11 +70,11 @@ def _joined_table(
 ) -> Table:
     """The table of a patch with those contacts of `some` that are likely to be on it."""
     rim, half = _square(r)
-    least = max(noise / r.radius, NOISE)
-    likely = np.hypot(least, LIKELY * r.mean_height_std / r.radius)
-    likely = likely * (1.0 + BEYOND * np.maximum(some.share - 1.0, 0.0))
+    least = max(noise / r.radius, LEAST_NOISE)
+    likely = np.hypot(least, UNDOUBTED * r.mean_height_std / r.radius)
+    likely = likely * (1.0 + LOOSER * np.maximum(some.share - 1.0, 0.0))
     off = np.abs(some.distance) / (r.radius * likely)
-    facing = np.einsum("mi,mi->m", some.normal, normals[some.place]) > FACING
+    facing = np.einsum("mi,mi->m", some.normal, normals[some.place]) > ALIGNED
     on = own[some.place] | ((off < FARTHEST) & facing)
     place = some.place[on]
     local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
@@ -90,10 +89,10 @@ def _agreed(charts: Charts) -> Joining:
 
     x, y = charts.knots().reshape(2, -1)
     node = np.repeat(np.arange(len(charts.radii)), SIDE**2)
-    asked = np.flatnonzero(charts.shares(x, y, node) < NEAR)
+    asked = np.flatnonzero(charts.shares(x, y, node) < KNOTS_WITHIN)
     moves = np.zeros(charts.heights.size)
-    for start in range(0, len(asked), LOOK):
-        some = asked[start : start + LOOK]
+    for start in range(0, len(asked), PLACES_AT_ONCE):
+        some = asked[start : start + PLACES_AT_ONCE]
         moves[some] = _move(charts, node[some], x[some], y[some])
         yield 1.0
     each = moves.reshape(charts.heights.shape)
@@ -106,8 +105,8 @@ def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
     points, _ = charts.world(node, x, y)
     field = blended(charts, points)
     up = np.einsum("ki,ki->k", field.normal, charts.axes[node, :, 2])
-    move = -field.distance / np.maximum(up, OPPOSED) / charts.radii[node]
-    on = (field.node >= 0) & (up > OPPOSED) & (np.abs(move) < MOVED)
+    move = -field.distance / np.maximum(up, FACING) / charts.radii[node]
+    on = (field.node >= 0) & (up > FACING) & (np.abs(move) < MOVED)
     return np.where(on, move, 0.0)
 
 
@@ -150,7 +149,7 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
     at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
     share = np.hypot(x, y) / np.interp(at, np.arange(AZIMUTHS + 1), np.append(rim, rim[0]))
     # A sextic that is asked farther out runs away, and the spline would carry that inward.
-    pull = r.radius * np.minimum(1.0, NEAR / np.maximum(share, 1e-9))
+    pull = r.radius * np.minimum(1.0, KNOTS_WITHIN / np.maximum(share, 1e-9))
     heights = r.height(pull * x, pull * y).reshape(SIDE, SIDE) / r.radius
     stds = _stds(r, pull * x, pull * y) if deviations else np.zeros((SIDE, SIDE))
     return rim, half, spline_filter(heights, order=3, mode="mirror"), stds

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An atlas of contacts that were measured, as a robot's rasters: no surface is asked, no touch chosen."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,16 +10,18 @@ from numpy.typing import ArrayLike
 
 from ..arguments import Array, list_of, number, unit_vector
 from ..contours.contour import Contour
+from ..exploration.side_by_side import result_of
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
-from .frontier import FACING
+from .field import FACING
 from .join import charts_of
 from .object_atlas import Atlas
 
-FIRST, SOME = 40, 24  # contacts of the smallest patch; those that are asked how large that is
-STRETCH, STEPS = 1.4, 10  # by what patches grow, and how often
+FEWEST = 40  # contacts of the smallest patch
+SOME_PLACES = 24  # which are asked how large a patch has to be
+WIDENING, WIDENINGS = 1.4, 10  # by what patches grow, and how often
 MISSED = 3.0  # times what is expected, that contacts are off a patch in the median
-APART = 0.6  # radii from patch to patch
+PATCHES_APART = 0.6  # radii from patch to patch
 NEIGHBORS = 16  # contacts that a normal follows from, where none was measured
 GROWN = 0.012  # of the radius, that a patch may be uncertain on average where there is no tolerance
 
@@ -35,17 +37,34 @@ def atlas_of(
 
     outward : (3,), on the outer side of all contacts; required where some have no normals that face outward
     tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
-    noise : accuracy of a contact; None for the contours' own
+    noise : standard deviation of a contact; None for the contours' own
 
     Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, and if no
     contacts carry a patch.
+    """
+    steps = cover_contacts(contours_or_strokes, outward=outward, tolerance=tolerance, noise=noise)
+    atlas: Atlas = result_of(steps)
+    return atlas
+
+
+def cover_contacts(
+    contours_or_strokes: Sequence[ArrayLike | Contour],
+    *,
+    outward: ArrayLike | None = None,
+    tolerance: float | None = None,
+    noise: float | None = None,
+) -> Generator[float, None, Atlas]:
+    """What `atlas_of` does, in steps: yields the share of the contacts that is covered, returns the Atlas.
+
+    Arguments and errors are those of `atlas_of`; the errors come with the first steps.
     """
     from scipy.spatial import cKDTree
 
     points, normals, own = _contacts(contours_or_strokes, outward)
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = own if noise is None else number("noise", noise, least=0.0)
-    found = _patches(_Cloud(points, normals, cKDTree(points), noise, largest))
+    yield 0.0
+    found = yield from _patches(_Cloud(points, normals, cKDTree(points), noise, largest))
     return Atlas(tuple(found), charts_of(found), largest)
 
 
@@ -59,8 +78,8 @@ def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -
     if up is None and any(stroke.normals is None for stroke in strokes):
         raise ValueError("outward: expected a direction where contacts have no normals, got none")
     points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
-    if len(points) < FIRST:
-        raise ValueError(f"contours_or_strokes: expected {FIRST} contacts or more, got {len(points)}")
+    if len(points) < FEWEST:
+        raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
     if up is None:
         normals = np.vstack([stroke.normals for stroke in strokes])  # type: ignore[misc]
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
@@ -99,7 +118,7 @@ class _Cloud(NamedTuple):
     def largest_patch(self, i: int, radius: float) -> Reconstruction | None:
         """The largest that is certain enough, or the smallest where none is."""
         best = None
-        for _ in range(STEPS):
+        for _ in range(WIDENINGS):
             r = self.patch(i, radius)
             if r is None:
                 break
@@ -107,34 +126,36 @@ class _Cloud(NamedTuple):
             off = r.typical_miss > MISSED * max(self.noise, most)
             if best is not None and (off or r.mean_height_std > most):
                 break
-            best, radius = r, STRETCH * radius
+            best, radius = r, WIDENING * radius
         return best
 
-    def least_radius(self) -> float:
+    def least_radius(self) -> Generator[float, None, float]:
         """At which half of some contacts carry a patch: rasters have theirs in lines. Raises ValueError."""
-        some = np.linspace(0, len(self.points) - 1, SOME).astype(np.intp)
-        radius = float(np.median(self.tree.query(self.points[some], FIRST)[0][:, -1]))
-        for _ in range(STEPS):
-            if sum(self.patch(i, radius) is not None for i in some.tolist()) * 2 >= SOME:
+        some = np.linspace(0, len(self.points) - 1, SOME_PLACES).astype(np.intp)
+        radius = float(np.median(self.tree.query(self.points[some], FEWEST)[0][:, -1]))
+        for _ in range(WIDENINGS):
+            if sum(self.patch(i, radius) is not None for i in some.tolist()) * 2 >= SOME_PLACES:
                 return radius
-            radius *= STRETCH
+            radius *= WIDENING
+            yield 0.0
         raise ValueError(
             "contours_or_strokes: expected contacts all around at least one of them, got "
             f"{len(self.points)} without"
         )
 
 
-def _patches(cloud: _Cloud) -> list[Reconstruction]:
+def _patches(cloud: _Cloud) -> Generator[float, None, list[Reconstruction]]:
     """Patches at contacts that none so far covers, one after the other, each as large as it may be."""
-    radius = cloud.least_radius()
+    radius = yield from cloud.least_radius()
     left, found = np.ones(len(cloud.points), dtype=bool), []
     for i in range(len(left)):
         if not left[i]:
             continue
         r = cloud.largest_patch(i, radius)
-        room = APART * (radius if r is None else r.radius)
+        room = PATCHES_APART * (radius if r is None else r.radius)
         near = cloud.tree.query_ball_point(cloud.points[i], room)
         left[near] &= cloud.normals[near] @ cloud.normals[i] < FACING
         if r is not None:
             found.append(r)
+        yield 1.0 - float(left.mean())
     return found

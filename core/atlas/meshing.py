@@ -23,13 +23,13 @@ Indices = NDArray[np.intp]
 CELL = 2.1  # edges of the mesh in a cell of the lattice
 CLIP = 0.25  # of a lattice edge, that a vertex is off its ends at least
 ROOM = 1.2  # cubes, that patches reach at least
-STEEP = 1.8  # slope of the field beyond which it jumps, from wall to wall, and has no surface
+JUMP = 1.8  # slope of the field beyond which it jumps, from wall to wall, and has no surface
 SPECK = 40  # triangles that a piece of the mesh has at least, beside the largest
-SMOOTHINGS, EVEN = 3, 0.6  # passes, and share of the way to the mean of its neighbors
-AT_ONCE = 3000  # places of the field in a step
+SMOOTHINGS, SMOOTHING_SHARE = 3, 0.6  # passes, and share of the way to the mean of its neighbors
+FIELD_AT_ONCE = 3000  # places of the field in a step
 MOST_CELLS = 20_000_000
-SMALLEST = 1e-300  # that a vector is divided by
-FACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])  # corners of a face, from its center
+LEAST_DIVISOR = 1e-300  # that a vector is divided by
+FACE_CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])  # corners of a face, from its center
 
 
 class Mesh(NamedTuple):
@@ -46,7 +46,7 @@ class Mesh(NamedTuple):
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         normals = np.zeros_like(self.vertices)
         np.add.at(normals, self.triangles, np.cross(b - a, c - a)[:, None])
-        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), SMALLEST)
+        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), LEAST_DIVISOR)
 
     @property
     def is_closed(self) -> bool:
@@ -66,8 +66,8 @@ def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
     yield 0.0
     points = 0.5 * size * lattice.astype(np.float64)
     values, known = np.zeros(len(points)), np.zeros(len(points), dtype=bool)
-    for start in range(0, len(points), AT_ONCE):
-        some = slice(start, start + AT_ONCE)
+    for start in range(0, len(points), FIELD_AT_ONCE):
+        some = slice(start, start + FIELD_AT_ONCE)
         field = blended(charts, points[some], ROOM * size)
         values[some], known[some] = field.distance, field.node >= 0
         yield 0.5 * start / len(points)
@@ -81,8 +81,8 @@ def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
             vertices = _evened(vertices, field.normal, triangles)
             yield 0.5 + 0.5 * done / (SMOOTHINGS + 1)
         parts = []
-        for start in range(0, max(len(vertices), 1), AT_ONCE):
-            some = slice(start, start + AT_ONCE)
+        for start in range(0, max(len(vertices), 1), FIELD_AT_ONCE):
+            some = slice(start, start + FIELD_AT_ONCE)
             vertices[some], part = _onto(charts, vertices[some], 0.5 * size)
             parts.append(part)
             yield 0.5 + 0.5 * (done + start / max(len(vertices), 1)) / (SMOOTHINGS + 1)
@@ -153,7 +153,7 @@ def _tetrahedra(cells: Indices) -> tuple[Indices, Indices]:
         center = 2 * cells[both] + 1
         ahead = np.eye(3, dtype=np.intp)[axis]
         e1, e2 = np.eye(3, dtype=np.intp)[[(axis + 1) % 3, (axis + 2) % 3]]
-        face = [center + ahead + i * e1 + j * e2 for i, j in FACES]
+        face = [center + ahead + i * e1 + j * e2 for i, j in FACE_CORNERS]
         corners += [
             np.stack([center, center + 2 * ahead, face[k], face[(k + 1) % 4]], axis=1) for k in range(4)
         ]
@@ -171,7 +171,7 @@ def _cut(
     mixed = signs.any(axis=1) & ~signs.all(axis=1) & known[tetrahedra].all(axis=1)
     # Two of a tetrahedron's corners are no farther from each other than a cube's.
     at = values[tetrahedra]
-    mixed &= np.ptp(at, axis=1) <= STEEP * size
+    mixed &= np.ptp(at, axis=1) <= JUMP * size
     tetrahedra, signs = tetrahedra[mixed], signs[mixed]
     case = signs @ (1 << np.arange(4))
     table = _table()
@@ -229,5 +229,5 @@ def _evened(vertices: Array, normal: Array, triangles: Indices) -> Array:
     move = links @ vertices / np.maximum(counts, 1.0)[:, None] - vertices
     move -= np.einsum("ni,ni->n", move, normal)[:, None] * normal
     move[border | (counts == 0.0)] = 0.0
-    moved: Array = vertices + EVEN * move
+    moved: Array = vertices + SMOOTHING_SHARE * move
     return moved

@@ -16,12 +16,12 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, edges_of, node_dict
 from .charts import Charts
-from .field import AGREE, DIFFER, LAYER, blended, node_weights
-from .frontier import FACING, INSIDE, Place
-from .meshing import SMALLEST, Mesh, meshed
+from .field import AGREE, FACING, LAYER, blended, node_weights
+from .frontier import INSIDE, Place
+from .meshing import LEAST_DIVISOR, Mesh, meshed
 
-VERSION = 1  # of the graph as data
-TURNS, OUTWARD = 16, 6  # samples of each patch, from which what is far away is measured
+GRAPH_VERSION = 1  # of the graph as data
+SAMPLE_TURNS, SAMPLES_OUTWARD = 16, 6  # samples of each patch, from which what is far away is measured
 
 
 class NextTouch(NamedTuple):
@@ -135,10 +135,10 @@ class Atlas:
         from scipy.spatial import cKDTree
 
         charts, count = self.charts, len(self.patches)
-        turns = 2.0 * np.pi * np.arange(TURNS) / TURNS
-        node = np.repeat(np.arange(count), TURNS * OUTWARD)
-        rays = np.tile(np.repeat(np.stack([np.cos(turns), np.sin(turns)]), OUTWARD, axis=1), count)
-        out = np.tile(np.arange(1, OUTWARD + 1) / OUTWARD, TURNS * count)
+        turns = 2.0 * np.pi * np.arange(SAMPLE_TURNS) / SAMPLE_TURNS
+        node = np.repeat(np.arange(count), SAMPLE_TURNS * SAMPLES_OUTWARD)
+        rays = np.tile(np.repeat(np.stack([np.cos(turns), np.sin(turns)]), SAMPLES_OUTWARD, axis=1), count)
+        out = np.tile(np.arange(1, SAMPLES_OUTWARD + 1) / SAMPLES_OUTWARD, SAMPLE_TURNS * count)
         x, y = rays * out / np.maximum(charts.shares(rays[0], rays[1], node), 1e-9)
         points, normals = charts.world(node, x, y)
         pairs = charts.pairs(points)
@@ -205,7 +205,7 @@ class Atlas:
         """
         touch, stds = self.next_touch(), self.charts.mean_stds
         return {
-            "version": VERSION,
+            "version": GRAPH_VERSION,
             **{name: getattr(self, name) for name in ("status", "message", "tolerance")},
             "nodes": [node_dict(r, float(std)) for r, std in zip(self.patches, stds, strict=True)],
             "edges": [edge.to_dict() for edge in self.edges],
@@ -219,7 +219,7 @@ def _blended_curvatures(atlas: Atlas, points: Array, normals: Array) -> tuple[Ar
     charts = atlas.charts
     pairs = charts.pairs(points)
     facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
-    weights = node_weights(charts, pairs) * np.clip((facing - DIFFER) / (AGREE - DIFFER), 0.0, 1.0)
+    weights = node_weights(charts, pairs) * np.clip((facing - FACING) / (AGREE - FACING), 0.0, 1.0)
     radii = charts.radii[pairs.node]
     weights *= np.abs(pairs.distance) < LAYER * radii
     x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T * radii
@@ -229,6 +229,6 @@ def _blended_curvatures(atlas: Atlas, points: Array, normals: Array) -> tuple[Ar
             d = atlas.patches[pairs.node[at[0]]].patch.derivatives(x[at], y[at])
             curvatures[:, at] = d.gaussian_curvature, d.mean_curvature
     count = len(points)
-    total = np.maximum(np.bincount(pairs.place, weights, count), SMALLEST)
+    total = np.maximum(np.bincount(pairs.place, weights, count), LEAST_DIVISOR)
     gauss, mean = (np.bincount(pairs.place, weights * each, count) / total for each in curvatures)
     return gauss, mean

@@ -20,9 +20,9 @@ from .join import Table, joined
 from .object_atlas import Atlas
 
 MOST = 1000
-FIRST = 300.0  # times the tolerance, that half curves of the first touch may become
+FIRST_EXTENT = 300.0  # times the tolerance, that half curves of the first touch may become
 SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
-LEAST = 5.0  # times it, that a patch is wide at least
+SMALL = 5.0  # times it, that a patch is wide at least
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
 AGAIN = 2  # times that patches less certain than the tolerance are touched again
 LARGER = 2.0  # times the patch where it begins, that a touch may become
@@ -111,7 +111,7 @@ class _Run:
 
     def first(self, point: Array, up: Array) -> Progress:
         """The touch from which all others go on; raises ValueError where there is none."""
-        first = explore(self.surface, point, up, farthest=FIRST * self.tolerance, **self.wanted)
+        first = explore(self.surface, point, up, farthest=FIRST_EXTENT * self.tolerance, **self.wanted)
         self.frontier = Frontier(self.surface, side_of(self.surface, point, up, first.step))
         self.frontier.add(first.result)
         self.found, self.done = [first], 1
@@ -125,7 +125,7 @@ class _Run:
         """Touches at places, where there can be one that is wide enough; their rims are the frontier's."""
         points, outward = (np.array(values) for values in zip(*contacts, strict=True))
         results = yield from exploring(self.surface, points, outward, farthest=farthest, **self.wanted)
-        new = [e for e in results if isinstance(e, Exploration) and e.result.radius >= LEAST * self.tolerance]
+        new = [e for e in results if isinstance(e, Exploration) and e.result.radius >= SMALL * self.tolerance]
         for exploration in new:
             self.frontier.add(exploration.result)
             yield

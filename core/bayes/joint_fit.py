@@ -23,8 +23,10 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import along, cross, dot, scaled
+from ..patch.smoothing_spline import STUDENT
 from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances, restricted
 from .linear_system import (
+    System,
     hyperparameters,
     linear_system,
     posterior,
@@ -37,14 +39,17 @@ from .posterior import FREE, Posterior
 MISFIT = 2e-3  # Share of the radius: no surface is a polynomial, so the noise is never less.
 PASSES = 8  # At most: two passes turn the frame to what they found, and more are for outliers.
 SETTLED_WEIGHT = 0.1  # Change of a weight between passes that counts as none.
+STALE_WEIGHT = 0.5  # Change of a weight since waviness and noise were found, at which they are anew.
 ALIKE_CURVATURES = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
 LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
 OUTLYING = 5.0  # standard deviations
-STUDENT = 4.0  # degrees of freedom
 
 
 class _Touches(NamedTuple):
-    """What a pass of the fit needs to know of b touches; the last four are what it changes."""
+    """What a pass of the fit needs to know of b touches; all from the axes on are what it changes.
+
+    told : (b, n), the weights with which hyper (waviness and noise) and triangle, of evidence.py, were found
+    """
 
     contacts: Array
     normals: Array  # (b, 0, 3) without
@@ -54,6 +59,20 @@ class _Touches(NamedTuple):
     k1: Array
     k2: Array
     weights: Array
+    typical: Array
+    variances: Array
+    noise: Array
+    triangle: Array
+    told: Array
+
+    @property
+    def hyper(self) -> Hyperparameters:
+        """Waviness and noise."""
+        return Hyperparameters(self.typical, self.variances, self.noise)
+
+    def at(self, which: NDArray[np.bool_]) -> "_Touches":
+        """Some of them."""
+        return _Touches(*(values[which] for values in self))
 
 
 def joint_fit(
@@ -83,7 +102,10 @@ def joint_fit(
     """
     axes = np.eye(3)[None].repeat(len(contacts), axis=0)
     given = contacts[:, :0] if normals is None else normals
-    touches = _Touches(contacts, given, tangent, np.maximum(accuracy, MISFIT), axes, k1, k2, weights)
+    floor, usual = np.maximum(accuracy, MISFIT), prior_variances(np.full(len(contacts), USUAL_WAVINESS))
+    unknown = np.zeros((*usual.shape, usual.shape[1]))
+    first = axes, k1, k2, weights, usual, usual, floor, unknown, weights
+    touches = _Touches(contacts, given, tangent, floor, *first)
     pending, found = np.arange(len(contacts)), []
     for step in range(PASSES):
         touches, settled, surface = _pass(touches, step, through)
@@ -93,7 +115,7 @@ def joint_fit(
             break
         if not settled.any():
             continue
-        touches, pending = _Touches(*(values[~settled] for values in touches)), pending[~settled]
+        touches, pending = touches.at(~settled), pending[~settled]
     if len(found) == 1:  # all at once, as nearly always: in the order they came
         return found[0][1], Posterior(*found[0][3:]), found[0][2]
     order, turns, found_weights, *surfaces = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -107,30 +129,43 @@ def _pass(
     """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
     expected = prior_mean(touches.k1, touches.k2)
     local, normals = touches.contacts @ touches.axes, touches.normals @ touches.axes
-    system, data = linear_system(local, touches.weights, expected, normals, through), None
-    if step == 0:
-        usual = prior_variances(np.full(len(expected), USUAL_WAVINESS))
-        hyper = Hyperparameters(usual, usual, touches.floor)
-    else:
-        data = restricted(system.equations)
-        hyper = hyperparameters(system, data, touches.floor)
-    found = solution(system, hyper)
+    system = linear_system(local, touches.weights, expected, normals, through)
+    if step:
+        stale = np.abs(touches.weights - touches.told).max(axis=1) > STALE_WEIGHT
+        touches = _with_evidence(touches, system, stale | (step == 1))
+    found = solution(system, touches.hyper)
     mean = expected + found
     found_axes = [turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
     axes, k1, k2, angle = (np.array(values) for values in zip(*found_axes, strict=True))
     # Outliers show against a surface in level axes.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
     weights, settled, surface = touches.weights, np.full(len(mean), step == PASSES - 1), None
-    if data is not None and level.any():
+    if step and level.any():
         told = _student_weights(system.residuals(found), weights > 0.0, touches.floor)
         weights = np.where(level[:, None], told, weights)
         settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED_WEIGHT)
-    if data is not None and settled.any():
+    if step and settled.any():
         which = slice(None) if settled.all() else settled
-        surface = posterior(mean, system, data, hyper, touches.weights).at(which).turned(angle[which])
+        surface = posterior(mean, system, touches.triangle, touches.hyper, touches.weights)
+        surface = surface.at(which).turned(angle[which])
         surface.mean[:, [0, 1, 3]] = 0.0
         surface.mean[:, 2], surface.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
     return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, surface
+
+
+def _with_evidence(touches: _Touches, system: System, stale: NDArray[np.bool_]) -> _Touches:
+    """The touches with waviness and noise of those that are stale, (b,), as their systems have them."""
+    if not stale.any():
+        return touches
+    some = system if stale.all() else system.at(stale)
+    data = restricted(some.equations)
+    found = *hyperparameters(some, data, touches.floor[stale]), data.triangle, touches.weights[stale]
+    if stale.all():
+        return _Touches(*touches[:-5], *found)
+    changed = _Touches(*touches[:-5], *(values.copy() for values in touches[-5:]))
+    for values, new in zip(changed[-5:], found, strict=True):
+        values[stale] = new
+    return changed
 
 
 def posterior_of(k1: float, k2: float, contacts: Array, accuracy: float) -> Posterior:
@@ -139,7 +174,7 @@ def posterior_of(k1: float, k2: float, contacts: Array, accuracy: float) -> Post
     system = linear_system(contacts[None], weights, expected, contacts[None, :0])
     data = restricted(system.equations)
     hyper = hyperparameters(system, data, np.array([max(accuracy, MISFIT)]))
-    return posterior(expected + solution(system, hyper), system, data, hyper, weights).at(0)
+    return posterior(expected + solution(system, hyper), system, data.triangle, hyper, weights).at(0)
 
 
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:

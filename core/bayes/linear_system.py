@@ -5,6 +5,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..patch.monge import TERMS, monomials
@@ -41,6 +42,12 @@ class System(NamedTuple):
     slopes: Array | None = None
     steepness: Array | None = None
     pivot: Array | None = None
+
+    def at(self, which: NDArray[np.bool_]) -> "System":
+        """Some of the b."""
+        rows, equations, *beside = self
+        some = NormalEquations(*(part[which] for part in equations))
+        return System(rows[which], some, *(part if part is None else part[which] for part in beside))
 
     def residuals(self, coefficients: Array) -> Array:
         """What coefficients (b, 27) leave of the heights, (b, n)."""
@@ -119,22 +126,22 @@ def solution(system: System, hyper: Hyperparameters) -> Array:
 
 
 def posterior(
-    mean: Array, system: System, data: Restricted, hyper: Hyperparameters, weights: Array
+    mean: Array, system: System, triangle: Array, hyper: Hyperparameters, weights: Array
 ) -> Posterior:
-    """What is left open, under the averaged prior, about the means (b, 27)."""
+    """What is left open, under the averaged prior, about the means (b, 27); triangle as in Restricted."""
     covariance = np.array(
         [inverse_definite(each) for each in _precision(system, hyper.variances, hyper.noise)]
     )
     # Waviness and noise are estimates: with so many degrees of freedom Student's t has this more variance.
-    freedom = np.maximum(data.contacts - FREE, LEAST_FREEDOM)
+    freedom = np.maximum(system.equations.contacts - FREE, LEAST_FREEDOM)
     covariance *= (freedom / (freedom - 2.0))[:, None, None]
-    visibility = data.triangle * (PRIOR_SCALE / hyper.noise)[:, None, None]
+    visibility = triangle * (PRIOR_SCALE / hyper.noise)[:, None, None]
     if system.slopes is not None:
         # What the slopes show of the free terms too: the QR of all there is, each in its deviation.
         basis = (np.sqrt(weights) / hyper.noise[:, None])[..., None] * system.rows[:, :-1].transpose(0, 2, 1)
         rows = np.concatenate([basis, system.slopes], axis=1)
-        triangle: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
-        visibility = PRIOR_SCALE * triangle[:, FREE:, FREE:]
+        whole: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
+        visibility = PRIOR_SCALE * whole[:, FREE:, FREE:]
     return Posterior(mean, covariance, hyper.noise, visibility, _level(covariance, system, hyper, weights))
 
 

@@ -34,7 +34,7 @@ ROUGH_MISFIT = 5e-4  # Share of the radius: facets and rounding, where the resid
 AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
 ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
 RESIDUAL_NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
-UPWARD = np.arange(RESIDUAL_NOISES) / (RESIDUAL_NOISES - 1.0)
+RESIDUAL_UPWARD = np.arange(RESIDUAL_NOISES) / (RESIDUAL_NOISES - 1.0)
 MOST_PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
 ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
 NEGLIGIBLE = 160.0  # -2 log likelihood beside the best, at which no other noise is tried
@@ -103,7 +103,7 @@ def sizes(touch: Observations, system: System) -> Sizes:
     heights, as in evidence.py; each contact's row times the root of its weight.
     """
     basis, heights, kernels_within = _weighted(touch, system)
-    noises = touch.least * (touch.most / touch.least) ** UPWARD
+    noises = touch.least * (touch.most / touch.least) ** RESIDUAL_UPWARD
     with_it = _surprises(basis, heights, kernels_within, noises)
     without = _surprises_alone(basis / touch.most, heights / touch.most)
     without += 2.0 * len(heights) * math.log(touch.most)

@@ -25,12 +25,12 @@ from ..reconstruction.status import DOUBTFUL_STD
 # benchmarks.amount judges the numbers of contacts, benchmarks.extents how far curves grow.
 # Numbers of contacts of the longest half curve: the first that is enough is taken.
 CONTACT_COUNTS = (12, 24, 48)
-LEAST = 4  # contacts of the shortest half curve
+SHORTEST = 4  # contacts of the shortest half curve
 FELT = 96  # contacts of a half curve as long as may be
 SEEDS = (24, 12, 6, 3)  # Numbers of these contacts that a half curve may begin with.
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
 STRETCH = 1.5  # A half curve grows by this factor at once.
-NEAR = 0.75  # of what ends growth: where twice as long is known to be in doubt, nothing between is tried
+NEARLY_ENDED = 0.75  # of what ends growth: where twice as long is in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
 TOO_ROUGH = 0.0085  # Roughness of contacts whose fit ends growth, in all but one of a hundred
 EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
@@ -137,7 +137,7 @@ def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: f
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
     noisy = found.result.accuracy > MISFIT and found is not list(known.values())[-1]
     longest = (found.counts == np.minimum(SEEDS[0], felt.whole)).all()
-    most = np.inf if noisy else 1.0 if longest else NEAR
+    most = np.inf if noisy else 1.0 if longest else NEARLY_ENDED
     growing = np.full(found.counts.shape, noisy or found.doubt <= 1.0)
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
@@ -208,7 +208,7 @@ def stride_of(counts: Counts) -> int:
 
 
 def spacing(reaches: Array | Counts, count: int) -> float:
-    """A step that gives the longest of half curves (c, 2) some `count` contacts, the shortest LEAST."""
+    """A step that gives the longest of half curves (c, 2) some `count` contacts, the shortest SHORTEST."""
     longest = float(reaches.max())
     shortest = float(np.where(reaches > 0, reaches, longest).min())
-    return min(longest / count, max(shortest / LEAST, longest / CONTACT_COUNTS[-1]))
+    return min(longest / count, max(shortest / SHORTEST, longest / CONTACT_COUNTS[-1]))

@@ -19,7 +19,7 @@ from ..reconstruction.result import Reconstruction
 from .growth import (
     CONTACT_COUNTS,
     FELT,
-    LEAST,
+    SHORTEST,
     STRETCH,
     Counts,
     Feel,
@@ -150,7 +150,7 @@ class Touch:
         while len(where):
             worst, counts = beside(shorter.result, where), counts.copy()
             counts.flat[worst] = (counts.flat[worst] / SHORTER).astype(np.intp)
-            if counts.flat[worst].min() < LEAST:
+            if counts.flat[worst].min() < SHORTEST:
                 break
             try:
                 shorter, where = self._tapped((yield from self._of_reaches(largest, counts)))
@@ -215,9 +215,9 @@ class Touch:
                 raise r
             misfits = felt.misfits(counts, r)
             worst = int(np.argmax(misfits))
-            if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * LEAST:
+            if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * SHORTEST:
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
-            counts.flat[worst] = (counts.flat[worst] / SHORTER).astype(np.intp)
+            counts.flat[worst] = max(2 * SHORTEST, int(counts.flat[worst] / STRETCH) // 2 * 2)
 
 
 def is_enough(r: Reconstruction) -> bool:

@@ -24,7 +24,7 @@ from .one_touch import Answer, Ask, Exploration, Steps, Touch
 from .taps import tapped
 
 MOST_EVEN = 24  # At most so many planes are laid out evenly.
-COARSE_STEPS = 8  # Contacts of a half curve that only tell whether it ends.
+GLANCE_CONTACTS = 8  # Contacts of a half curve that only tell whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
 BISECTIONS = 6  # They leave a factor of two no more than a 64th.
 
@@ -113,7 +113,7 @@ def _farthest(feel: Callable[..., list[Contour]]) -> float:
     def ended(length: float) -> bool:
         """Whether all do, felt coarsely; where nothing can be felt the length is beyond all."""
         try:
-            contours = feel(extent=length, step=length / COARSE_STEPS)
+            contours = feel(extent=length, step=length / GLANCE_CONTACTS)
         except ValueError:
             if length <= 1.0 / LONGEST and not felt:
                 raise

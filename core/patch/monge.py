@@ -24,6 +24,7 @@ def exponents(lowest: int, highest: int) -> NDArray[np.intp]:
 
 DEGREE = 6  # The default fit sees all terms up to this degree at once.
 TERMS = exponents(1, DEGREE)
+QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 
 
 def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:

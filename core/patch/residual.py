@@ -29,7 +29,7 @@ from .monge import TERMS, derived_monomials, monomials
 LENGTHS = np.array([0.4, 1.6])  # of the radius; with benchmarks.real
 DISTANCES_AT_ONCE = 6000  # distances at once: they fit into a processor's cache
 KERNEL_ROUNDING = 1e-9  # Share of k(u, u).
-ORDER = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+PARTIALS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Residual:
 
     def derivatives(self, x: Array, y: Array) -> Derivatives:
         """The kernel with its slopes and second derivatives."""
-        terms = np.einsum("kmn,m->kn", derived_monomials(x, y, TERMS, ORDER), self.mean[: len(TERMS)])
+        terms = np.einsum("kmn,m->kn", derived_monomials(x, y, TERMS, PARTIALS), self.mean[: len(TERMS)])
         p = np.column_stack([x, y])
         return Derivatives(*(terms + _derived(p, self.places, self.variances, self.mean[len(TERMS) :])))
 
@@ -232,15 +232,15 @@ def _maternes(distance: Array) -> list[Array]:
 
 
 def _derived(p: Array, places: Array, variances: Array, weights: Array) -> Array:
-    """k(p, places) @ weights at points (n, 2) and its derivatives by p, (6, n), as ORDER says."""
-    total = np.zeros((len(ORDER), len(p)))
+    """k(p, places) @ weights at points (n, 2) and its derivatives by p, (6, n), as PARTIALS says."""
+    total = np.zeros((len(PARTIALS), len(p)))
     for variance, length in zip(variances, LENGTHS, strict=True):
         total += variance * (_derived_matern(p[:, None] - places, length) @ weights)
     return total
 
 
 def _derived_matern(apart: Array, length: float) -> Array:
-    """M(|apart| / length) of (..., 2) and its derivatives, (6, ...), as ORDER says."""
+    """M(|apart| / length) of (..., 2) and its derivatives, (6, ...), as PARTIALS says."""
     x, y = np.moveaxis(apart, -1, 0)
     a, b = math.sqrt(3.0) / length * np.hypot(x, y), 3.0 / length**2
     slope = -b * np.exp(-a)

@@ -19,16 +19,16 @@ from ..arguments import Array
 # python -m benchmarks.atlas chose these.
 SIDE = 21  # knots along each axis, evenly spaced over [-half, half]
 ROUGHNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # sizes of third derivatives
-NOISES = (1.0, 2.0, 4.0, 8.0)  # times the least noise
+NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # times the least noise
 SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # of normals: facets have some of that
-FIRST = 3, 0, 2  # of each of these
-PASSES = 2  # of finding sizes, with a solve for weights after each
-OUTLYING, STUDENT = 3.0, 4.0  # standard deviations; degrees of freedom
-STEEP = 0.2  # cosine of the angle between a normal and the axis, below which it tells nothing
+START = 3, 0, 2  # which of each of these comes first
+SIZE_PASSES = 2  # of finding sizes, with a solve for weights after each
+FAR_OFF, STUDENT = 3.0, 4.0  # standard deviations; degrees of freedom
+LEAST_COSINE = 0.2  # cosine of the angle between a normal and the axis, below which it tells nothing
 ORDER, CUBIC = 3, 3
 WIDTH = CUBIC * SIDE + CUBIC  # of the band
 RANK = SIDE**2 - ORDER * (ORDER + 1) // 2
-ROUNDING = 1e-9
+SPLINE_ROUNDING = 1e-9
 
 
 class Spline(NamedTuple):
@@ -62,11 +62,11 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
     noise : standard deviation of a contact, at least
     """
     heights, *slopes = bases(contacts[:, 0], contacts[:, 1], half)
-    up = np.maximum(normals[:, 2], STEEP)
+    up = np.maximum(normals[:, 2], LEAST_COSINE)
     asked = -normals[:, :2] / up[:, None]
-    certainty = np.where(normals[:, 2] > STEEP, up**4, 0.0)  # a slope s is less sure by 1 + s^2
-    sizes, sloping = [grid[i] for grid, i in zip(_grids(noise), FIRST, strict=True)], weights * certainty
-    for _ in range(PASSES):
+    certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)  # a slope s is less sure by 1 + s^2
+    sizes, sloping = [grid[i] for grid, i in zip(_grids(noise), START, strict=True)], weights * certainty
+    for _ in range(SIZE_PASSES):
         data = [_equations([heights], weights, contacts[:, 2:]), _equations(slopes, sloping, asked)]
         found = _likeliest(data, sizes, half, noise)
         off = np.abs(contacts[:, 2] - heights @ found.coefficients)
@@ -80,7 +80,7 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
 
 
 def _grids(noise: float) -> tuple[Any, Any, Any]:
-    return ROUGHNESS, tuple(noise * np.array(NOISES)), SLOPE_STDS
+    return ROUGHNESS, tuple(noise * np.array(NOISE_FACTORS)), SLOPE_STDS
 
 
 def _likeliest(data: list[_Equations], sizes: list[float], half: float, noise: float) -> _Solution:
@@ -110,7 +110,7 @@ def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solutio
         matrix += some.band / std**2
         right += some.right / std**2
         surprise += some.square / std**2 + 2.0 * some.size * np.log(std)
-    matrix[0] += ROUNDING * matrix[0].max()
+    matrix[0] += SPLINE_ROUNDING * matrix[0].max()
     factor = cholesky_banded(matrix, overwrite_ab=True, lower=True, check_finite=False)
     found = cho_solve_banded((factor, True), right, check_finite=False)
     surprise += 2.0 * np.log(factor[0]).sum() - right @ found
@@ -128,7 +128,7 @@ def _equations(bases: list[Any], weights: Array, values: Array) -> _Equations:
 def _student(misses: Array, std: float) -> Array:
     """The weights of contacts that are off by so much."""
     ratios = misses / max(std, 1.4826 * float(np.median(misses)))
-    return np.where(ratios > OUTLYING, (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
+    return np.where(ratios > FAR_OFF, (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
 
 
 def _stds(factor: Array, half: float) -> Array:
@@ -173,7 +173,7 @@ def bases(x: Array, y: Array, half: float) -> list[Any]:
 
 def weights_at(at: Array) -> tuple[Any, Array, Array]:
     """The knot before places (m,) in steps from the middle; weights (m, 4) of four knots and their slopes."""
-    at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - ROUNDING)
+    at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - SPLINE_ROUNDING)
     knot = at.astype(np.intp)
     powers = np.vander(at - knot, 4, increasing=True)
     values, slopes = _tables()

@@ -12,9 +12,9 @@ from ..arguments import Array, unit_vector
 from ..contours.contour import SamplingPlane
 from .result import Reconstruction
 
-AZIMUTHS = np.radians(np.arange(0.0, 180.0, 3.0))  # 1.5 degrees off, a plane ends a 38th of the radius aside.
+TRIED = np.radians(np.arange(0.0, 180.0, 3.0))  # azimuths: 1.5 degrees off, a plane ends a 38th of L aside
 COARSE_STRIDE = 5  # So many azimuths lie between those that are tried first.
-MOST_CONTACTS = 24  # contacts of a contour: more tell of its seven terms no more than as many of less noise
+TELLING_CONTACTS = 24  # of a contour: more tell of its seven terms no more than as many of less noise
 FEW_CONTACTS = 8  # of those that are compared
 NEARBY = np.arange(-(COARSE_STRIDE // 2), COARSE_STRIDE // 2 + 1)  # Azimuths about the best of those.
 
@@ -41,13 +41,13 @@ def suggest_plane(
         """What a contour at each of these takes off the variances at the points, (k, n), in unit radius."""
         count = min(wanted, most)
         noise = float(r.uncertainty.noise) ** 2 * count / wanted
-        return widening * _lost(covariances, AZIMUTHS[azimuths % len(AZIMUTHS)], count, noise)
+        return widening * _lost(covariances, TRIED[azimuths % len(TRIED)], count, noise)
 
-    tried = np.arange(0, len(AZIMUTHS), COARSE_STRIDE)
+    tried = np.arange(0, len(TRIED), COARSE_STRIDE)
     near = tried[[np.argmax(lost(tried, FEW_CONTACTS) @ weights)]] + NEARBY
-    best = near[[np.argmax(lost(near, FEW_CONTACTS) @ weights)]] % len(AZIMUTHS)
-    variance = np.maximum((r.node_stds / r.radius) ** 2 - lost(best, MOST_CONTACTS)[0], 0.0)
-    plane = SamplingPlane(float(AZIMUTHS[best[0]]))
+    best = near[[np.argmax(lost(near, FEW_CONTACTS) @ weights)]] % len(TRIED)
+    variance = np.maximum((r.node_stds / r.radius) ** 2 - lost(best, TELLING_CONTACTS)[0], 0.0)
+    plane = SamplingPlane(float(TRIED[best[0]]))
     if outward is not None:
         d1, _, n = r.frame.axes.T
         plane = SamplingPlane(azimuth_of(plane.axes(n, d1)[:, 0], outward, tangent))

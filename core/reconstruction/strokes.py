@@ -18,7 +18,7 @@ from ..arguments import LARGEST, SMALLEST, Array, finite_array, list_of
 from ..bayes.joint_fit import turned
 from ..contours.contour import Contour, cross
 from ..contours.local_geometry import DegenerateCurvesError
-from ..patch.monge import exponents, monomials
+from ..patch.monge import QUADRIC, QUARTIC, monomials
 
 # Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot).
 STRIPS, LEAST_STRIPS = 10, 6
@@ -27,7 +27,6 @@ STROKE_CELL = 0.02  # of the radius: contacts in one such square tell of one pla
 QUARTIC_CONTACTS = 2000  # contacts that the quartic is fitted to
 FIRST_REACH = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
 DETERMINED = 0.02  # the least singular value of a quadric's terms on average over contacts, in unit radius
-QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 OPEN = 1e-3  # share of the largest singular value: contacts on a few lines leave such terms of a quartic open
 STRAY = 2.0  # times as far as all others: contacts that are none of the surface there,
 FEW = 0.02  # if they are but this share of all

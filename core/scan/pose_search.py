@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, shown
-from ..patch.monge import exponents, monomials
+from ..patch.monge import QUARTIC, exponents, monomials
 from ..reconstruction.result import Reconstruction
 from .sampling import spaced
 from .scanned_mesh import Mesh, corners_of, mesh_distances, mesh_of
@@ -26,7 +26,6 @@ SPACING = 0.1  # Spacing of the points that a polynomial is fitted to.
 MOST_POINTS = 400
 PLACE_SPACING = 0.2  # between the places that are tried
 TRIED_TURNS = 36
-QUARTIC = exponents(0, 4)
 POLYNOMIAL_RIDGE = 1e-3  # where a polynomial has few points
 COARSE_CONTACTS = 60  # The coarse search takes no more contacts.
 COARSE_PLACES, COARSE_STEPS = 400, 8  # places that move to the planes of the nearest triangles

@@ -15,7 +15,7 @@ from ..touch import units
 from . import contact_rows, ply_contacts, whole_file
 from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
-VERSION = 2
+FILE_VERSION = 2
 TITLE = "# Tactile Patch contacts, version "
 UNIT_METERS = dict(units.METERS.values())  # meters in each unit
 VECTOR_KEYS, DEVIATION_KEYS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
@@ -67,7 +67,7 @@ def write(path, contacts):
         if any(std is not None for std in stds):
             told[key] = stds[:1] if len(set(stds)) == 1 else stds
     text = io.StringIO()
-    print(f"{TITLE}{VERSION}, lengths in {unit or 'no unit'}", file=text)
+    print(f"{TITLE}{FILE_VERSION}, lengths in {unit or 'no unit'}", file=text)
     for key, values in told.items():
         if values is not None:
             print("#", key, *("-" if value is None else repr(value) for value in values), file=text)
@@ -156,9 +156,9 @@ def _deviation(at, word):
 
 
 def _require_version(at, version):
-    if not version.isdecimal() or int(version) > VERSION:
+    if not version.isdecimal() or int(version) > FILE_VERSION:
         raise ValueError(
-            f"{at}: expected version {VERSION} or less, got {version[:40]}: this was written by a "
+            f"{at}: expected version {FILE_VERSION} or less, got {version[:40]}: this was written by a "
             "later release"
         )
 

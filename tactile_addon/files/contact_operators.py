@@ -15,11 +15,12 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper
 
-from ..probes.operators import is_in_object_mode, make_active, report_error, waiting
+from ..probes.in_slices import InSlices
+from ..probes.operators import is_in_object_mode, make_active, report_error
 from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_chosen, draw_solver, length_property
 from ..touch.units import length
-from ..touch.wording import fit_summary
+from ..touch.wording import fit_summary, many
 from ..whole_object import whole_mesh
 from ..whole_object.object_report import object_summary
 from . import contact_file, measured
@@ -35,7 +36,7 @@ UNITS = [
 ]
 
 
-class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
+class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, ImportHelper):
     """Rebuild the surface patch, or the whole surface, that measured contours and strokes show"""
 
     bl_idname = "tactile.import_contacts"
@@ -101,32 +102,36 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         return context.area is None or is_in_object_mode(cls, context, "Contacts are imported")
 
     def invoke(self, context, event):
+        self._in_window = not bpy.app.background
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.
 
     def execute(self, context):
-        paths = [str(Path(self.directory) / file.name) for file in self.files if file.name] or [self.filepath]
+        self._paths = [str(Path(self.directory) / each.name) for each in self.files if each.name]
+        self._paths = self._paths or [self.filepath]
         try:
             scale = context.scene.unit_settings.scale_length
-            contacts = measured.read(paths, self.unit, scale, self.whole)
-            if self.whole:
-                return self._joined(context, paths, contacts)
-            touched = measured.fit(
-                Path(paths[0]).name,
-                contacts,
-                point=self._given("point"),
-                outward=self._given("outward"),
-                flip=self.flip,
-                all_strokes=self.strokes,
-                radius=self.radius,
-                noise=self.noise,
-                normal_std=self.normal_std,
-                method=self.method,
-                degree=self.degree or "auto",
-                weight=self.weight or None,
-                solver=self.solver,
-            )
+            self._contacts = measured.read(self._paths, self.unit, scale, self.whole)
+            return super().execute(context) if self.whole else self._patch(context)
         except (OSError, ValueError) as error:
             return report_error(self, error)
+
+    def _patch(self, context):
+        """Adds the patch around one point."""
+        touched = measured.fit(
+            Path(self._paths[0]).name,
+            self._contacts,
+            point=self._given("point"),
+            outward=self._given("outward"),
+            flip=self.flip,
+            all_strokes=self.strokes,
+            radius=self.radius,
+            noise=self.noise,
+            normal_std=self.normal_std,
+            method=self.method,
+            degree=self.degree or "auto",
+            weight=self.weight or None,
+            solver=self.solver,
+        )
         make_active(context, patch_object.insert(context.scene, touched))
         report = touched.report
         summary = fit_summary(report)
@@ -135,18 +140,28 @@ class TACTILE_OT_import_contacts(FitSettings, bpy.types.Operator, ImportHelper):
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
-    def _joined(self, context, paths, contacts):
-        """Adds the surface of all contacts, as that of a whole object."""
-        more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
-        with waiting(context):
-            whole, report = measured.whole_of(
-                contacts,
-                outward=self._given("outward"),
-                flip=self.flip,
-                tolerance=self.tolerance,
-                noise=self.noise,
-            )
-        made = whole_mesh.insert(context.scene, Path(paths[0]).name + more, whole, report)
+    def _begin(self, context):
+        self._object = measured.MeasuredObject(
+            self._contacts,
+            outward=self._given("outward"),
+            flip=self.flip,
+            tolerance=self.tolerance,
+            noise=self.noise,
+        )
+        self._steps = self._object.steps()
+
+    def _done(self):
+        return f"Joining {many(len(self._paths), 'file', 'files')}", self._object.share
+
+    def _stopped(self, context):
+        self._leave(context)
+        self.report({"INFO"}, "Stopped: nothing was imported")
+        return {"CANCELLED"}
+
+    def _finish(self, context):
+        more = f" and {len(self._paths) - 1} more" if len(self._paths) > 1 else ""
+        report = self._object.report()
+        made = whole_mesh.insert(context.scene, Path(self._paths[0]).name + more, self._object.whole, report)
         make_active(context, made)
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, object_summary(report))
         return {"FINISHED"}

@@ -49,41 +49,65 @@ def read(paths, unit, meters, whole=False):
     return contact_file.Contacts(contours, found, point, outward, tuple(strokes))
 
 
-def whole_of(contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
-    """The WholeSurface of contact_file.Contacts, its steps done, and its report.
+class MeasuredObject:
+    """Measured contacts that are covered with patches and joined to a surface, step by step.
 
-    outward : on the outer side of all contacts; None for the normals that were measured, or for that of the
-        files; `flip` takes the other side
-    tolerance, noise : in the contours' unit; 0 for a choice by core.atlas_of, and for those of the files
-
-    Raises ValueError with a sentence for the user.
+    share : of the work, that is done
+    whole : the WholeSurface, once the steps are done
     """
-    felt = [*contacts.contours, *contacts.strokes]
-    if outward is None and any(contour.normals is None for contour in felt):
-        outward = contacts.outward
-        if outward is None:
-            raise ValueError(
-                "Some contacts have no normals, and nothing tells their outer side: set outward, a direction "
-                "on the outer side of all contacts"
+
+    def __init__(self, contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
+        """Of contact_file.Contacts.
+
+        outward : on the outer side of all contacts; None for the normals that were measured, or for that of
+            the files; `flip` takes the other side
+        tolerance, noise : in the contours' unit; 0 for a choice by core.atlas_of, and for those of the files
+
+        Raises ValueError with a sentence for the user.
+        """
+        felt = [*contacts.contours, *contacts.strokes]
+        if outward is None and any(contour.normals is None for contour in felt):
+            outward = contacts.outward
+            if outward is None:
+                raise ValueError(
+                    "Some contacts have no normals, and nothing tells their outer side: set outward, a "
+                    "direction on the outer side of all contacts"
+                )
+        sign, self._origin = -1.0 if flip else 1.0, np.mean(np.vstack([c.points for c in felt]), axis=0)
+        self._felt = [
+            replace(
+                c, points=c.points - self._origin, normals=None if c.normals is None else sign * c.normals
             )
-    sign, origin = -1.0 if flip else 1.0, np.mean(np.vstack([c.points for c in felt]), axis=0)
-    placed = [
-        replace(c, points=c.points - origin, normals=None if c.normals is None else sign * c.normals)
-        for c in felt
-    ]
-    atlas = core.atlas_of(
-        placed,
-        outward=None if outward is None else sign * np.array(outward),
-        tolerance=tolerance or None,
-        noise=noise or None,
-    )
-    found = WholeSurface(atlas, origin)
-    for _ in found.steps(0.0):
-        pass
-    report = {"contacts": sum(len(contour.points) for contour in felt), **found.report()}
-    if report["status"] == "ok":  # nobody has looked for places where the object goes on
-        report |= {"message": "The patches reach the tolerance wherever there are contacts."}
-    return found, report | {"tolerance": tolerance, "noise": noise}
+            for c in felt
+        ]
+        self._outward = None if outward is None else sign * np.array(outward)
+        self._tolerance, self._noise, self.share = tolerance, noise, 0.0
+
+    def steps(self):
+        """Does all of it; a generator. Raises ValueError with a sentence for the user."""
+        steps = core.cover_contacts(
+            self._felt,
+            outward=self._outward,
+            tolerance=self._tolerance or None,
+            noise=self._noise or None,
+        )
+        while True:
+            try:
+                self.share = 0.5 * next(steps)
+            except StopIteration as end:
+                self.whole = WholeSurface(end.value, self._origin)
+                break
+            yield
+        for share in self.whole.steps(0.0):
+            self.share = 0.5 + 0.5 * share
+            yield
+
+    def report(self):
+        """What there is to say, a dict of plain values."""
+        found = {"contacts": sum(len(contour.points) for contour in self._felt), **self.whole.report()}
+        if found["status"] == "ok":  # nobody has looked for places where the object goes on
+            found |= {"message": "The patches reach the tolerance wherever there are contacts."}
+        return found | {"tolerance": self._tolerance, "noise": self._noise}
 
 
 def _scaled(curve, factor):

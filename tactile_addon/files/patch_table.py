@@ -19,7 +19,7 @@ NUMBER_POWERS = {
     **dict.fromkeys(("radius", "extent", "step", "noise"), 1),
     **dict.fromkeys(("degree", "contacts"), 0),
 }
-WORDS = ("source", "method", "status", "message")
+WORD_COLUMNS = ("source", "method", "status", "message")
 
 
 def patches_of(objects):
@@ -54,7 +54,7 @@ def _row(patch, record, unit):
         numbers[_heading(key, power, unit)] = record[key] / unit[1] ** power if key in record else None
     named = {"probe": owner.name if owner else "", "patch": patch.name}
     said = {key: "" if value is None else f"{value:.9g}" for key, value in numbers.items()}
-    return named | said | {key: record[key] for key in WORDS}
+    return named | said | {key: record[key] for key in WORD_COLUMNS}
 
 
 def _heading(name, power, unit):

@@ -21,7 +21,7 @@ from .probe import forget_targets, is_free, is_probe, probe_of, record_of, targe
 from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
 
 SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
-SLICE = 0.2  # seconds of work between two events, in a window
+EVENT_SLICE = 0.2  # seconds of work between two events, in a window
 CHEAP = 0.05  # seconds that a touch may take to be made in every frame of an animation
 
 _unsure = True  # whether any patch may be another than its inputs ask for, as after undo
@@ -59,7 +59,7 @@ def _bring_up_to_date(depsgraph, dearest):
         reshaped = {u.id.original: None for u in depsgraph.updates if u.is_updated_geometry}
         if unsure:  # edited where no handler was told, as while the extension was off
             reshaped |= {probe.tactile_probe.target: None for probe in concerned}
-        end = perf_counter() + SLICE
+        end = perf_counter() + EVENT_SLICE
         for probe in filter(is_free, concerned):
             in_time = bpy.app.background or (perf_counter() < end and _seconds(probe) <= dearest)
             _look_at(probe, depsgraph, reshaped, in_time)
@@ -166,7 +166,7 @@ def _settle():
         return None
     if bpy.app.is_job_running("RENDER") or has_gesture():
         return SETTLE
-    end = perf_counter() + SLICE
+    end = perf_counter() + EVENT_SLICE
     for window in bpy.context.window_manager.windows:
         with bpy.context.temp_override(window=window), remembered(), undo.after_step():
             depsgraph = bpy.context.evaluated_depsgraph_get()

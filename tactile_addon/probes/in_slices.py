@@ -11,7 +11,7 @@ from ..touch.settings import UNSAVED
 from .operators import report_error
 
 FIRST_SLICE = 0.2  # seconds of work before a window is told that there is more
-SLICE = 0.03  # seconds of work between two events
+TIMER_SLICE = 0.03  # seconds of work between two events
 SAY = 1.0  # seconds between two lines of progress where there is no window
 NEXT = 0.01  # seconds from one slice to the next
 
@@ -72,7 +72,7 @@ class InSlices:
         if event.type != "TIMER":
             return self.meanwhile
         try:
-            if not self._advance(context, SLICE):
+            if not self._advance(context, TIMER_SLICE):
                 context.workspace.status_text_set(_status(self.stop, *self._done()))
                 return self.meanwhile
             self._leave(context)

@@ -17,7 +17,7 @@ PACES = {
     "extent": 1.5e-3, "spacing": 5e-4, "step": 1.5e-4, "edge": 1.5e-4, "noise": 1.5e-5, "tolerance": 1.5e-5
 }  # fmt: skip
 DECADES = range(-6, 7)  # of the properties' steps
-UNSAVED = {"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"}
+HIDDEN_UNSAVED = {"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"}
 # Blender's units of length in meters, each with the least length that is said in it.
 UNITS = {
     "METRIC": ((1e3, 1e3), (1.0, 1.0), (1e-2, 1e-2), (1e-3, 1e-4), (1e-6, 1e-6)),
@@ -83,7 +83,7 @@ def _field(name, given, decade, found):
         **shown,
         precision=given.get("precision", 2),
         step=10.0**decade,
-        options=UNSAVED,
+        options=HIDDEN_UNSAVED,
         get=lambda settings: getattr(settings, name) or found(settings.id_data, name),
         set=lambda settings, value: setattr(settings, name, value),
     )

@@ -9,7 +9,7 @@ from ..whole_object.object_report import object_summary, object_table_rows, unit
 from . import drawing, page, parts, views
 
 TOLERANCES = (0.5, 1.0, 2.0, 5.0)
-WORDS = {
+SCALE_WORDS = {
     "deviation": "deviation, red outside of the mesh",
     "height_std": "standard deviation",
 }
@@ -35,7 +35,7 @@ def _pictures(mesh, unit, shown):
     shown_values = values(mesh, shown).astype(float)
     limit = symmetric_range(shown_values, parts.LEAST_RANGE)
     low = 0.0 if shown in patch_record.POSITIVE else -1.0
-    scale = page.figure(drawing.scale(limit, parts.label(1, unit), low), WORDS[shown])
+    scale = page.figure(drawing.scale(limit, parts.label(1, unit), low), SCALE_WORDS[shown])
     return page.section("Pictures", *views.three_sides(mesh, shades(shown_values, limit)), scale)
 
 

@@ -9,7 +9,9 @@ import blf
 import bpy
 from bpy.props import StringProperty
 
-FONT, TEXT = 0, 11.0  # Blender's own, and its size in panels,
+from ..viewport.overlay import FONT
+
+TEXT = 11.0  # the size of the font in panels,
 LETTER, PADDING = 6.5, 12.0  # the width of a letter, about, and what is free around a text: pixels at scale 1
 
 TIPS = {

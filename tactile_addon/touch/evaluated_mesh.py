@@ -7,7 +7,7 @@ import zlib
 
 import numpy as np
 
-SHORT = 0.05  # Share of the reach within which a patch has its mesh, mostly.
+SHORT_SHARE = 0.05  # Share of the reach within which a patch has its mesh, mostly.
 FARTHEST_VERTEX = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
 
 
@@ -147,7 +147,7 @@ class PlacedMesh:
 
     def _deviation(self, point, normal, reach):
         ways = [(sign, [-sign * v for v in normal]) for sign in (-1.0, 1.0)]
-        for within in (SHORT * reach, reach):  # A long ray that meets nothing is dear.
+        for within in (SHORT_SHARE * reach, reach):  # A long ray that meets nothing is dear.
             hits = [(sign, self.ray_cast(point, way, within)) for sign, way in ways]
             found = [sign * math.dist(point, hit[0]) for sign, hit in hits if hit is not None]
             if found:

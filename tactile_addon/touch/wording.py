@@ -11,7 +11,7 @@ from .touch_report import ENDS, FEW_VERTICES
 from .units import length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
-SHORT = ("edge", "crease", "turns away")  # what ends a curve that could be felt on
+EARLY = ("edge", "crease", "turns away")  # what ends a curve that could be felt on
 
 
 def readable(report):
@@ -59,7 +59,7 @@ def verdict(report, unit):
         doubt = report["message"].partition(". ")[0].rstrip(".")
         return f"Doubtful: {doubt.rpartition(': ')[2]}"
     stops = Counter(stop for pair in report.get("stops", ()) for stop in pair)
-    early = [(count, ENDS[stop]) for stop, count in stops.most_common() if ENDS.get(stop, "").endswith(SHORT)]
+    early = [(count, ENDS[stop]) for stop, count in stops.most_common() if ENDS.get(stop, "").endswith(EARLY)]
     if early:
         count, where = early[0]
         return f"Good, with {count} of {stops.total()} half curves cut short {where}"

@@ -10,6 +10,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
 from ..scene import colors, patch_record
+from ..scene.contour_mesh import RIM_CORNERS
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
 from ..touch import units
@@ -21,8 +22,7 @@ PLANE_COLORS = [
     (0.94, 0.89, 0.26), (0.80, 0.47, 0.65), (0.84, 0.37, 0.0),
 ]  # fmt: skip
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
-RIM_CORNERS = 96  # points around a patch
-FONT = 0
+FONT = 0  # Blender's own
 LEGEND_STEPS = 65  # of the legend's colors
 # In pixels at the resolution scale 1, width and height: the legend's bar, and Blender's navigation buttons.
 BAR, NAVIGATION_GIZMO = (150, 12), (50, 290)

@@ -14,11 +14,11 @@ from ..touch.wording import many
 from .whole_surface import WholeSurface
 
 TOLERANCE_SHARE = 1.0 / 500.0  # of the object's size, where no tolerance is given
-LARGEST_TOLERANCE, LONGEST_EDGE = 0.1, 0.5  # of the size: beyond, no patch and no triangle fits
+LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # of the size: beyond, no patch and no triangle fits
 SHORTEST_EDGE = 1e-3  # of the size: some millions of triangles
 STARTS = 20  # places that are tried where no place to begin is given
-REACH = 0.05  # of the object's size, that the target is looked for along the normal
-AT_ONCE = 2000  # vertices whose deviation from the target is measured in a step
+TARGET_WITHIN = 0.05  # of the object's size, that the target is looked for along the normal
+COMPARED_AT_ONCE = 2000  # vertices whose deviation from the target is measured in a step
 
 
 class ObjectTouches:
@@ -65,7 +65,7 @@ class ObjectTouches:
         for what, value, most in (
             ("noise", noise, LARGEST_TOLERANCE),
             ("tolerance", tolerance, LARGEST_TOLERANCE),
-            ("edge length", edge, LONGEST_EDGE),
+            ("edge length", edge, LARGEST_EDGE),
         ):
             if value > most * size:
                 raise ValueError(
@@ -141,10 +141,10 @@ class ObjectTouches:
             yield
         mesh, deviation = self.whole.mesh, self.whole.deviation
         normals = mesh.normals
-        for start in range(0, len(deviation), AT_ONCE):
-            some = slice(start, start + AT_ONCE)
+        for start in range(0, len(deviation), COMPARED_AT_ONCE):
+            some = slice(start, start + COMPARED_AT_ONCE)
             deviation[some] = self.surface.deviations(
-                mesh.vertices[some], normals[some], REACH * self.surface.size
+                mesh.vertices[some], normals[some], TARGET_WITHIN * self.surface.size
             )
             self.share = 0.9 + 0.1 * start / len(deviation)
             yield

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-AT_ONCE = 3000  # vertices that are given their curvatures in a step
+CURVED_AT_ONCE = 3000  # vertices that are given their curvatures in a step
 
 
 class WholeSurface:
@@ -37,8 +37,8 @@ class WholeSurface:
             raise ValueError("The patches are too small for triangles of that edge length: use a shorter one")
         points, normals = self.mesh.vertices, self.mesh.normals
         self.deviation, parts = np.zeros(len(points)), []
-        for start in range(0, len(points), AT_ONCE):
-            some = slice(start, start + AT_ONCE)
+        for start in range(0, len(points), CURVED_AT_ONCE):
+            some = slice(start, start + CURVED_AT_ONCE)
             parts.append(self.atlas.curvatures_at(points[some], normals[some]))
             yield 0.8
         self.curvatures = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -149,7 +149,7 @@ def test_the_same_object_twice_is_touched_once(command, tmp_path):
 def test_a_list_that_names_itself_is_refused(command, tmp_path):
     (tmp_path / "all.txt").write_text("all.txt\n")
     code, _, error = command(tmp_path / "all.txt", "--output", tmp_path / "set")
-    assert code == 2 and f'in the list "{tmp_path / "all.txt"}", got another list' in error
+    assert code == 2 and f'in the list "{tmp_path / "all.txt"}", got a list' in error
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import bpy
 import gui
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import check, data_blocks, last_report, look
+from common import check, data_blocks, last_report, look, until
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
 
@@ -56,6 +56,42 @@ def write_rasters():
     return {"directory": str(FOLDER), "files": [{"name": "even.csv"}, {"name": "odd.csv"}], "whole": True}
 
 
+def joining():
+    windows = bpy.context.window_manager.windows
+    return any(op.bl_idname == "TACTILE_OT_import_contacts" for w in windows for op in w.modal_operators)
+
+
+def made():
+    return any("tactile_object" in obj for obj in bpy.data.objects)
+
+
+def joined_by_dialog(given):
+    """Agreed to in the dialog the work is done in slices, which Esc ends."""
+    before = data_blocks()
+    for stop in (True, False):
+        window, area, region = gui.find()
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            path = str(FOLDER / "even.csv")
+            bpy.ops.tactile.import_contacts("INVOKE_DEFAULT", True, filepath=path, outward=(0, 0, 1), **given)
+        yield 1
+        gui.xdo("key", "Return")
+        while not joining() and not made():  # it is a matter of a second
+            yield 0.1
+        check("the window goes on while files are joined", joining() and data_blocks() == before)
+        if stop:
+            gui.xdo("key", "Escape")
+        yield from until(lambda: not joining(), 60)
+        words = "... Esc ends that" if stop else "... and ends with a surface"
+        check(words, made() is not stop, data_blocks())
+        if stop:
+            said = last_report()
+            check("... and says so", said.endswith("Stopped: nothing was imported"), said)
+        else:
+            gui.xdo("mousemove", 600, 400, "sleep", 0.2, "key", "ctrl+z")
+            yield 1
+        check("... and nothing is left", data_blocks() == before, data_blocks())
+
+
 def several_files():
     """Contacts of one object in two files: the dialog, what it says without the outer side, the surface."""
     given, before = write_rasters(), data_blocks()
@@ -71,6 +107,7 @@ def several_files():
     check("... and leave nothing", data_blocks() == before, data_blocks())
     gui.xdo("key", "Escape", "mousemove", 600, 400)
     yield 0.5
+    yield from joined_by_dialog(given)
     bpy.ops.tactile.import_contacts("EXEC_DEFAULT", True, outward=(0, 0, 1), **given)
     yield 1
     surface = next((obj for obj in bpy.data.objects if "tactile_object" in obj), None)

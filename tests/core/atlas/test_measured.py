@@ -33,6 +33,19 @@ def test_a_raster_becomes_a_surface():
     assert (above > 0.0).mean() > 0.98
 
 
+def test_steps_tell_the_share_that_is_covered_and_return_the_same():
+    steps, shares = core.cover_contacts(raster(), outward=(0, 0, 1), tolerance=4e-3), []
+    while True:
+        try:
+            shares.append(next(steps))
+        except StopIteration as end:
+            atlas = end.value
+            break
+    assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] == 1.0
+    same = core.atlas_of(raster(), outward=(0, 0, 1), tolerance=4e-3)
+    assert [r.patch.k1 for r in atlas.patches] == [r.patch.k1 for r in same.patches]
+
+
 def test_contours_with_normals_need_no_direction():
     solid = solids.ball()
     planes = [core.SamplingPlane(a) for a in np.radians([0, 45, 90, 135])]

@@ -26,7 +26,7 @@ from core.patch import residual
 from core.patch.monge import TERMS, exponents, monomials
 from core.patch.residual import kernel, weighted_kernel
 from core.reconstruction.deviations import mean_height_stds
-from core.reconstruction.next_plane import AZIMUTHS, _lost
+from core.reconstruction.next_plane import TRIED, _lost
 
 EXTENT = 12.0
 OUTWARD = np.array([0.0, 0.0, 1.0])
@@ -305,11 +305,9 @@ def test_the_suggested_plane_tells_as_much_as_any_of_all(seed):
     points, weights = r.domain.nodes
     covariances = r.uncertainty.covariances_with(points / r.radius)
     told = (
-        r.geometry.widening(*points.T) ** 2
-        * _lost(covariances, AZIMUTHS, 24, r.uncertainty.noise**2)
-        @ weights
+        r.geometry.widening(*points.T) ** 2 * _lost(covariances, TRIED, 24, r.uncertainty.noise**2) @ weights
     )
-    chosen = np.argmin(np.abs(AZIMUTHS - suggest_plane(r)[0].azimuth))
+    chosen = np.argmin(np.abs(TRIED - suggest_plane(r)[0].azimuth))
     assert told[chosen] >= 0.97 * told.max()
 
 

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import surfaces
+from numpy.testing import assert_allclose
 
 import core
 
@@ -31,7 +32,7 @@ class Face:
         return None
 
 
-def beyond(r, count=40_000):
+def beyond(r, count=10_000):
     """The share of the domain's area that is beyond the edge."""
     points, _ = r.domain.grid(count)
     return np.mean(r.frame.to_world(np.column_stack([points, np.zeros(len(points))]))[:, 0] > 1.0)
@@ -51,9 +52,9 @@ def test_near_an_edge_no_patch_reaches_beyond_it(flank, distance, count):
             assert r.domain.brinks.any()
             assert beyond(r) < 5e-3
         again = core.from_dict(json.loads(json.dumps(core.to_dict(r))))
-        assert again.domain.boundary(90) == pytest.approx(r.domain.boundary(90))
+        assert_allclose(again.domain.boundary(90), r.domain.boundary(90), 1e-6, 1e-12)
         larger = r.moved(np.diag([3.0, 3.0, 3.0, 1.0]))
-        assert larger.domain.boundary(90) == pytest.approx(3.0 * r.domain.boundary(90))
+        assert_allclose(larger.domain.boundary(90), 3.0 * r.domain.boundary(90), 1e-6, 1e-12)
         vertices, _ = r.mesh()
         assert (r.frame.to_world(vertices)[:, 0] < 1.0 + 0.02).all()
 

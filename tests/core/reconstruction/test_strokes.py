@@ -42,8 +42,8 @@ def wiped(name, count, rows=0, extent=EXTENT):
     flat = extent * flat[np.hypot(*flat.T) <= 1.0]
     e1, n, e2 = SamplingPlane(0.3).axes(surface.normal).T
     starts = surface.point + flat @ np.array([e1, e2]) + EXTENT * n
-    hits = [surface.ray_cast(start, -n, 2.0 * EXTENT) for start in starts]
-    return np.array([hit[0] for hit in hits if hit is not None])
+    hits = surface.crossings(starts, -n, 2.0 * EXTENT)
+    return hits[np.isfinite(hits[:, 0])]
 
 
 def noisy(points, noise, seed):
