@@ -13,12 +13,11 @@ from ..contours.contour import Vector, dot, vector_of
 from ..contours.finger import Surface, section
 from ..patch.domain import GAUSS_ALONG, SAME_END, Domain
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.status import Taps
+from ..reconstruction.status import CONTRADICTING, Taps
 
 # benchmarks.real says what they notice.
-RIM, WITHIN = 0.98, 0.6  # of the way to the boundary: four taps between the ends of two curves, and two
-FAR_OFF = 10.0  # deviations that no tap may be off,
-CONTRADICTING = 3.0  # and that they may be on average
+NEAR_RIM, WITHIN = 0.98, 0.6  # of the way to the boundary: four taps between the ends of two curves, and two
+TOO_FAR_OFF = 10.0  # deviations that no tap may be off
 BESIDE = 0.01  # of the radius: where the side is felt, at the point
 
 
@@ -33,7 +32,7 @@ def places(domain: Domain) -> Array:
     """Where to tap, (n, 2): near the rim and farther within, at the Gauss nodes of each piece of it."""
     rim = domain.nodes[0][-GAUSS_ALONG * len(domain.ends) :] / domain.node_places[-1]
     inner = rim.reshape(-1, GAUSS_ALONG, 2)[:, 1:-1].reshape(-1, 2)
-    return np.concatenate([RIM * rim, WITHIN * inner])
+    return np.concatenate([NEAR_RIM * rim, WITHIN * inner])
 
 
 def tapped(surface: Surface, r: Reconstruction) -> Tapped:
@@ -45,8 +44,8 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     noise = max((contour.noise or 0.0 for contour in r.contours), default=0.0)
     stds = np.hypot(r.height_std(*where.T), noise)
     feet, up = r.frame.to_world(np.column_stack([where, r.height(*where.T)])), r.frame.axes[:, 2]
-    starts, down = feet + FAR_OFF * stds[:, None] * up, vector_of(-up)
-    rays = zip(starts.tolist(), (2.0 * FAR_OFF * stds).tolist(), strict=True)
+    starts, down = feet + TOO_FAR_OFF * stds[:, None] * up, vector_of(-up)
+    rays = zip(starts.tolist(), (2.0 * TOO_FAR_OFF * stds).tolist(), strict=True)
     hits = [surface.ray_cast((x, y, z), down, length) for (x, y, z), length in rays]
     met = np.array([hit is not None for hit in hits])
     offs = np.empty(len(where))
@@ -55,7 +54,7 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     )
     offs[~met] = [_off(surface, r, vector_of(foot)) for foot in feet[~met]]
     missed, offs = np.isnan(offs), np.nan_to_num(offs)
-    contradicts = (offs > FAR_OFF * stds).any() or offs.mean() > CONTRADICTING * stds.mean()
+    contradicts = (offs > TOO_FAR_OFF * stds).any() or offs.mean() > CONTRADICTING * stds.mean()
     taps = Taps(len(offs), int(missed.sum()), float(offs.max()) / r.radius if contradicts else 0.0)
     return Tapped(taps, where[(offs > CONTRADICTING * stds) & contradicts])
 

@@ -23,6 +23,7 @@ SIGNIFICANT = 5.0  # and standard deviations of it.
 LEAST_SCATTER = 0.3  # Share of a contact's accuracy: few contacts may happen to scatter less.
 CONTRADICTED = 0.01  # Radians by which normals may contradict the contacts, beside SIGNIFICANT deviations.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts may be missed, beside the noise.
+CONTRADICTING = 3.0  # A surface that is off by more than so many deviations on average contradicts the patch.
 DOUBTFUL_GAP = 0.1  # Share of the taps between the curves that feel no surface.
 
 
