@@ -20,6 +20,7 @@ FLOOR = 1e-3  # share of the radius: no smaller deviation counts in a weight
 AGREE, FACING = 0.64, 0.34  # cosines of 50 and 70 degrees: a patch fades out of a blend, faces another way
 LAYER = 0.15  # share of the radius by which places of one wall differ in height at most
 SLANT = 0.5  # share of their distance from it, which is added
+INSIDE = 1.0  # of a domain's radius: farther out a place is not covered
 WALLS = 3  # that meet at a place
 WELL_INSIDE = 0.8  # share of a domain's radius
 
@@ -47,6 +48,16 @@ def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
         known = np.bincount(pairs.place[sure], minlength=len(points)) > 0
         pairs = pairs.chosen((pairs.share < MARGIN) | ~known[pairs.place])
     return blend_of(charts, pairs, points)
+
+
+def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
+    """Which of the places (k, 3) lie inside a patch that faces their way."""
+    pairs = charts.pairs(points)
+    on = pairs.share < INSIDE
+    on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
+    on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
+    found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
+    return found
 
 
 def blend_of(charts: Charts, pairs: Pairs, points: Array) -> Blend:
