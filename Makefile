@@ -19,6 +19,8 @@ CLUSTER := $(VENV)/.cluster
 SITE := build/site
 # Tests run beside each other, one process a processor, each with one thread.
 BESIDE := -n auto --dist worksteal
+# Those of core share what takes longest to touch.
+test-core: BESIDE := -n auto --dist loadgroup
 test test-core test-cluster: export OMP_NUM_THREADS = 1
 test test-core test-cluster: export OPENBLAS_NUM_THREADS = 1
 

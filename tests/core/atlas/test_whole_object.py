@@ -12,6 +12,7 @@ import core
 from core.atlas.charts import Charts
 from tests import solids
 
+pytestmark = pytest.mark.xdist_group("whole object")
 RING = solids.ring(small=0.5)
 
 
