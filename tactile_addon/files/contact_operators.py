@@ -25,7 +25,7 @@ from ..whole_object import whole_mesh
 from ..whole_object.object_report import object_summary
 from . import contact_file, measured
 
-UNITS = [
+UNIT_ITEMS = [
     (
         "FILE",
         "From File",
@@ -46,7 +46,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
     filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.ply", options={"HIDDEN"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
-    unit: EnumProperty(name="Unit", description="Unit of the numbers in the file", items=UNITS)
+    unit: EnumProperty(name="Unit", description="Unit of the numbers in the file", items=UNIT_ITEMS)
     whole: BoolProperty(
         name="Whole Object",
         description="Cover all contacts with patches, and join these to one surface",

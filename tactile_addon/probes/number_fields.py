@@ -19,7 +19,7 @@ PACES = {
 DECADES = range(-6, 7)  # of the properties' steps
 HIDDEN_UNSAVED = {"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"}
 # Blender's units of length in meters, each with the least length that is said in it.
-UNITS = {
+LENGTH_UNITS = {
     "METRIC": ((1e3, 1e3), (1.0, 1.0), (1e-2, 1e-2), (1e-3, 1e-4), (1e-6, 1e-6)),
     "IMPERIAL": ((1609.344, 1609.344), (0.3048, 0.3048), (0.0254, 0.0254), (2.54e-5, 2.54e-5)),
 }
@@ -69,7 +69,7 @@ def pace_of(decade):
 
 
 def _unit_of(system, meters):
-    found = (unit for unit, least in UNITS[system] if meters >= least * (1.0 - 1e-4))
+    found = (unit for unit, least in LENGTH_UNITS[system] if meters >= least * (1.0 - 1e-4))
     return next(found, WHOLE[system])
 
 
