@@ -92,7 +92,7 @@ def make_target():
 
 def by_dialog():
     before = data_blocks()
-    yield from start(target="Target", tolerance=3e-4)
+    yield from start(target="Target")
     check("the dialog starts it", running())
     yield from until(lambda: any("Touches" in obj.name for obj in bpy.data.objects), 20)
     yield 1
