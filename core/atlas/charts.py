@@ -19,18 +19,18 @@ from ..arguments import Array
 from ..contours.contour import Vector, cross, vector_of
 from ..patch.smoothing_spline import SIDE, weights_at
 
-MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
+MARGIN = 1.12  # times a domain's radius: how far a patch is asked, for beside a crease it ends a step early
 AZIMUTHS = 96  # samples of a domain's radius
-REACH = 0.5  # of the radius, that a place may be off its patch
+REACH = 0.5  # share of the radius: how far a place may be off its patch
 DISK_PLACES = 36  # places of a disk around a place
 CHUNK = 200_000  # pairs at once
 
 
 class Pairs(NamedTuple):
-    """What patches say of places near by, m pairs sorted by place.
+    """What patches say of places near them: m pairs of a place and a patch, sorted by place.
 
     place, node : (m,), indices
-    share : (m,), of the domain's radius at its foot, below MARGIN
+    share : (m,), how far out the place's foot is, as a share of the domain's radius there, below MARGIN
     distance : (m,), signed
     normal : (m, 3), of the patch below the place
     std : (m,), of the distance
@@ -107,7 +107,7 @@ class Charts:
         return np.hypot(x, y) / np.maximum(radius, 1e-6)
 
     def _pairs_at(self, points: Array, room: float, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
-        """Distances to the tangent plane at the foot, which is where the share and the deviation are of."""
+        """The pairs among these that are within reach, by the tangent plane at the foot of each place."""
         x, y, z = self.local(points, place, node).T
         reach = np.maximum(REACH, room / self.radii[node])
         inside = (self.shares(x, y, node) < MARGIN + reach) & (np.abs(z) < 1.5 + reach)

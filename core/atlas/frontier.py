@@ -25,15 +25,15 @@ from .field import FACING, INSIDE, covered
 from .join import charts_of
 
 RIM = 24  # places of a rim
-REACHES = (0.35, 0.12, 0.04)  # of the radius, that the finger goes on; the first that finds what is new
-DISK_REACHES = 3.0  # of these, the radius of the disk around it that tells how much, at most the patch's
-SLIVER = 0.03  # of the disk: less is bridged by what blends patches
+REACHES = (0.35, 0.12, 0.04)  # shares of the radius that the finger goes on, until it finds anything new
+DISK_REACHES = 3.0  # times this: the radius of the disk, at most the patch's, in which that is measured
+SLIVER = 0.03  # share of the disk: the blend of patches bridges less
 TRIES = 3  # touches that a place of a rim is worth
 LOOK = 7  # more places that are looked at with the first
 TOUCHES_APART = 2.2  # radii between touches that are made side by side
-LOW = 0.1  # of the radius, that the finger is above a place when it comes down
-ABOVE = 0.6  # of the radius, that the finger is above what it feels around
-HAIR = 0.02  # of a reach, that the finger is above the surface
+LOW = 0.1  # share of the radius: how high above a place the finger is when it comes down
+ABOVE = 0.6  # share of the radius: how high the finger is above what it feels around a contact
+HAIR = 0.02  # share of a reach: how high the finger is above the surface
 
 Hit = tuple[Sequence[float], Sequence[float]]  # what a surface answers
 Contact = tuple[Vector, Vector]  # a point of the surface and its outward normal
@@ -64,13 +64,13 @@ class Next(NamedTuple):
 
 @dataclass(eq=False)
 class Frontier:
-    """What was felt, and the places of its rims, by an area that touches there bring at most.
+    """What was felt, and a queue of the places on its rims, by the area that a touch there can bring at most.
 
     side : 1 where the surface's normals are on the side of the finger, -1 where they are on the other
     least : the area that a touch has to bring
     left : places where touches brought nothing
 
-    What a touch brings only becomes less, so that no other need be asked anew before it is the first.
+    What a place can bring only shrinks as patches come, so it is measured again only once it is the first.
     """
 
     surface: Surface
@@ -82,19 +82,19 @@ class Frontier:
     left: list[Place] = field(default_factory=list)
 
     def add(self, r: Reconstruction, goes_on: bool = True) -> None:
-        """A patch that was felt, and whether others go on from its rim."""
+        """Takes in a patch that was felt, with the places of its rim where others may go on from there."""
         chart = charts_of([r], deviations=False)
         self.charts = chart if self.charts is None else self.charts.joined(chart)
         for p, n, t in zip(*chart.rim(RIM, 1.01 * INSIDE), strict=True) if goes_on else ():
             self.push(Place(vector_of(p), vector_of(n), vector_of(t), r.radius), np.pi * r.radius**2)
 
     def push(self, place: Place, gain: float) -> None:
-        """A place of a rim whose touch may bring so much."""
+        """Queues a place of a rim by the area that a touch there may bring."""
         self.pushed += 1
         heapq.heappush(self.queue, (-gain, self.pushed, place))
 
     def tried(self, touch: Next) -> None:
-        """What was touched: its place is looked at again."""
+        """Queues the place of a touch that was made once more: something may be left beyond it."""
         place, at = touch.place, vector_of(touch.point)
         self.push(replace(place, tried=(*place.tried, at)), touch.gain)
 
@@ -211,7 +211,7 @@ class Frontier:
     def disk(self, place: Place, share: float) -> list[Contact]:
         """The contact that is a share of the radius ahead of a place, if any, and those on a disk around it.
 
-        By rays onto the disk: beyond an edge there is nothing to add.
+        Rays onto the disk measure it: beyond an edge there is nothing to add.
         """
         contact = self.ahead(place, share * place.radius)
         if contact is None:
@@ -229,7 +229,7 @@ class Frontier:
 
 
 def still_open(places: Sequence[Place], charts: Charts | None) -> list[Place]:
-    """Those of places that no patch covers."""
+    """The places that no patch covers."""
     if charts is None or not places:
         return list(places)
     points, normals = (np.array([getattr(p, name) for p in places]) for name in ("point", "normal"))

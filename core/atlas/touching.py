@@ -21,14 +21,14 @@ from .frontier import Frontier
 from .join import Table, joined
 from .object_atlas import Atlas
 
-MOST = 1000
-FIRST_EXTENT = 300.0  # times the tolerance, that half curves of the first touch may become
-SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
-SMALL = 5.0  # times it, that a patch is wide at least from which others go on
-NARROW = 1.0  # times it, that a patch is wide at least where a touch was in vain before
+MOST = 1000  # touches, unless the caller says otherwise
+FIRST_EXTENT = 300.0  # times the tolerance: the longest half curve of the first touch
+SIZE = 1.5  # times the tolerance: how uncertain a patch may be before its neighbors are known
+SMALL = 5.0  # times it: others do not go on from a patch of a smaller radius
+NARROW = 1.0  # times it: the least radius of a patch where a touch was in vain before
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
-AGAIN = 2  # times that patches less certain than the tolerance are touched again
-LARGER = 2.0  # times the patch where it begins, that a touch may become
+AGAIN = 2  # how often patches less certain than the tolerance are touched again
+LARGER = 2.0  # times the radius of the patch where it begins: how far a touch may reach
 
 Contact = tuple[Array, Array]  # a point and its normal, (3,) each
 
@@ -122,7 +122,7 @@ class _Run:
         return self.now(new=[first])
 
     def now(self, joining: float | None = None, new: Sequence[Exploration] = ()) -> Progress:
-        """How far it is."""
+        """The Progress so far, with new touches."""
         return Progress(self.done, len(self.frontier.queue), tuple(new), joining)
 
     def touch(
@@ -154,7 +154,7 @@ class _Run:
         return (yield from joined(contours, results, self.frontier.charts, self.wanted["noise"], known))
 
     def missing(self, charts: Charts, rough: list[int]) -> list[Contact | None]:
-        """For each of these patches the contact in the middle of those that no other covers, if there are."""
+        """For each of these patches the contact in the middle of those that no other covers, or None."""
         others = charts.chosen(np.setdiff1d(np.arange(len(self.found)), rough))
         found: list[Contact | None] = []
         for i in rough:

@@ -32,6 +32,7 @@ from .growth import (
 # benchmarks.amount judges the first, benchmarks.speed --base what adding planes costs.
 NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
 HELPS = 0.1  # Share of it that one more plane must take off.
+QUIET = 1.0  # of it: where contacts scatter by less, twice as many take nothing noticeable off
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +73,7 @@ class Touch:
     is_grown : whether what makes curves grow is the fit that is asked for
     """
 
-    follow: Callable[..., Feel]
+    follow: Callable[..., Callable[[float], list[Contour]]]
     point: Array
     reference: Array
     planes: tuple[SamplingPlane, ...]
@@ -105,15 +106,15 @@ class Touch:
         steps = [extent / count for count in CONTACT_COUNTS] if self.step is None else [self.step]
 
         def at(step: float) -> Contacts:
+            """Contacts so far apart."""
             return self.follow(self.planes, step=step)(extent), step, None
 
         return (yield from self._enough(at, extent, steps))
 
     def _grown(self) -> Steps:
         """The touch that is as large as it can be trusted."""
-        between = max(self.step or 0.0, self.farthest / FELT)
-        feel = self.follow(self.planes, step=between)
-        fits = grown(feel, self.point, self.farthest, between, self.largest_std)
+        least = self.step or 0.0
+        fits = grown(self._feeling(), self.farthest, max(least, self.farthest / FELT), least)
         contours = next(fits)
         while True:
             answer = yield Ask(contours, growing=not self.is_grown)
@@ -127,6 +128,19 @@ class Touch:
             # These contacts are others than those felt.
             return (yield from self._of_reaches(largest, np.floor(largest.counts / STRETCH).astype(np.intp)))
         return found
+
+    def _feeling(self) -> Feel:
+        """What is felt along the planes, with any step; it goes on from where it was."""
+        feels: dict[float, Callable[[float], list[Contour]]] = {}
+
+        def felt(step: float, length: float) -> Felt:
+            """Half curves of a length."""
+            if step not in feels:
+                feels[step] = self.follow(self.planes, step=step)
+            contours = feels[step](min(length, self.farthest))
+            return Felt(contours, self.point, step, self.largest_std, partial=length < self.farthest)
+
+        return felt
 
     def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
         """The touch with half curves of so many of the contacts that were felt; with these where they do."""
@@ -187,9 +201,10 @@ class Touch:
 def is_enough(r: Reconstruction) -> bool:
     """Whether twice as many contacts would take less than NOTICEABLE off the mean deviation of the height.
 
-    They would tell nothing where that is less than a polynomial may be off.
+    They would tell nothing where that is less than a polynomial may be off, nor where it is more than
+    contacts scatter: then it is what no contact tells that makes it large.
     """
-    if r.mean_height_std <= MISFIT * r.radius:
+    if r.mean_height_std <= MISFIT * r.radius or r.uncertainty.noise * r.radius <= QUIET * r.mean_height_std:
         return True
     (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
     if r.residual is None:
