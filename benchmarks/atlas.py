@@ -23,6 +23,7 @@ import numpy as np
 import core
 from core.atlas.join import charts_of, joined
 from core.atlas.object_atlas import Atlas
+from core.exploration.side_by_side import result_of
 from tests import solids
 from tools import blender
 
@@ -283,12 +284,8 @@ def elsewhere(thing, which, where, tolerance):
     seconds = process_time() - start
     results = [e.result for e in found]
     charts = charts_of(results, deviations=False)
-    steps = joined([e.contours for e in found], results, charts, NOISE, {})
-    try:
-        while True:
-            next(steps)
-    except StopIteration as end:
-        atlas = Atlas(tuple(results), end.value, tolerance)
+    joining = joined([e.contours for e in found], results, charts, NOISE, {})
+    atlas = Atlas(tuple(results), result_of(joining), tolerance)
     mesh = atlas.mesh(EDGE)
     covered = np.isfinite(atlas.distance(thing.points)[1]).mean()
     off = off_mesh(mesh.vertices, mesh.triangles, thing.points)

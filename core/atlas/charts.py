@@ -3,7 +3,7 @@
 """Many patches as tables, so that what all of them say of many places is one pass over arrays.
 
 A patch with a residual costs a kernel with each of its contacts at every place. Here it costs 16 numbers of a
-cubic B-spline, which is C2 and off the patch by less than the residual's own grain.
+cubic B-spline, which is C2 and off the patch by less than a tenth of its deviation.
 """
 
 import math

@@ -63,7 +63,7 @@ def meshed(charts: Charts, felt: Felt, edge: float) -> Generator[float, None, Me
     size = CELL * edge
     cells = yield from _cells(charts, size)
     yield 0.0
-    lattice, tetrahedra = _tetrahedra(cells)
+    lattice, tetrahedra = yield from _tetrahedra(cells)
     yield 0.0
     points = 0.5 * size * lattice.astype(np.float64)
     values, known = np.zeros(len(points)), np.zeros(len(points), dtype=bool)
@@ -141,8 +141,11 @@ def _keys(rows: Indices) -> Indices:
     return keys
 
 
-def _tetrahedra(cells: Indices) -> tuple[Indices, Indices]:
-    """Lattice points (n, 3), in halves of a cube, and tetrahedra (m, 4) on all faces between two cubes."""
+def _tetrahedra(cells: Indices) -> Generator[float, None, tuple[Indices, Indices]]:
+    """Lattice points (n, 3), in halves of a cube, and tetrahedra (m, 4) on all faces between two cubes.
+
+    Yields 0 between its parts.
+    """
     corners = []
     keys = _keys(np.vstack([cells, cells.min(axis=0) - 1, cells.max(axis=0) + 1]))[:-2]
     across = cells.max(axis=0) - cells.min(axis=0) + 3
@@ -158,8 +161,11 @@ def _tetrahedra(cells: Indices) -> tuple[Indices, Indices]:
         corners += [
             np.stack([center, center + 2 * ahead, face[k], face[(k + 1) % 4]], axis=1) for k in range(4)
         ]
+    yield 0.0
     flat = np.concatenate(corners).reshape(-1, 3)
-    _, first, index = np.unique(_keys(flat), return_index=True, return_inverse=True)
+    keys = _keys(flat)
+    yield 0.0
+    _, first, index = np.unique(keys, return_index=True, return_inverse=True)
     return flat[first], index.reshape(-1, 4)
 
 

@@ -36,9 +36,8 @@ class ObjectTouches:
 
         Raises ValueError, with a sentence, for what cannot be touched.
         """
-        import scipy.linalg
-        import scipy.sparse  # takes half a second once: not between two redraws
-        import scipy.spatial  # noqa: F401
+        import scipy.interpolate  # half a second with all that it brings: not between two redraws
+        import scipy.ndimage  # noqa: F401
 
         for name, value in (("tolerance", tolerance), ("noise", noise), ("edge", edge)):
             if not value >= 0.0:  # NaN is none
@@ -141,6 +140,7 @@ class ObjectTouches:
             yield
         mesh, deviation = self.whole.mesh, self.whole.deviation
         normals = mesh.normals
+        yield
         for start in range(0, len(deviation), COMPARED_AT_ONCE):
             some = slice(start, start + COMPARED_AT_ONCE)
             deviation[some] = self.surface.deviations(

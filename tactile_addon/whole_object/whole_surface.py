@@ -47,7 +47,10 @@ class WholeSurface:
         for r in self.atlas.patches:
             self._in_doubt += r.status != "ok"  # which takes a while, once
             yield 0.9
-        self.graph = json.dumps(self._graph(), allow_nan=False)
+        graph = self._graph()
+        yield 0.9
+        self.graph = json.dumps(graph, allow_nan=False)
+        yield 0.9
 
     def _graph(self):
         """The graph of patches as Atlas.to_dict has it, in the world."""
