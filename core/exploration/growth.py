@@ -35,7 +35,7 @@ EASY = 0.1  # of what ends growth.
 NEARLY_ENDED = 0.75  # of what ends growth: where twice as long is in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
 TOO_ROUGH = 0.0068  # Roughness of contacts whose fit ends growth, in all but three of a hundred
-EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
+EXPLAINED = 3.0  # times its noise, that a contact is off: root mean square of a half curve
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
 Fits = Generator[list[Contour], Reconstruction | DegenerateCurvesError, "Grown"]
@@ -92,7 +92,7 @@ class Felt:
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
         """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
 
-        Above 1 is too much for their accuracy.
+        Above 1 is too much for their noise.
         """
         each = list(zip(self.contours, self.places, counts.tolist(), strict=True))
         points = np.vstack([contour.points[at - n[0] : at + n[1] + 1] for contour, at, n in each])
@@ -102,7 +102,7 @@ class Felt:
         starts = np.cumsum(sizes) - sizes.ravel()
         squares = np.append((z - r.height(x, y)) ** 2, 0.0)
         sums = np.add.reduceat(squares, starts).reshape(-1, 3)[:, ::2]
-        limit = max(EXPLAINED * max(r.accuracy, MISFIT) * r.radius, self.largest_std or 0.0)
+        limit = max(EXPLAINED * max(r.noise, MISFIT) * r.radius, self.largest_std or 0.0)
         return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0) / limit
 
 
@@ -144,7 +144,7 @@ def grown(feel: Feel, farthest: float, step: float, least: float) -> Fits:
     known: list[Grown] = []
     found = yield from _seed(feel, step, least, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
-    if found.result.accuracy > MISFIT and found is not known[-1]:
+    if found.result.noise > MISFIT and found is not known[-1]:
         return (yield from _longer(feel, farthest, found, np.inf, np.inf))
     if found.felt.step < step or found.doubt > 1.0:
         return found

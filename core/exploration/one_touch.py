@@ -106,6 +106,7 @@ class Touch:
         steps = [extent / count for count in CONTACT_COUNTS] if self.step is None else [self.step]
 
         def at(step: float) -> Contacts:
+            """Contacts so far apart."""
             return self.follow(self.planes, step=step)(extent), step, None
 
         return (yield from self._enough(at, extent, steps))
