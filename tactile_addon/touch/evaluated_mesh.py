@@ -139,19 +139,22 @@ class PlacedMesh:
     def deviations(self, points, normals, reach):
         """Signed distances (n,) of world points to the mesh, positive outside it.
 
-        Measured along the unit normals (n, 3) either way, up to `reach`; to the nearest point of the
-        mesh where they meet nothing, as over a hole.
+        Measured along the unit normals (n, 3): from outside where the mesh is near, otherwise either way, up
+        to `reach`; to the nearest point of the mesh where they meet nothing, as over a hole.
         """
         pairs = zip(points.tolist(), normals.tolist(), strict=True)
         return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
 
     def _deviation(self, point, normal, reach):
-        ways = [(sign, [-sign * v for v in normal]) for sign in (-1.0, 1.0)]
-        for within in (SHORT_SHARE * reach, reach):  # A long ray that meets nothing is dear.
-            hits = [(sign, self.ray_cast(point, way, within)) for sign, way in ways]
-            found = [sign * math.dist(point, hit[0]) for sign, hit in hits if hit is not None]
-            if found:
-                return min(found, key=abs)
+        short = SHORT_SHARE * reach  # A long ray that meets nothing is dear.
+        start, down = [p + short * v for p, v in zip(point, normal, strict=True)], [-v for v in normal]
+        hit = self.ray_cast(start, down, 2.0 * short)
+        if hit is not None:
+            return math.dist(start, hit[0]) - short
+        hits = [(sign, self.ray_cast(point, way, reach)) for sign, way in ((-1.0, normal), (1.0, down))]
+        found = [sign * math.dist(point, hit[0]) for sign, hit in hits if hit is not None]
+        if found:
+            return min(found, key=abs)
         foot = self._to_world(self._nearest(self._to_local(point))[0])
         return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
 

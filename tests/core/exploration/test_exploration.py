@@ -102,6 +102,27 @@ def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     assert len(asked) - few > few
 
 
+def fits_of(monkeypatch, surface, **more):
+    """What is found, and the results of the fits that this took."""
+    results = []
+    monkeypatch.setattr(side_by_side, "fitted", lambda *given: results.extend(r := fitted(*given)) or r)
+    return explore(surface, **more), results
+
+
+def test_short_curves_are_felt_densely_so_that_the_last_fit_tried_is_the_result(monkeypatch):
+    found, results = fits_of(monkeypatch, short_waves())
+    assert found.result.contours == results[-1].contours
+    assert found.extent == pytest.approx(3 * 30.0 / 96)
+    assert found.step == pytest.approx(found.extent / 12)
+    found, _ = fits_of(monkeypatch, short_waves(), step=0.2)  # as near to each other as may be
+    assert found.step >= 0.2
+
+
+def test_curves_in_next_to_no_doubt_grow_fast(monkeypatch):
+    _, results = fits_of(monkeypatch, surfaces.plane())
+    assert len(results) == 3  # of 24, 54 and 96 contacts
+
+
 def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
     tried = growth.tried
 
