@@ -90,8 +90,8 @@ def test_deviations_of_bends_are_true_where_patches_meet(ball, ring):
         out = np.hypot(curves[:, 0], curves[:, 1]) - 1.0
         cosine = out / np.hypot(out, curves[:, 2])
         true = np.ones(len(curves)) if atlas is ball else cosine / (0.5 * (1.0 + 0.5 * cosine))
-        assert np.mean(np.abs(bends - true) <= 1.645 * stds) > 0.8
-        assert np.mean(np.abs(bends[0] - bends[1]) <= 1.645 * np.hypot(*stds)) > 0.8
+        assert np.mean(np.abs(bends - true) <= 1.645 * stds) > 0.75
+        assert np.mean(np.abs(bends[0] - bends[1]) <= 1.645 * np.hypot(*stds)) > 0.75
 
 
 def test_at_the_point_the_deviation_of_the_bend_is_that_of_the_reconstruction(ring):
