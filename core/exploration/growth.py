@@ -211,7 +211,12 @@ def _seed(feel: Feel, step: float, least: float, known: list[Grown]) -> Fits:
         known.append((yield from tried(*rough[-1])))
     if not known and error is not None:
         raise error
-    return min(known, key=lambda trial: (trial.doubt, trial.length))
+    best = min(known, key=lambda trial: (trial.doubt, trial.length))
+    if best.doubt <= 1.0 or felt.largest_std is not None:
+        return best
+    # Growth does not go on from any, but the longest that is sure is as good as a short one in less doubt.
+    enough = [trial for trial in known if trial.sure and trial.misfits.max() <= 1.0]
+    return max((best, *enough), key=lambda trial: trial.length)
 
 
 def tried(felt: Felt, counts: Counts) -> Fits:

@@ -9,13 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..bayes.joint_fit import MISFIT
-from ..bayes.residual_evidence import MOST_PLACES
 from ..contours.contour import Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
-from ..patch.residual import cholesky, solved
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
+from .enough import is_enough
 from .growth import (
     CONTACT_COUNTS,
     FELT,
@@ -28,11 +26,10 @@ from .growth import (
     grown,
     spacing,
 )
+from .taps import Tapped, beside
 
-# benchmarks.amount judges the first, benchmarks.speed --base what adding planes costs.
-NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
-HELPS = 0.1  # Share of it that one more plane must take off.
-QUIET = 1.0  # of it: where contacts scatter by less, twice as many take nothing noticeable off
+HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
+SHORTER = 1.15  # A half curve beside what contradicts a fit is shortened by this factor at once.
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +67,7 @@ class Touch:
     Lengths are None where they are to be chosen, the tolerance where no planes are to be added.
     reference : columns e1, n and e1 x n, which azimuths are measured by
     largest_std : a length, that curves may grow to
+    tap : taps between the curves of a fit, see taps.py
     is_grown : whether what makes curves grow is the fit that is asked for
     """
 
@@ -83,7 +81,13 @@ class Touch:
     tolerance: float | None
     most_planes: float
     largest_std: float | None
+    tap: Callable[[Reconstruction], Tapped]
     is_grown: bool
+
+    @property
+    def is_tapped(self) -> bool:
+        """Whether the finger taps between the curves: not where they are as long as asked for."""
+        return self.extent is None and self.largest_std is None
 
     def steps(self) -> Steps:
         """The touch, with planes added while they help: they are for a better patch, not for a larger one."""
@@ -100,6 +104,8 @@ class Touch:
             except ValueError:  # nothing can be felt along that one: what was felt so far stays
                 break
             stds.append(found.result.mean_height_std)
+        if self.is_tapped and found.result.taps is None:
+            found, _ = self._tapped(found)
         return replace(found, stds=tuple(stds))
 
     def _of_extent(self, extent: float) -> Steps:
@@ -123,11 +129,36 @@ class Touch:
             except StopIteration as end:
                 largest: Grown = end.value
                 break
-        found = yield from self._of_reaches(largest, largest.counts)
+        counts = largest.counts
+        found = yield from self._of_reaches(largest, counts)
         if largest.sure and found.result.status != "ok" and self.is_grown:
             # These contacts are others than those felt.
-            return (yield from self._of_reaches(largest, np.floor(largest.counts / STRETCH).astype(np.intp)))
-        return found
+            counts = np.floor(counts / STRETCH).astype(np.intp)
+            found = yield from self._of_reaches(largest, counts)
+        return (yield from self._agreeing(largest, counts, found)) if self.is_tapped else found
+
+    def _agreeing(self, largest: Grown, counts: Counts, found: Exploration) -> Steps:
+        """The touch with curves so much shorter that no tap between them contradicts it; or as it is."""
+        r, (found, where) = found.result, self._tapped(found)
+        if not (len(where) and self.is_grown and r.status == "ok"):
+            return found
+        shorter = found
+        while len(where):
+            worst, counts = beside(shorter.result, where), counts.copy()
+            counts.flat[worst] = (counts.flat[worst] / SHORTER).astype(np.intp)
+            if counts.flat[worst].min() < SHORTEST:
+                break
+            try:
+                shorter, where = self._tapped((yield from self._of_reaches(largest, counts)))
+            except DegenerateCurvesError:
+                break
+        return shorter if shorter.result.status == "ok" else found
+
+    def _tapped(self, found: Exploration) -> tuple[Exploration, Array]:
+        """The touch with what taps say of it, and the places where they contradict it, (k, 2)."""
+        r = found.result
+        taps, where = self.tap(r)
+        return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std)), where
 
     def _feeling(self) -> Feel:
         """What is felt along the planes, with any step; it goes on from where it was."""
@@ -196,29 +227,3 @@ class Touch:
             if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * SHORTEST:
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
             counts.flat[worst] = max(2 * SHORTEST, int(counts.flat[worst] / STRETCH) // 2 * 2)
-
-
-def is_enough(r: Reconstruction) -> bool:
-    """Whether twice as many contacts would take less than NOTICEABLE off the mean deviation of the height.
-
-    They would tell nothing where that is less than a polynomial may be off, nor where it is more than
-    contacts scatter: then it is what no contact tells that makes it large.
-    """
-    if r.mean_height_std <= MISFIT * r.radius or r.uncertainty.noise * r.radius <= QUIET * r.mean_height_std:
-        return True
-    (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
-    if r.residual is None:
-        which = np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)
-        some = contacts[which] / r.radius
-    else:
-        some = r.residual.places
-    over, m = points / r.radius, len(some)
-    shared, seen = r.uncertainty.covariances_with(over)(some)
-    # A patch by another method departs from the posterior's mean, of which no contact takes anything off.
-    own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
-    variance = own**2
-    seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
-    told = solved(cholesky(seen), shared)
-    lost = r.geometry.node_widening**2 * np.einsum("in,in->n", told, told)
-    then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
-    return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))

@@ -21,6 +21,7 @@ from ..reconstruction.stacks import Options
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
 from .one_touch import Answer, Ask, Exploration, Steps, Touch
+from .taps import tapped
 
 MOST_EVEN = 24  # At most so many planes are laid out evenly.
 GLANCE_CONTACTS = 8  # Contacts of a half curve that only tell whether it ends.
@@ -78,7 +79,8 @@ def touching(
         place = surface, point, direction
         farthest = wanted["farthest"] or _farthest(partial(track, *place, wanted["planes"], tangent=tangent))
         follow = partial(following, *place, noise=noise, rng=generator, tangent=tangent)
-        return (yield from Touch(follow, point, reference, **wanted | {"farthest": farthest}).steps())
+        more = wanted | {"farthest": farthest, "tap": partial(tapped, surface)}
+        return (yield from Touch(follow, point, reference, **more).steps())
 
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, fit)
 

@@ -21,7 +21,7 @@ from ..patch.domain import Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.residual import Residual
-from .status import doubt
+from .status import Taps, contradicted, doubt, notes
 
 MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at most (benchmarks.patch_mesh).
 
@@ -38,6 +38,7 @@ class Reconstruction:
     method : of the fit
     converged : whether its solver did
     joint_posterior : the posterior of "bayes"
+    taps : what was felt between the curves; None where nobody tapped
     known_height_std : mean_height_std, if it is known already
     known_curves : the contours as Curves of one touch, in the world, if they are known already
 
@@ -52,6 +53,7 @@ class Reconstruction:
     converged: bool = True
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
     joint_posterior: Posterior | None = None
+    taps: Taps | None = None
     known_height_std: float | None = None
     known_curves: Curves | None = None
 
@@ -227,17 +229,11 @@ class Reconstruction:
     @property
     def message(self) -> str:
         """The status in a sentence with advice, and whether directions are undefined or blind."""
-        _, message = self._verdict
-        if self.posterior.is_round:
-            message += " The curvatures are alike, so there are no principal directions."
-        if self.blind:
-            verb, terms = "is" if self.blind == 1 else "are", terms_to(self.patch.degree)
-            message += f" {self.blind} of {terms} coefficients {verb} invisible to these planes."
-        return message
+        return self._verdict[1] + notes(self)
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
-        return doubt(self) or ("ok", "The patch describes its contacts.")
+        return contradicted(self.taps) or doubt(self) or ("ok", "The patch describes its contacts.")
 
     @cached_property
     def contradiction(self) -> tuple[float, float]:

@@ -18,6 +18,7 @@ from ..patch.monge import TERMS, MongePatch
 from ..patch.residual import LENGTHS, Residual
 from .from_contours import METHODS
 from .result import Reconstruction
+from .status import Taps
 
 VERSION = 2
 ORTHONORMAL = 1e-6  # Axes of a file may be in single precision.
@@ -52,6 +53,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "contours": [plain(vars(contour)) for contour in r.contours],
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
         "posterior": None if posterior is None else plain(posterior._asdict()),
+        "taps": None if r.taps is None else r.taps._asdict(),
     }
 
 
@@ -94,6 +96,7 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         converged=bool(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),
         joint_posterior=None if posterior is None else _posterior(posterior),
+        taps=_taps(d.get("taps")),
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
     )
     if not len(r.contacts):
@@ -141,6 +144,14 @@ def _contours(contours: Any, may_be_none: bool) -> tuple[Contour, ...]:
         raise ValueError(f"contours: expected a list of some, got {shown(contours)}")
     names = [field.name for field in fields(Contour)]
     return tuple(Contour(**{name: _of(contour, name) for name in names}) for contour in contours)
+
+
+def _taps(d: Any) -> Taps | None:
+    """None in files that were written before there were taps, too."""
+    if d is None:
+        return None
+    taps, missed = (int(number(name, _of(d, name), least=0.0)) for name in ("number", "missed"))
+    return Taps(taps, missed, number("off", _of(d, "off"), least=0.0))
 
 
 def _posterior(d: Any) -> Posterior:

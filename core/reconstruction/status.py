@@ -3,12 +3,13 @@
 """How far a reconstruction can be trusted: what gives reason to doubt it, and what to do about that."""
 
 import math
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ..arguments import Array
-from ..bayes.posterior import Posterior
+from ..bayes.posterior import Posterior, terms_to
+from ..patch.monge import MongePatch
 from ..patch.residual import Residual
 
 # Chosen with benchmarks.stability, but for what benchmarks.real says of rough surfaces.
@@ -22,6 +23,20 @@ SIGNIFICANT = 5.0  # and standard deviations of it.
 LEAST_SCATTER = 0.3  # Share of a contact's noise: few contacts may happen to scatter less.
 CONTRADICTED = 0.01  # Radians by which normals may contradict the contacts, beside SIGNIFICANT deviations.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts may be missed, beside the noise.
+CONTRADICTING = 3.0  # A surface that is off by more than so many deviations on average contradicts the patch.
+DOUBTFUL_GAP = 0.1  # Share of the taps between the curves that feel no surface.
+
+
+class Taps(NamedTuple):
+    """What a finger that tapped between the curves found, so many times.
+
+    missed : taps that met no surface within the radius
+    off : how far the surface is off the patch at most, in units of L, where taps contradict it; or 0
+    """
+
+    number: int
+    missed: int = 0
+    off: float = 0.0
 
 
 class _Judged(Protocol):
@@ -68,8 +83,20 @@ class _Judged(Protocol):
         """The median of |dz| over the contacts."""
 
     @property
+    def patch(self) -> MongePatch:
+        """Equation (1), of the degree asked for."""
+
+    @property
+    def blind(self) -> int:
+        """Directions among its coefficients that the contacts do not show."""
+
+    @property
     def contradiction(self) -> tuple[float, float]:
         """The deviations, and the angle, by which normals contradict contacts."""
+
+    @property
+    def taps(self) -> Taps | None:
+        """What was felt between the curves, if a finger tapped there."""
 
 
 def doubt(r: _Judged) -> tuple[str, str] | None:
@@ -85,6 +112,37 @@ def doubt(r: _Judged) -> tuple[str, str] | None:
             f"{r.condition_number:.1e}): use another method or add sampling planes."
         )
     return _about_data(r) or _about_heights(r) or _about_frame(r)
+
+
+def contradicted(taps: Taps | None) -> tuple[str, str] | None:
+    """Status and a sentence of advice where taps contradict a fit; None where they do not."""
+    if taps is None:
+        return None
+    if taps.off:
+        return "uncertain", (
+            f"Between the curves the surface is up to {100.0 * taps.off:.2g} % of the radius off the "
+            "patch, perhaps at an edge or a pocket that no curve crosses: use a shorter extent or add "
+            "sampling planes."
+        )
+    if taps.missed > DOUBTFUL_GAP * taps.number:
+        return "uncertain", (
+            "Between the curves the surface ends, or has a hole that no curve crosses: use a shorter "
+            "extent or add sampling planes."
+        )
+    return None
+
+
+def notes(r: _Judged) -> str:
+    """What else is to be said, whatever the status: sentences, each after a space."""
+    message = ""
+    if r.taps is not None and r.taps.missed:
+        message += f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface."
+    if r.posterior.is_round:
+        message += " The curvatures are alike, so there are no principal directions."
+    if r.blind:
+        verb, terms = "is" if r.blind == 1 else "are", terms_to(r.patch.degree)
+        message += f" {r.blind} of {terms} coefficients {verb} invisible to these planes."
+    return message
 
 
 def _about_data(r: _Judged) -> tuple[str, str] | None:

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..contours.finger import Surface
 from ..reconstruction.result import Reconstruction
+from ..reconstruction.status import CONTRADICTING
 
 # benchmarks.refusals counts the patches that are off and say nothing.
 PATCH_SAMPLES = 15  # So many samples of a patch are compared with the mesh.
 MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh.
-CONTRADICTING = 3.0  # A mesh that is off by more than so many deviations contradicts the patch.
 
 
 def height_error(r: Reconstruction, surface: Surface) -> float | None:

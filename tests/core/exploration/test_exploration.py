@@ -8,7 +8,7 @@ import surfaces
 
 import core
 from core.exploration import growth, one_touch, side_by_side
-from core.exploration.one_touch import NOTICEABLE, is_enough
+from core.exploration.enough import NOTICEABLE, is_enough
 from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
 
@@ -113,6 +113,31 @@ def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
     monkeypatch.setattr(growth, "tried", of_more_than_the_least)
     monkeypatch.setattr(growth.Felt, "roughness", lambda *_: 2.0)
     assert explore(surfaces.plane()).result.status == "ok"
+
+
+@pytest.mark.parametrize("largest_std", [None, 1.0])
+def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, monkeypatch):
+    """A longer one is as good as a short one in less doubt, where no deviation is asked for."""
+    spreads, sure = {24: 1.7, 12: 1.4, 6: 1.3, 3: 1.1}, {24: False, 12: True, 6: True, 3: False}
+
+    class Trial(growth.Grown):
+        @property
+        def sure(self):
+            return sure[int(self.counts.max())]
+
+    def tried(felt, counts):
+        yield from ()
+        return Trial(felt, counts, 1, np.zeros((3, 2)), spreads[int(counts.max())], None)
+
+    class Felt:
+        step, whole = 1.0, np.full((3, 2), 24)
+        roughness = staticmethod(lambda counts: 0.0)
+
+    monkeypatch.setattr(growth, "tried", tried)
+    felt = Felt()
+    felt.largest_std = largest_std
+    found = side_by_side.result_of(growth._seed(lambda step, length: felt, 1.0, 1.0, []))
+    assert found.counts.max() == (12 if largest_std is None else 3)
 
 
 def test_a_plane_is_felt_as_far_as_may_be_with_few_contacts():

@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Taps between the curves: what no curve crosses is noticed, and where all is well nothing changes."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import surfaces
+
+import core
+from core.exploration import side_by_side
+from core.exploration.taps import Tapped, places
+from core.reconstruction.status import DOUBTFUL_GAP, Taps
+
+FARTHEST = 30.0
+UP = (0.0, 0.0, 1.0)
+
+
+class Sector:
+    """A plane that lacks what is between two azimuths, no curve in it, and two radii; a floor or none."""
+
+    def __init__(self, floor, nearest=3.0, farthest=math.inf, azimuths=(15.0, 45.0)):
+        self.floor, self.radii, self.azimuths = floor, (nearest, farthest), np.radians(azimuths)
+
+    def lacks(self, x, y):
+        first, last = self.azimuths
+        return (
+            (self.radii[0] < np.hypot(x, y)) & (np.hypot(x, y) < self.radii[1])
+            & (first < np.arctan2(y, x)) & (np.arctan2(y, x) < last)
+        )  # fmt: skip
+
+    def ray_cast(self, origin, direction, distance):
+        for level in (0.0, self.floor):
+            if level is None or abs(direction[2]) < 1e-9:
+                continue
+            gone = (level - origin[2]) / direction[2]
+            x, y = (o + gone * d for o, d in zip(origin[:2], direction[:2], strict=True))
+            if 0.0 <= gone <= distance and (level == 0.0) != self.lacks(x, y):
+                return (x, y, level), UP
+        return None
+
+
+def explore(surface, point=(0.0, 0.0, 0.0), outward=UP, **more):
+    return core.explore(surface, point, outward, farthest=FARTHEST, **more)
+
+
+def mean_error(surface, r):
+    """The mean |dz| on what is there of a plane with a floor beneath."""
+    points, weights = r.domain.nodes
+    x, y, z = r.frame.to_world(np.column_stack([points, r.height(*points.T)])).T
+    return weights @ np.abs(z - np.where(surface.lacks(x, y), surface.floor, 0.0))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("floor", [-4.0, 2.5])
+def test_curves_become_shorter_beside_an_edge_that_none_crosses(floor, noise):
+    """The step to the floor begins at 3, and curves of 30 run along both sides of it."""
+    surface = Sector(floor)
+    r = explore(surface, noise=noise, rng=0).result
+    assert (r.status, r.taps.off) == ("ok", 0.0)
+    assert mean_error(surface, r) < 3.0 * r.mean_height_std
+    assert not surface.lacks(
+        *r.frame.to_world(np.column_stack([places(r.domain), 0.0 * places(r.domain)[:, 0]])).T[:2]
+    ).any()
+    assert r.radius > 0.9 * FARTHEST  # the other curves are as long as ever
+
+
+def test_an_edge_next_to_the_point_leaves_the_touch_in_doubt():
+    surface = Sector(-4.0, nearest=0.5)
+    r = explore(surface).result
+    assert r.status == "uncertain"
+    assert r.message.startswith(
+        "Between the curves the surface is up to 13 % of the radius off the patch, perhaps at an edge or a "
+        "pocket that no curve crosses: use a shorter extent or add sampling planes."
+    )
+    assert pytest.approx(r.taps.off * r.radius, rel=1e-3) == 4.0
+    assert mean_error(surface, r) > 3.0 * r.mean_height_std
+
+
+def test_a_hole_that_no_curve_crosses_leaves_the_touch_in_doubt():
+    r = explore(Sector(None, azimuths=(2.0, 58.0))).result
+    assert r.status == "uncertain"
+    assert r.message.startswith(
+        "Between the curves the surface ends, or has a hole that no curve crosses: use a shorter extent or "
+        "add sampling planes. "
+    )
+    assert r.taps.missed > DOUBTFUL_GAP * r.taps.number
+    assert f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface." in r.message
+
+
+def test_a_small_hole_is_told_and_is_no_doubt():
+    r = explore(Sector(None, nearest=16.0, farthest=20.0, azimuths=(10.0, 30.0))).result
+    assert r.status == "ok"
+    assert r.message.startswith("The patch describes its contacts. ")
+    assert 0 < r.taps.missed <= DOUBTFUL_GAP * r.taps.number
+    assert f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface." in r.message
+
+
+@pytest.mark.parametrize("turn", [0.0, 10.0, 20.0, 30.0])
+def test_what_three_planes_cannot_show_is_noticed(turn):
+    """Along planes at its lines a monkey saddle is flat, and between them it is not."""
+    s = surfaces.monkey_saddle()
+    planes = surfaces.planes((turn, turn + 60.0, turn + 120.0))
+    r = core.explore(s, s.point, s.normal, planes, farthest=40.0).result
+    local, heights = surfaces.heights_over(s, r)
+    off = np.abs(r.height(*local.T) - heights).mean()
+    assert r.status != "ok" or off < 5.0 * r.mean_height_std
+
+
+SMOOTH = [surfaces.pear(), surfaces.sphere(20.0), surfaces.plane(), surfaces.torus(30, 22, 0.8)]
+
+
+def without_taps(monkeypatch):
+    nothing = Tapped(Taps(36), np.empty((0, 2)))
+    monkeypatch.setattr(side_by_side, "tapped", lambda *_: nothing)
+
+
+@pytest.mark.parametrize("surface", SMOOTH, ids=["pear", "sphere", "plane", "torus"])
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_where_taps_agree_nothing_changes(surface, noise, monkeypatch):
+    given = {"noise": noise, "farthest": 20.0}
+    generators = np.random.default_rng(5), np.random.default_rng(5)
+    one = core.explore(surface, surface.point, surface.normal, rng=generators[0], **given)
+    without_taps(monkeypatch)
+    other = core.explore(surface, surface.point, surface.normal, rng=generators[1], **given)
+    assert one.result.status == "ok"
+    assert one.result.taps == (36, 0, 0.0)
+    assert json.dumps(core.to_dict(one.result)) == json.dumps(core.to_dict(other.result))
+    assert generators[0].random() == generators[1].random()  # taps draw no noise
+
+
+def test_a_sheet_is_tapped_from_either_side():
+    for floor, status in ((-4.0, "ok"), (None, "uncertain")):
+        sheet = Sector(floor, azimuths=(-58.0, -2.0))
+        found = [explore(sheet, outward=up, tangent=(1.0, 0.0, 0.0)).result for up in (UP, (0.0, 0.0, -1.0))]
+        assert [r.status for r in found] == [status] * 2
+        assert [(r.taps.missed, r.taps.off) for r in found] == [(found[0].taps.missed, found[0].taps.off)] * 2
+
+
+def test_many_are_judged_as_each_is():
+    surface = Sector(-4.0, nearest=1.5)
+    points = np.array([[0.0, 0.0, 0.0], [-8.0, 5.0, 0.0], [0.9, 0.2, 0.0]])
+    many = core.explore_many(surface, points, [UP] * 3, farthest=FARTHEST)
+    for one, point in zip(many, points, strict=True):
+        other = explore(surface, point)
+        assert (one.result.status, one.result.message) == (other.result.status, other.result.message)
+        assert one.result.taps[:2] == other.result.taps[:2]
+        assert one.extent == other.extent
+        assert one.result.taps.off == pytest.approx(other.result.taps.off, rel=1e-9)
+
+
+@pytest.mark.parametrize("more", [{"extent": 20.0}, {"largest_std": 0.1}])
+def test_curves_as_long_as_asked_for_are_not_tapped_between(more):
+    assert explore(Sector(-4.0), **more).result.taps is None
+
+
+def test_planes_that_are_added_are_tapped_between():
+    r = explore(Sector(-4.0, nearest=0.5), tolerance=0.0).result
+    assert r.taps.number > 36
+
+
+def test_taps_go_with_the_result():
+    r = explore(Sector(-4.0, nearest=0.5)).result
+    again = core.from_dict(json.loads(json.dumps(core.to_dict(r))))
+    assert (again.taps, again.message) == (r.taps, r.message)
+    assert r.moved(np.diag([2.0, 2.0, 2.0, 1.0])).message == r.message
+    old = core.to_dict(r)
+    del old["taps"]
+    assert core.from_dict(old).taps is None
+    assert replace(r, taps=None).status == "ok"
