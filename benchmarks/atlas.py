@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whole objects: how far the surface of all touches is off, after how many touches and seconds, beside peers.
 
-`python -m benchmarks.atlas [--only NAME] [--finest T] [--peers NAME]`, from the root of a checkout; bpy to
-read the scans and cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a noise of .0005.
+`python -m benchmarks.atlas [--only NAME] [--finest T] [--coarsest T] [--peers NAME]`, from the root of a
+checkout; bpy to read the scans and cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a
+noise of .0005.
 Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the
 object from the mesh, what share of these the field's 90 % interval holds, the angle of normals across edges,
 that at points around which the object turns by less than 20 degrees, with their share, the share of points
@@ -359,6 +360,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", default="", help="objects with this in their names")
     parser.add_argument("--finest", type=float, default=min(TOLERANCES), help="tolerance (%(default)s)")
+    parser.add_argument("--coarsest", type=float, default=max(TOLERANCES), help="tolerance (%(default)s)")
     parser.add_argument("--peers", default="", help="those with that in their names, and no other places")
     parser.add_argument("--memory", action="store_true", help="of 1000 touches, and no more")
     options = parser.parse_args()
@@ -370,7 +372,7 @@ def main():
     for name in names:
         with blender.quiet():
             thing = Scanned(name) if name in SCANS else Exact(name)
-        for tolerance in (t for t in TOLERANCES if t >= options.finest):
+        for tolerance in (t for t in TOLERANCES if options.finest <= t <= options.coarsest):
             cells, number, found = row(thing, tolerance)
             rows.append(cells)
             numbers.append(number)

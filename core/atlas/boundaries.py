@@ -16,6 +16,7 @@ from .charts import MARGIN, Charts, Pairs
 from .field import FACING, LAYER, node_weights
 
 RAYS, RAY_PLACES = 32, 16  # rays from the middle of each patch, and places on each
+OUTWARD_STD = 0.5  # more deviation of K at a radius: a surface has terms beyond a sextic's, felt at a rim
 SLOPES_AND_BENDS = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # derivatives that curvatures consist of
 
 
@@ -94,7 +95,8 @@ def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Arra
     second = c[0, 0] * c[2, 2] + c[0, 2] ** 2 + 2.0 * c[1, 1] ** 2 - 4.0 * c[0, 1] * c[1, 2]
     variance = first + second / steep[:, 0] ** 4
     curvature = r.patch.derivatives(x, y).gaussian_curvature
-    return curvature, np.sqrt(np.maximum(variance, 0.0)) / r.radius**2
+    wider = 1.0 + OUTWARD_STD * (x**2 + y**2) / r.radius**2
+    return curvature, wider * np.sqrt(np.maximum(variance, 0.0)) / r.radius**2
 
 
 def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:

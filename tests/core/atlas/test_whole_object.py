@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 import core
+from core.atlas import meshing
+from core.atlas.boundaries import gaussian_curvature_of
 from core.atlas.charts import Charts
+from core.atlas.field import blended
 from tests import solids
 
 pytestmark = pytest.mark.xdist_group("whole object")
@@ -76,13 +79,27 @@ def test_edges_join_neighbors_along_curves_on_the_surface(ball):
 
 def test_neighbors_agree_on_normals_and_bends_where_they_meet(ring):
     assert np.degrees(np.mean(np.concatenate([edge.angle for edge in ring.edges]))) < 0.5
-    bends = []
-    for edge in ring.edges:
-        for r in (ring.patches[node] for node in edge.nodes):
-            x, y, _ = ((edge.curve - r.frame.origin) @ r.frame.axes).T
-            bends.append(r.patch.derivatives(x, y).gaussian_curvature)
-    one, other = np.concatenate(bends[::2]), np.concatenate(bends[1::2])
-    assert np.abs(one - other).mean() < 0.2 * np.ptp(one)
+    bends = np.hstack([ring.bends(edge)[0] for edge in ring.edges])
+    assert np.abs(bends[0] - bends[1]).mean() < 0.2 * np.ptp(bends[0])
+
+
+def test_deviations_of_bends_are_true_where_patches_meet(ball, ring):
+    """A torus of radii R and r has K = cos t / (r (R + r cos t))."""
+    for atlas in (ball, ring):
+        curves = np.vstack([edge.curve for edge in atlas.edges])
+        bends, stds = (np.hstack(parts) for parts in zip(*map(atlas.bends, atlas.edges), strict=True))
+        out = np.hypot(curves[:, 0], curves[:, 1]) - 1.0
+        cosine = out / np.hypot(out, curves[:, 2])
+        true = np.ones(len(curves)) if atlas is ball else cosine / (0.5 * (1.0 + 0.5 * cosine))
+        assert np.mean(np.abs(bends - true) <= 1.645 * stds) > 0.75
+        assert np.mean(np.abs(bends[0] - bends[1]) <= 1.645 * np.hypot(*stds)) > 0.75
+
+
+def test_at_the_point_the_deviation_of_the_bend_is_that_of_the_reconstruction(ring):
+    r = ring.patches[0]
+    bend, std = gaussian_curvature_of(r, r.frame.origin[None])
+    assert bend[0] == pytest.approx(r.patch.k1 * r.patch.k2)
+    assert std[0] == pytest.approx(r.gaussian_curvature_std, rel=0.05)
 
 
 def test_patches_are_as_certain_as_asked(ball, ring):
@@ -111,6 +128,16 @@ def test_touches_bend_around_the_edges_of_a_block(block):
     felt = np.isfinite(std)
     assert felt.mean() > 0.98
     assert np.abs(distance[felt]).mean() < 1e-3
+
+
+def test_contacts_mend_holes_at_sharp_edges(block, monkeypatch):
+    """Across an edge patches alone do not tell whether it is convex."""
+    mended = block.mesh(0.06)
+    monkeypatch.setattr(meshing, "told", lambda charts, _, points, room=0.0: blended(charts, points, room))
+    alone = block.mesh(0.06)
+    assert solids.topology(mended.triangles).open < solids.topology(alone.triangles).open
+    off, before = (np.abs(solids.block().distances(mesh.vertices)) for mesh in (mended, alone))
+    assert off.mean() < 0.5 * before.mean()
 
 
 def test_progress_can_end_it_with_what_is_there():
