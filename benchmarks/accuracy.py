@@ -134,7 +134,7 @@ def darboux(surface):
 def above(surface, axes, kappas, points):
     """The surface above tangent plane points (m, 2), relative to the reference point, (m, 3).
 
-    By Newton's method from the quadric; NaN where it finds no way.
+    Newton's method finds it from the quadric; NaN where that finds no way.
     """
     n, h = axes[:, 2], 1e-5
     z = (points**2 @ kappas) / 2.0

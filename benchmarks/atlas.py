@@ -5,12 +5,12 @@
 `python -m benchmarks.atlas [--only NAME] [--finest T] [--peers NAME]`, from the root of a checkout; bpy to
 read the scans and cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a noise of .0005.
 Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the
-object from the mesh, what share of these the field's 90 % interval holds, the angle of normals across edges
-and the share of their points where K is alike within 90 %, and what the mesh is; (b) peers on the contacts of
-tolerance .001, each at the best of its settings, with the same normals; and where normals are off by ten
-degrees; (c) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of
-touching alone. Draws build/charts/atlas.png. `--memory` touches the lemon 1000 times and prints how much
-memory that took at most.
+object from the mesh, what share of these the field's 90 % interval holds, the angle of normals across edges,
+that at points around which the object turns by less than 20 degrees, with their share, the share of points
+where K is alike within 90 %, and what the mesh is; (b) peers on the contacts of tolerance .001, each at the
+best of its settings, with the same normals; and where normals are off by ten degrees; (c) as many touches at
+random places and at evenly spaced ones, in one batch, with the seconds of touching alone. Draws
+build/charts/atlas.png. `--memory` touches the lemon 1000 times and prints how much memory that took at most.
 """
 
 import argparse
@@ -35,6 +35,10 @@ NOISE, COMPARED, POINTS, MOST = 0.0005, 0.001, 2500, 1500
 EDGE = 0.01
 FINE = 0.0002  # tolerance and noise at which 1000 touches are not enough
 BLURRED = np.radians(10.0)  # deviation of normals
+CREASE, AROUND = (
+    20.0,
+    8,
+)  # degrees that an object turns within an edge of the mesh; places on a ring of that radius
 
 
 class Scanned:
@@ -47,6 +51,22 @@ class Scanned:
         places = list(self.scan.places(POINTS, 1))
         self.points = np.array([point for point, _ in places])
         self.random = np.array(places[: POINTS // 2])
+
+    def turns(self, points):
+        """By how many degrees the scan turns at most within an edge of the mesh around points (n, 3)."""
+        return turns(points, lambda p: self.scan.tree.find_nearest(p)[1])
+
+
+def turns(points, normal):
+    """By how many degrees normals turn at most within EDGE around points (n, 3)."""
+    at = np.array([normal(tuple(p)) for p in points])
+    e1 = np.cross(at, np.eye(3)[np.abs(at).argmin(axis=1)])
+    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    e2, least = np.cross(at, e1), np.ones(len(points))
+    for t in 2.0 * np.pi * np.arange(AROUND) / AROUND:
+        around = np.array([normal(tuple(p)) for p in points + EDGE * (np.cos(t) * e1 + np.sin(t) * e2)])
+        least = np.minimum(least, np.einsum("ni,ni->n", at, around))
+    return np.degrees(np.arccos(np.clip(least, -1.0, 1.0)))
 
 
 class Exact:
@@ -65,17 +85,22 @@ class Exact:
         self.points = np.array(points)
         self.random = np.array([(p, self.solid.normal(*p)) for p in points[: POINTS // 2]])
 
+    def turns(self, points):
+        """As of a Scanned."""
+        return turns(points, lambda p: self.solid.normal(*p))
+
 
 class Blurred:
     """An object whose normals are felt badly."""
 
     def __init__(self, thing):
         self.thing, self.rng = thing, np.random.default_rng(0)
-        self.name, self.start, self.outward, self.points = (
+        self.name, self.start, self.outward, self.points, self.turns = (
             thing.name,
             thing.start,
             thing.outward,
             thing.points,
+            thing.turns,
         )
 
     def ray_cast(self, origin, direction, distance):
@@ -116,19 +141,17 @@ def explored(thing, tolerance):
     return atlas, found, touched - start, process_time() - touched, mesh
 
 
-def agreeing(atlas):
-    """The mean angle of normals across edges in degrees, and the share of K that is alike within 90 %."""
-    angles, alike = [], []
+def agreeing(thing, atlas):
+    """The mean angle of normals across edges in degrees, that off creases of the object, the share of points
+    that are off them, and the share of points where K is alike within 90 %."""
+    points = np.vstack([edge.curve for edge in atlas.edges])
+    angles = np.degrees(np.concatenate([edge.angle for edge in atlas.edges]))
+    alike = []
     for edge in atlas.edges:
-        angles += edge.angle.tolist()
-        bends, variance = [], 0.0
-        for node in edge.nodes:
-            r = atlas.patches[node]
-            x, y, _ = ((edge.curve - r.frame.origin) @ r.frame.axes).T
-            bends.append(r.patch.derivatives(x, y).gaussian_curvature)
-            variance += r.gaussian_curvature_std**2
-        alike += (np.abs(bends[0] - bends[1]) <= 1.645 * np.sqrt(variance)).tolist()
-    return np.degrees(np.mean(angles or [0.0])), np.mean(alike or [1.0])
+        (one, other), stds = atlas.bends(edge)
+        alike += (np.abs(one - other) <= 1.645 * np.hypot(*stds)).tolist()
+    smooth = thing.turns(points) < CREASE
+    return angles.mean(), angles[smooth].mean(), smooth.mean(), np.mean(alike)
 
 
 def row(thing, tolerance):
@@ -140,10 +163,15 @@ def row(thing, tolerance):
     within = np.mean(np.abs(distance[felt]) <= 1.645 * std[felt])
     shape = solids.topology(mesh.triangles)
     contacts = sum(len(c.points) for e in found for c in e.contours)
-    angle, alike = agreeing(atlas)
+    angle, smooth, share, alike = agreeing(thing, atlas)
     cells = [thing.name, f"{1e3 * tolerance:g}", str(len(atlas.patches)), str(contacts)]
     cells += [f"{touching:.1f}", f"{meshing:.1f}", f"{100 * felt.mean():.1f}", three(off), f"{within:.2f}"]
-    cells += [f"{angle:.1f}", f"{alike:.2f}", f"{shape.open} / {shape.euler} / {shape.pieces}"]
+    cells += [
+        f"{angle:.1f}",
+        f"{smooth:.1f} ({100 * share:.0f} %)",
+        f"{alike:.2f}",
+        f"{shape.open} / {shape.euler} / {shape.pieces}",
+    ]
     return cells, (thing.name, tolerance, len(atlas.patches), touching + meshing, off.mean()), found
 
 
@@ -354,7 +382,7 @@ def main():
                 others += lines[0]
                 random += lines[1]
     head = "object|tolerance|touches|contacts|s touch, join|s mesh|% covered|mean / median / 95 %|within 90 %"
-    table([*head.split("|"), "angle at edges", "K alike", "open edges / Euler / pieces"], rows)
+    table([*head.split("|"), "angle at edges", "off creases", "K alike", "open edges / Euler / pieces"], rows)
     table(["object", "method", "setting", "mean / median / 95 %", "s"], others, left=3)
     if random:
         table(["object", "places", "touches", "% covered", "mean / median / 95 %", "s touch"], random, left=2)

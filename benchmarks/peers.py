@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What people would use instead: from a case of benchmarks.accuracy to a surface, from a mesh to curvatures.
 
-Those that fit the contacts start from the paper's frame, in unit radius. Where one asks for a setting that
+Peers that fit the contacts start from the paper's frame, in unit radius. Where one asks for a setting that
 its user would have to find, several were tried on the exact surfaces at all three noise levels, and what came
 out best over these is the default here. Optional packages are imported where they are used.
 """
@@ -178,7 +178,7 @@ def nurbs(case, samples=(25, 61)):
 
 
 def screened_poisson(case, true_normals, neighbors=40):
-    """With the surface's own normals at the contacts, which no curve tells, or with those of the neighbors.
+    """Poisson, with the surface's own normals at the contacts, which no curve tells, or the neighbors'.
 
     Fewer neighbors are all of one curve, which has no normal. A finer octree changes nothing but the time.
     Heights are linear between the vertices of the upper side.

@@ -58,7 +58,7 @@ def label(axes, texts, places):
 
 
 def _moves(axes, texts, places):
-    """From the places to the centers of their texts, in points, so that these cover little else.
+    """Ways from the places to the centers of their texts, in points, so that these cover little else.
 
     Each text in turn, four times over, takes the nearest of 80 positions that overlaps least.
     """

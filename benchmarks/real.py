@@ -199,7 +199,7 @@ def score(fit, touch, radius):
 def met(fit, touch, radius):
     """Where the surface meets the paper's normals through held-out points, (m, 3) in the frame of the fit.
 
-    And how far along them that is, and how much nearer to it in height a unit along them leads.
+    Also how far along them that is, and how much nearer to it in height a unit along them leads.
     """
     at, normal = touch.hold_out @ fit.axes, fit.axes.T @ touch.axes[:, 2]
     off, change, small = np.zeros(len(at)), np.ones(len(at)), 1e-4 * radius

@@ -74,7 +74,7 @@ def explorations(folder):
 
 
 def places(contacts, directions, count, radius):
-    """At random contacts; some that have too few around them are left out."""
+    """Places at random contacts; some that have too few around them are left out."""
     rng = np.random.default_rng(0)
     for i in rng.integers(len(contacts), size=count):
         blocks = (np.arange(len(contacts)) + rng.integers(BLOCK)) // BLOCK

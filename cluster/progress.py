@@ -34,7 +34,7 @@ class Progress:
             self._say(self.line(workers))
 
     def line(self, workers: int) -> str:
-        """As in "1,200 of 9,000 touches, 80 a second on 2 workers, 2 min left, 3 errors"."""
+        """A sentence such as "1,200 of 9,000 touches, 80 a second on 2 workers, 2 min left, 3 errors"."""
         left = (self.total - self.done) / self.rate if self.done else 0.0
         words = [
             f"{self.done:,} of {self.total:,} {self.noun}",

@@ -79,7 +79,7 @@ class Run:
         return list(self._distinct(each for path in self.files for each in facts[path]))
 
     def _distinct(self, objects: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-        """Those that can be touched, each geometry once; of the others there are error rows then."""
+        """The objects that can be touched, each geometry once; the others get error rows."""
         seen: dict[str, dict[str, Any]] = {}
         for facts in objects:
             if facts["hash"] is None:

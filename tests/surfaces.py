@@ -242,6 +242,15 @@ def sine():
     )
 
 
+FIVE = {
+    "ellipsoid": ellipsoid(35, 25, 20, 0.6, 0.5),
+    "torus": torus(40, 20, 0.6),
+    "pear": pear(),
+    "saddle": saddle(),
+    "sphere": sphere(25),
+}
+
+
 def heights_over(surface, r, count=200):
     """Points of a reconstruction's domain (m, 2), and the surface's heights there in its frame, by rays."""
     points, _ = r.domain.grid(count)

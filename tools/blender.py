@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender as a Python module with the built extension installed in it, as its users install it.
 
-To be imported before bpy, which reads the folder of the user's files once, on import: the project's
+Import it before bpy, which reads the folder of the user's files once, on import: the project's
 own stands in for the user's.
 """
 

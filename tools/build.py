@@ -40,7 +40,7 @@ pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
 LEAD = """<!doctype html><meta charset="utf-8"><title>Tactile Patch</title>
 <meta http-equiv="refresh" content="0; url=viewport.html#{}">
 """
-# By the Python of the wheels, the first Blender that has it, and the first that has it no more.
+# For the Python of the wheels: the first Blender that has it, and the first that has it no more.
 SERIES = {"311": ("4.5.0", "5.1.0"), "313": ("5.1.0",)}
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Install a release as its users do, in a Blender without any settings, and make a patch with it.
 
-From the repository, as Get Extensions does, and from the zip for this system, as Install from Disk does.
+It comes from the repository, as by Get Extensions, and from the zip for this system, as by Install from Disk.
 """
 
 import argparse

@@ -119,7 +119,7 @@ def _schema(columns: tuple[tuple[str, pa.DataType, str, str], ...]) -> pa.Schema
 
 
 TOUCH_SCHEMA = _schema(TOUCHES)
-# By the name of the folder that has them: of its files, and of the file of objects beside it.
+# For the name of a folder: the schemas of its files, and of the file of objects beside it.
 SCHEMAS = {
     "touches": (TOUCH_SCHEMA, _schema(OBJECTS)),
     "surfaces": (_schema(SURFACES), _schema((*OBJECTS, *FOUND))),

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..patch.monge import TERMS, derived_monomials
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts, Pairs
 from .field import FACING, LAYER, node_weights
 
 RAYS, RAY_PLACES = 32, 16  # rays from the middle of each patch, and places on each
+SLOPES_AND_BENDS = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # derivatives that curvatures consist of
 
 
 class Edge(NamedTuple):
@@ -52,7 +54,7 @@ def node_dict(r: Reconstruction, std: float) -> dict[str, Any]:
 
 
 def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
-    """All pairs that share a boundary, each with that of the patch on which it is seen from more rays.
+    """All pairs that share a boundary, each as seen from that of the two patches of which more rays cross it.
 
     Yields the share that is done.
     """
@@ -73,8 +75,30 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
     return edges
 
 
+def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Array]:
+    """K of a patch's polynomial at points (m, 3) on it, (m,), and standard deviations (m,), in 1/length^2.
+
+    By the gradient of K in the coefficients, and by the variance of z_xx z_yy - z_xy^2 beyond that, for
+    normally distributed second derivatives: at a rim it is not small.
+    """
+    x, y, _ = ((points - r.frame.origin) @ r.frame.axes).T
+    by = np.swapaxes(derived_monomials(x / r.radius, y / r.radius, TERMS, SLOPES_AND_BENDS), 1, 2)
+    told, covariance = by @ r.posterior.mean, r.posterior.covariance
+    zx, zy, zxx, zxy, zyy = told[:, :, None]
+    steep = 1.0 + zx**2 + zy**2
+    k = (zxx * zyy - zxy**2) / steep**2
+    gradient = (zyy * by[2] + zxx * by[4] - 2.0 * zxy * by[3]) / steep**2
+    gradient -= 4.0 * k / steep * (zx * by[0] + zy * by[1])
+    first = np.einsum("mi,ij,mj->m", gradient, covariance, gradient)
+    c = np.einsum("ami,ij,bmj->abm", by[2:], covariance, by[2:])
+    second = c[0, 0] * c[2, 2] + c[0, 2] ** 2 + 2.0 * c[1, 1] ** 2 - 4.0 * c[0, 1] * c[1, 2]
+    variance = first + second / steep[:, 0] ** 4
+    curvature = r.patch.derivatives(x, y).gaussian_curvature
+    return curvature, np.sqrt(np.maximum(variance, 0.0)) / r.radius**2
+
+
 def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:
-    """From the ray after the widest gap on."""
+    """Crossings in the order of their rays, from the one after the widest gap on."""
     rays = ray[which]
     gaps = np.diff(rays, append=rays[0] + RAYS)
     start = int(np.argmax(gaps)) + 1

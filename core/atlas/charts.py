@@ -16,21 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import Vector
+from ..contours.contour import Vector, cross, vector_of
 from ..patch.smoothing_spline import SIDE, weights_at
 
-MARGIN = 1.12  # of a domain's radius: so far a patch is asked; beside a crease it ends a step before it
+MARGIN = 1.12  # times a domain's radius: how far a patch is asked, for beside a crease it ends a step early
 AZIMUTHS = 96  # samples of a domain's radius
-REACH = 0.5  # of the radius, that a place may be off its patch
+REACH = 0.5  # share of the radius: how far a place may be off its patch
 DISK_PLACES = 36  # places of a disk around a place
 CHUNK = 200_000  # pairs at once
 
 
 class Pairs(NamedTuple):
-    """What patches say of places near by, m pairs sorted by place.
+    """What patches say of places near them: m pairs of a place and a patch, sorted by place.
 
     place, node : (m,), indices
-    share : (m,), of the domain's radius at its foot, below MARGIN
+    share : (m,), how far out the place's foot is, as a share of the domain's radius there, below MARGIN
     distance : (m,), signed
     normal : (m, 3), of the patch below the place
     std : (m,), of the distance
@@ -107,7 +107,7 @@ class Charts:
         return np.hypot(x, y) / np.maximum(radius, 1e-6)
 
     def _pairs_at(self, points: Array, room: float, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
-        """Distances to the tangent plane at the foot, which is where the share and the deviation are of."""
+        """The pairs among these that are within reach, by the tangent plane at the foot of each place."""
         x, y, z = self.local(points, place, node).T
         reach = np.maximum(REACH, room / self.radii[node])
         inside = (self.shares(x, y, node) < MARGIN + reach) & (np.abs(z) < 1.5 + reach)
@@ -146,12 +146,8 @@ class Charts:
             hx += slopes_x[:, i] * across
             hy += by_x[:, i] * np.einsum("mk,mk->m", taps, slopes_y)
         nearest = np.clip(np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp), 0, SIDE - 1)
-        return (
-            h,
-            hx / pitch,
-            hy / pitch,
-            self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]],
-        )
+        std = self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]]
+        return h, hx / pitch, hy / pitch, std
 
     @cached_property
     def mean_stds(self) -> Array:
@@ -195,6 +191,16 @@ class Charts:
             *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
         )
 
+    def rim(self, count: int, out: float) -> tuple[Array, Array, Array]:
+        """Points at a share of the first domain's radius, normals and ways outward there, (count, 3) each."""
+        turns = 2.0 * np.pi * np.arange(count) / count
+        xy = out * self.rims[0, :: AZIMUTHS // count, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        points, normals = self.world(np.zeros(count, dtype=np.intp), *xy.T)
+        ahead = (xy / np.linalg.norm(xy, axis=1, keepdims=True)) @ self.axes[0, :, :2].T
+        ahead -= np.einsum("ki,ki->k", ahead, normals)[:, None] * normals
+        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
+        return points, normals, ahead
+
     def world(self, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
         """Points and normals (m, 3) of patches above local (x, y), which are in unit radius."""
         h, hx, hy, _ = self._heights(x, y, node)
@@ -227,10 +233,10 @@ def disk_around(normal: Vector, ahead: Vector) -> Array:
     """Places (DISK_PLACES, 3) spread evenly over the unit disk across a normal: a sunflower's."""
     i = np.arange(DISK_PLACES) + 0.5
     turn, out = math.pi * (3.0 - math.sqrt(5.0)) * i, np.sqrt(i / DISK_PLACES)
-    e1 = np.cross(normal, ahead)
+    e1 = np.array(cross(normal, ahead))
     if not np.linalg.norm(e1) > 1e-3:
-        e1 = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+        e1 = np.array(cross(normal, vector_of(np.eye(3)[np.argmin(np.abs(normal))])))
     e1 /= np.linalg.norm(e1)
     across = np.array([out * np.cos(turn), out * np.sin(turn)])
-    found: Array = across.T @ np.array([e1, np.cross(normal, e1)])
+    found: Array = across.T @ np.array([e1, cross(normal, vector_of(e1))])
     return found

@@ -4,7 +4,7 @@
 
 Only patches that face one way at a place are blended there. Others are its other walls: of two that face away
 from each other the inside is in both (a crease, a thin wall), of two that face each other it is in either (a
-valley, a gap). Beside the paper; weights as of Ohtake et al. 2003, with what is known of each patch.
+valley, a gap). Beside the paper; weights are those of Ohtake et al. 2003, over the variance of each patch.
 """
 
 from typing import Any, NamedTuple
@@ -16,12 +16,13 @@ from ..arguments import Array
 from .charts import MARGIN, Charts, Pairs
 
 OUTERMOST = 0.999  # of MARGIN, at which a weight stays: no more than that is one beyond it
-FLOOR = 1e-3  # of the radius, that no deviation is taken below in a weight
+FLOOR = 1e-3  # share of the radius: no smaller deviation counts in a weight
 AGREE, FACING = 0.64, 0.34  # cosines of 50 and 70 degrees: a patch fades out of a blend, faces another way
-LAYER = 0.15  # of the radius, that what is of one wall may differ in height at most
-SLANT = 0.5  # and of the distance from it
+LAYER = 0.15  # share of the radius by which places of one wall differ in height at most
+SLANT = 0.5  # share of their distance from it, which is added
+INSIDE = 1.0  # of a domain's radius: farther out a place is not covered
 WALLS = 3  # that meet at a place
-WELL_INSIDE = 0.8  # of a domain's radius
+WELL_INSIDE = 0.8  # share of a domain's radius
 
 
 class Blend(NamedTuple):
@@ -49,8 +50,18 @@ def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
     return blend_of(charts, pairs, points)
 
 
+def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
+    """Which of the places (k, 3) lie inside a patch that faces their way."""
+    pairs = charts.pairs(points)
+    on = pairs.share < INSIDE
+    on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
+    on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
+    found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
+    return found
+
+
 def blend_of(charts: Charts, pairs: Pairs, points: Array) -> Blend:
-    """The field at places (k, 3) of what patches say there."""
+    """The field at places (k, 3), from what patches say there."""
     weights = node_weights(charts, pairs)
     first, taken = _wall(charts, pairs, weights, points, np.ones(len(weights), dtype=bool))
     found, left = first, ~taken
@@ -62,7 +73,7 @@ def blend_of(charts: Charts, pairs: Pairs, points: Array) -> Blend:
     return found[0]
 
 
-_Wall = tuple[Blend, Array]  # with a point of it (k, 3), the nearest that its patch has well inside
+_Wall = tuple[Blend, Array]  # the field of a wall, and the nearest point well inside its patch (k, 3)
 
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
@@ -124,7 +135,7 @@ def _mean(
 
     def total(values: Array) -> Array:
         """Weighted sums (count,) of what the pairs at each place say."""
-        return np.bincount(place, w * values, count).astype(np.float64)  # of nothing: whole numbers
+        return np.bincount(place, w * values, count).astype(np.float64)  # of none: integers
 
     some = total(np.ones(len(w)))
     there = some > 0.0

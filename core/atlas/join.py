@@ -8,6 +8,7 @@ all contacts. Where patches overlap they are made to agree.
 
 from collections.abc import Generator, Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +18,80 @@ from ..contours.contour import Contour
 from ..patch.smoothing_spline import SIDE, between, smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
-from .field import FACING, blended
+from .field import FACING, Blend, blended
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # cosine of the angle between a contact's normal and the patch's there, at least
-UNDOUBTED = 2.0  # deviations of a patch, as many as a contact is off it at most that weighs 1
-LOOSER = 5.0  # times as much as that by a radius beyond the rim, where a patch alone is less certain
-FARTHEST = 3.0  # times that, a contact is of another wall
-LEAST_NOISE = 5e-4  # of the radius, at least
+UNDOUBTED = 2.0  # deviations of a patch: a contact that is off by fewer weighs 1
+LOOSER = 5.0  # how much larger they are a radius beyond the rim, where a patch alone is less certain
+FARTHEST = 3.0  # times that: a contact farther off is of another wall
+LEAST_NOISE = 5e-4  # share of the radius
 PATCHES_AT_ONCE, PLACES_AT_ONCE = 4, 1500  # patches, and contacts or other places of all, in a step
-KNOTS_WITHIN = 1.3  # of a domain's radius, as far as heights are asked at knots
-MOVED = 0.03  # of the radius, that a patch is at most
+KNOTS_WITHIN = 1.3  # times a domain's radius: how far out heights are asked at knots
+MOVED = 0.03  # share of the radius: a place of a patch is moved by less
+ASKEW = 0.3  # share of the way to a contact: how far the field may be off the contact's tangent plane
+AROUND = 2.0  # times the room: how near a contact tells alone,
+SURE = 0.5  # if the place is off its plane by this share of the way to it
+NEARER = 0.5  # share of how far the field is off that plane, that a patch of the contact's wall is at most
 
 Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
 Joining = Generator[float, None, Charts]
+
+
+class Felt(NamedTuple):
+    """Contacts and normals of their patches there, (n, 3), indices of these patches (n,), and a tree."""
+
+    points: Array
+    normals: Array
+    node: NDArray[np.intp]
+    tree: Any
+
+
+def felt_by(results: Sequence[Reconstruction], charts: Charts) -> Felt:
+    """The contacts of patches."""
+    from scipy.spatial import cKDTree
+
+    parts = [np.vstack([r.strokes, *(contour.points for contour in r.contours)]) for r in results]
+    points, node = np.vstack(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    x, y, _ = charts.local(points, np.arange(len(points)), node).T
+    return Felt(points, charts.world(node, x, y)[1], node, cKDTree(points))
+
+
+def told(charts: Charts, felt: Felt, points: Array, room: float = 0.0) -> Blend:
+    """The field at places (k, 3), as `blended` has it where no contact contradicts that.
+
+    Near an edge, patches alone do not tell whether the inside is in both walls or in either. Contacts are on
+    the surface: if the nearest one contradicts the field, and is inside the wall that the field took, the
+    inside is in both that wall and the contact's; if it is outside of it, in either. Beyond a corner that no
+    patch reaches, the nearest contact's plane tells the side of a place within a few times `room`, a length.
+    """
+    field = blended(charts, points, room)
+    away, nearest = felt.tree.query(points)
+    plane = np.einsum("ki,ki->k", points - felt.points[nearest], felt.normals[nearest])
+    off = np.abs(field.distance - plane)
+    some = np.flatnonzero((off > ASKEW * away) & (field.node >= 0))
+    pairs = charts.pairs(points[some], room)
+    pairs = pairs.chosen(pairs.share < MARGIN)
+    miss = np.abs(pairs.distance - plane[some[pairs.place]])
+    order = np.lexsort((miss, pairs.place))
+    pair = order[np.flatnonzero(np.diff(pairs.place[order], prepend=-1))]
+    other = pairs.chosen(pair[miss[pair] < NEARER * off[some[pairs.place[pair]]]])
+    at = some[other.place]
+    inside = _inside(charts, field.node[at], felt.points[nearest[at]])
+    takes = inside == (other.distance > field.distance[at])
+    for values, better in zip(field, (other.distance, other.std, other.normal, other.node), strict=True):
+        values[at[takes]] = better[takes]
+    alone = (field.node < 0) & (away < AROUND * room) & (np.abs(plane) > SURE * away)
+    field.distance[alone], field.node[alone] = plane[alone], felt.node[nearest[alone]]
+    return field
+
+
+def _inside(charts: Charts, node: NDArray[np.intp], points: Array) -> NDArray[np.bool_]:
+    """Whether points (k, 3) are below one patch each."""
+    x, y, _ = charts.local(points, np.arange(len(points)), node).T
+    feet, normals = charts.world(node, x, y)
+    below: NDArray[np.bool_] = np.einsum("ki,ki->k", points - feet, normals) < 0.0
+    return below
 
 
 def joined(
@@ -40,9 +101,9 @@ def joined(
     noise: float,
     known: dict[int, tuple[int, Table]],
 ) -> Joining:
-    """The charts of patches with all contacts, of which `charts` have but their own; yields the share done.
+    """The charts of patches by all contacts on them; `charts` know but their own. Yields the share done.
 
-    known : tables of patches that were joined before, and of how many contacts; is changed
+    known : for patches that were joined before, the number of contacts and the table; changed in place
     """
     points, normals, owner = _contacts(contours)
     parts = []
@@ -121,7 +182,7 @@ def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[
 
 
 def charts_of(results: Sequence[Reconstruction], deviations: bool = True) -> Charts:
-    """Patches alone as tables; or without their deviations, which cost most."""
+    """Patches alone as tables; without their deviations where these, which cost most, are not asked for."""
     return stacked(results, [table_of(r, deviations) for r in results])
 
 
@@ -156,13 +217,13 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
 
 
 def _square(r: Reconstruction) -> tuple[Array, float]:
-    """The domain's radii, and half the side of the square of knots: with some beside for the spline."""
+    """The domain's radii, and half the side of the square of knots, which leaves a margin for the spline."""
     rim = _rim(r)
     return rim, float(1.05 * MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 5)
 
 
 def _rim(r: Reconstruction) -> Array:
-    """The domain's radii (AZIMUTHS,), in unit radius, nowhere farther than curves beside went.
+    """The domain's radii (AZIMUTHS,), in unit radius, nowhere larger than the curves on either side are long.
 
     Between ends at very different distances the spline swings out to where nothing was felt.
     """
@@ -175,7 +236,7 @@ def _rim(r: Reconstruction) -> Array:
 
 
 def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
-    """Deviations (SIDE, SIDE) from every other knot: they are smooth, and cost the most."""
+    """Deviations (SIDE, SIDE), found at every other knot: they are smooth, and cost the most."""
     coarse = slice(None, None, 2)
     x, y = x.reshape(SIDE, SIDE)[coarse, coarse], y.reshape(SIDE, SIDE)[coarse, coarse]
     return between(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

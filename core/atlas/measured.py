@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An atlas of contacts that were measured, as a robot's rasters: no surface is asked, no touch chosen."""
+"""An atlas of contacts that were measured, such as a robot's rasters: no surface can be asked for more."""
 
 from collections.abc import Generator, Sequence
 from typing import Any, NamedTuple
@@ -19,11 +19,11 @@ from .object_atlas import Atlas
 
 FEWEST = 40  # contacts of the smallest patch
 SOME_PLACES = 24  # which are asked how large a patch has to be
-WIDENING, WIDENINGS = 1.4, 10  # by what patches grow, and how often
-MISSED = 3.0  # times what is expected, that contacts are off a patch in the median
-PATCHES_APART = 0.6  # radii from patch to patch
-NEIGHBORS = 16  # contacts that a normal follows from, where none was measured
-GROWN = 0.012  # of the radius, that a patch may be uncertain on average where there is no tolerance
+WIDENING, WIDENINGS = 1.4, 10  # the factor by which patches grow, and how often
+MISSED = 3.0  # times what is expected: how far contacts may be off a patch in the median
+PATCHES_APART = 0.6  # radii from one patch to the next
+NEIGHBORS = 16  # contacts whose plane gives the normal of one where none was measured
+GROWN = 0.012  # share of the radius: how uncertain a patch may be on average where there is no tolerance
 
 
 def atlas_of(
@@ -108,7 +108,7 @@ class _Cloud(NamedTuple):
     largest: float | None
 
     def patch(self, i: int, radius: float) -> Reconstruction | None:
-        """Around a contact, of those that face its way."""
+        """The patch of the contacts around one of them that face its way, if they carry one."""
         near = np.array(self.tree.query_ball_point(self.points[i], radius))
         near = near[self.normals[near] @ self.normals[i] > FACING]
         strokes, place, outward = [[self.points[near]]], self.points[i][None], self.normals[i][None]
@@ -116,7 +116,7 @@ class _Cloud(NamedTuple):
         return r if isinstance(r, Reconstruction) else None
 
     def largest_patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The largest that is certain enough, or the smallest where none is."""
+        """The largest patch around a contact that is certain enough, or the smallest where none is."""
         best = None
         for _ in range(WIDENINGS):
             r = self.patch(i, radius)
@@ -130,7 +130,7 @@ class _Cloud(NamedTuple):
         return best
 
     def least_radius(self) -> Generator[float, None, float]:
-        """At which half of some contacts carry a patch: rasters have theirs in lines. Raises ValueError."""
+        """The radius at which half of some contacts carry a patch: they may lie in lines. Else ValueError."""
         some = np.linspace(0, len(self.points) - 1, SOME_PLACES).astype(np.intp)
         radius = float(np.median(self.tree.query(self.points[some], FEWEST)[0][:, -1]))
         for _ in range(WIDENINGS):

@@ -16,18 +16,19 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from .charts import MARGIN, Charts
-from .field import Blend, blended
+from .field import Blend
+from .join import Felt, told
 
 Indices = NDArray[np.intp]
 
 CELL = 2.1  # edges of the mesh in a cell of the lattice
-CLIP = 0.25  # of a lattice edge, that a vertex is off its ends at least
-ROOM = 1.2  # cubes, that patches reach at least
-JUMP = 1.8  # slope of the field beyond which it jumps, from wall to wall, and has no surface
-SPECK = 40  # triangles that a piece of the mesh has at least, beside the largest
+CLIP = 0.25  # share of a lattice edge: how far a vertex is off its ends at least
+ROOM = 1.2  # cubes: how far from their surface patches are asked at least
+JUMP = 3.0  # slope of the field beyond which it jumps, from wall to wall, and has no surface
+SPECK = 40  # triangles: smaller pieces of the mesh are left out, but for the largest
 SMOOTHINGS, SMOOTHING_SHARE = 3, 0.6  # passes, and share of the way to the mean of its neighbors
 FIELD_AT_ONCE = 3000  # places of the field in a step
-MOST_CELLS = 20_000_000
+MOST_CELLS = 20_000_000  # of a patch: more points would not fit into memory
 LEAST_DIVISOR = 1e-300  # that a vector is divided by
 FACE_CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])  # corners of a face, from its center
 
@@ -57,8 +58,8 @@ class Mesh(NamedTuple):
         return bool((counts == 2).all())
 
 
-def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
-    """The mesh; yields the share that is done."""
+def meshed(charts: Charts, felt: Felt, edge: float) -> Generator[float, None, Mesh]:
+    """The mesh of the patches' field with edges about as long as asked; yields the share that is done."""
     size = CELL * edge
     cells = yield from _cells(charts, size)
     yield 0.0
@@ -68,7 +69,7 @@ def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
     values, known = np.zeros(len(points)), np.zeros(len(points), dtype=bool)
     for start in range(0, len(points), FIELD_AT_ONCE):
         some = slice(start, start + FIELD_AT_ONCE)
-        field = blended(charts, points[some], ROOM * size)
+        field = told(charts, felt, points[some], ROOM * size)
         values[some], known[some] = field.distance, field.node >= 0
         yield 0.5 * start / len(points)
     ends, triangles = _cut(tetrahedra, values, known, size)
@@ -83,7 +84,7 @@ def meshed(charts: Charts, edge: float) -> Generator[float, None, Mesh]:
         parts = []
         for start in range(0, max(len(vertices), 1), FIELD_AT_ONCE):
             some = slice(start, start + FIELD_AT_ONCE)
-            vertices[some], part = _onto(charts, vertices[some], 0.5 * size)
+            vertices[some], part = _onto(charts, felt, vertices[some], 0.5 * size)
             parts.append(part)
             yield 0.5 + 0.5 * (done + start / max(len(vertices), 1)) / (SMOOTHINGS + 1)
         field = Blend(*(np.concatenate(values) for values in zip(*parts, strict=True)))
@@ -169,7 +170,7 @@ def _cut(
     inside = values < 0.0
     signs = inside[tetrahedra]
     mixed = signs.any(axis=1) & ~signs.all(axis=1) & known[tetrahedra].all(axis=1)
-    # Two of a tetrahedron's corners are no farther from each other than a cube's.
+    # Two corners of a tetrahedron are an edge of a cube apart at most.
     at = values[tetrahedra]
     mixed &= np.ptp(at, axis=1) <= JUMP * size
     tetrahedra, signs = tetrahedra[mixed], signs[mixed]
@@ -184,9 +185,9 @@ def _cut(
 
 @cache
 def _table() -> dict[int, Indices]:
-    """For each set of corners inside: triangles (k, 3, 2) of edges (two corners each), seen from outside.
+    """For each set of corners inside, as bits: the vertices of k triangles, counterclockwise from outside.
 
-    As a list of edges, (3 k, 2).
+    A vertex lies on an edge, which is a pair of corners: (3 k, 2), three rows a triangle.
     """
     place = np.array([(-1, -1, -1), (1, -1, -1), (0, 1, -1), (0, 0, 1)], dtype=float)
     if np.linalg.det(place[1:] - place[0]) < 0.0:
@@ -209,9 +210,9 @@ def _table() -> dict[int, Indices]:
     return found
 
 
-def _onto(charts: Charts, points: Array, most: float) -> tuple[Array, Blend]:
-    """Points on the surface, by a step along the gradient, and the field there, but for its distance."""
-    field = blended(charts, points)
+def _onto(charts: Charts, felt: Felt, points: Array, most: float) -> tuple[Array, Blend]:
+    """Points moved onto the surface by a step along the gradient, and the field before that step."""
+    field = told(charts, felt, points)
     step = np.clip(field.distance, -most, most)
     return points - step[:, None] * field.normal, field
 

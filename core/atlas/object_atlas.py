@@ -14,10 +14,11 @@ from ..arguments import LARGEST, Array, finite_array, number
 from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
-from .boundaries import Edge, edges_of, node_dict
+from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
-from .field import AGREE, FACING, LAYER, blended, node_weights
-from .frontier import INSIDE, Place
+from .field import AGREE, FACING, INSIDE, LAYER, blended, node_weights
+from .frontier import Place
+from .join import Felt, felt_by, told
 from .meshing import LEAST_DIVISOR, Mesh, meshed
 
 GRAPH_VERSION = 1  # of the graph as data
@@ -66,6 +67,16 @@ class Atlas:
         """What `edges` does, in steps: yields the share that is done, after which `edges` are known."""
         if "edges" not in vars(self):
             vars(self)["edges"] = yield from edges_of(self.charts)  # where cached_property looks
+
+    def bends(self, edge: Edge) -> tuple[Array, Array]:
+        """Gaussian curvatures (2, m) of both patches along their boundary, and standard deviations there.
+
+        They are those of the touches' polynomials, which know less of them at a rim than at the point.
+        """
+        curvatures, stds = zip(
+            *(gaussian_curvature_of(self.patches[node], edge.curve) for node in edge.nodes), strict=True
+        )
+        return np.array(curvatures), np.array(stds)
 
     @property
     def status(self) -> str:
@@ -117,18 +128,22 @@ class Atlas:
         inf where that is at an open rim, so that something unfelt might be nearer.
         """
         p = finite_array("points", points, (None, 3), LARGEST)
-        field = blended(self.charts, p)
+        field = told(self.charts, self._felt, p)
         distance, std, far = field.distance.copy(), field.std.copy(), np.flatnonzero(field.node < 0)
         if len(far):
             distance[far], std[far] = self._far(p[far])
         return distance, std
 
     def _far(self, points: Array) -> tuple[Array, Array]:
-        """By the nearest sample: on the side that it faces, as far as it is."""
+        """Distances and deviations (n,) by the nearest sample: positive on the side that it faces."""
         samples = self._samples
         away, nearest = samples.tree.query(points)
         ahead = np.einsum("ni,ni->n", points - samples.points[nearest], samples.normals[nearest])
         return np.copysign(away, ahead), samples.stds[nearest]
+
+    @cached_property
+    def _felt(self) -> Felt:
+        return felt_by(self.patches, self.charts)
 
     @cached_property
     def _samples(self) -> _Samples:
@@ -192,7 +207,7 @@ class Atlas:
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """What `mesh` does, in steps: yields the share that is done, and returns the mesh."""
-        return meshed(self.charts, number("edge", edge, above=0.0))
+        return meshed(self.charts, self._felt, number("edge", edge, above=0.0))
 
     def to_dict(self) -> dict[str, Any]:
         """The graph as a dict of numbers, words, lists and dicts, as JSON has them, in the caller's unit.

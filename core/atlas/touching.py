@@ -9,23 +9,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
-from ..contours.finger import Surface
+from ..contours.contour import tangent_of, vector_of
+from ..contours.finger import Surface, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.side_by_side import exploring
 from ..exploration.touches import explore
 from .charts import Charts
-from .frontier import Frontier, covered, side_of, still_open
+from .field import FACING, covered
+from .frontier import Frontier
 from .join import Table, joined
 from .object_atlas import Atlas
 
-MOST = 1000
-FIRST_EXTENT = 300.0  # times the tolerance, that half curves of the first touch may become
-SIZE = 1.5  # times the tolerance, that a patch may be uncertain on average before its neighbors are known
-SMALL = 5.0  # times it, that a patch is wide at least
+MOST = 1000  # touches, unless the caller says otherwise
+FIRST_EXTENT = 300.0  # times the tolerance: the longest half curve of the first touch
+SIZE = 1.5  # times the tolerance: how uncertain a patch may be before its neighbors are known
+SMALL = 5.0  # times it: others do not go on from a patch of a smaller radius
+NARROW = 1.0  # times it: the least radius of a patch where a touch was in vain before
 SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
-AGAIN = 2  # times that patches less certain than the tolerance are touched again
-LARGER = 2.0  # times the patch where it begins, that a touch may become
+AGAIN = 2  # how often patches less certain than the tolerance are touched again
+LARGER = 2.0  # times the radius of the patch where it begins: how far a touch may reach
 
 Contact = tuple[Array, Array]  # a point and its normal, (3,) each
 
@@ -74,28 +77,27 @@ def touch_all_over(
 def _all_over(run: "_Run", more: bool) -> Generator[Progress, bool | None, bool]:
     """Touches until nothing within reach is uncovered; returns whether nobody has sent False."""
     while more and run.done < run.most:
-        chosen, more = yield from _told(
-            run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)), run.now()
-        )
+        chosen, more = yield from _told(run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)), run.now)
         if not chosen or not more:
             break
         farthest = LARGER * max(touch.place.radius for touch in chosen)
         contacts = [(touch.point, touch.outward) for touch in chosen]
-        new, more = yield from _told(run.touch(contacts, farthest), run.now())
+        least = [NARROW if touch.place.tried else SMALL for touch in chosen]
+        new, more = yield from _told(run.touch(contacts, farthest, least), run.now)
         for touch in chosen:
             run.frontier.tried(touch)
-        more = (yield run.now(new)) is not False and more
+        more = (yield run.now(new=new)) is not False and more
     return more
 
 
 def _told(
-    steps: Generator[None, None, Any], progress: Progress
+    steps: Generator[Any, None, Any], progress_of: Callable[[Any], Progress]
 ) -> Generator[Progress, bool | None, tuple[Any, bool]]:
-    """What steps return, and whether nobody has sent False; tells the same progress after each of them."""
+    """What steps return, and whether nobody has sent False; tells the progress of what they yield."""
     more = True
     while True:
         try:
-            next(steps)
+            progress = progress_of(next(steps))
         except StopIteration as end:
             return end.value, more
         more = (yield progress) is not False and more
@@ -112,29 +114,47 @@ class _Run:
     def first(self, point: Array, up: Array) -> Progress:
         """The touch from which all others go on; raises ValueError where there is none."""
         first = explore(self.surface, point, up, farthest=FIRST_EXTENT * self.tolerance, **self.wanted)
-        self.frontier = Frontier(self.surface, side_of(self.surface, point, up, first.step))
+        p, n = vector_of(point), vector_of(up)
+        side = first_contact(self.surface, p, n, tangent_of(n, None), first.step)[2]
+        self.frontier = Frontier(self.surface, side, np.pi * (NARROW * self.tolerance) ** 2)
         self.frontier.add(first.result)
         self.found, self.done = [first], 1
-        return self.now([first])
+        return self.now(new=[first])
 
-    def now(self, new: Sequence[Exploration] = ()) -> Progress:
-        """How far it is."""
-        return Progress(self.done, len(self.frontier.queue), tuple(new))
+    def now(self, joining: float | None = None, new: Sequence[Exploration] = ()) -> Progress:
+        """The Progress so far, with new touches."""
+        return Progress(self.done, len(self.frontier.queue), tuple(new), joining)
 
-    def touch(self, contacts: Sequence[Contact], farthest: float) -> Generator[None, None, list[Exploration]]:
-        """Touches at places, where there can be one that is wide enough; their rims are the frontier's."""
+    def touch(
+        self, contacts: Sequence[Contact], farthest: float, least: Sequence[float]
+    ) -> Generator[None, None, list[Exploration]]:
+        """Touches at places, where there can be one as wide as the least; the frontier has their rims.
+
+        least : times the tolerance; along a crease narrow ones would go on without end
+        """
         points, outward = (np.array(values) for values in zip(*contacts, strict=True))
         results = yield from exploring(self.surface, points, outward, farthest=farthest, **self.wanted)
-        new = [e for e in results if isinstance(e, Exploration) and e.result.radius >= SMALL * self.tolerance]
-        for exploration in new:
-            self.frontier.add(exploration.result)
-            yield
+        new = []
+        for e, up, times in zip(results, outward, least, strict=True):
+            if isinstance(e, ValueError) or e.result.frame.axes[:, 2] @ up < FACING:
+                continue  # at an edge a fit may end on its other side
+            if e.result.radius >= times * self.tolerance:
+                self.frontier.add(e.result, goes_on=e.result.radius >= SMALL * self.tolerance)
+                new.append(e)
+                yield
         self.found += new
         self.done += len(contacts)
         return new
 
+    def joining(self, known: dict[int, tuple[int, Table]]) -> Generator[float, None, Charts]:
+        """Joined patches; yields the share of them."""
+        assert self.frontier.charts is not None
+        contours, results = [e.contours for e in self.found], [e.result for e in self.found]
+        yield 0.0
+        return (yield from joined(contours, results, self.frontier.charts, self.wanted["noise"], known))
+
     def missing(self, charts: Charts, rough: list[int]) -> list[Contact | None]:
-        """For each of these patches the contact in the middle of those that no other covers, if there are."""
+        """For each of these patches the contact in the middle of those that no other covers, or None."""
         others = charts.chosen(np.setdiff1d(np.arange(len(self.found)), rough))
         found: list[Contact | None] = []
         for i in rough:
@@ -153,38 +173,22 @@ def _joined(run: _Run, more: bool) -> Steps:
     """
     known: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
-        uncovered = tuple(run.frontier.uncovered())
-        charts, goes_on = yield from _charts(run, len(uncovered), known)
+        charts, goes_on = yield from _told(run.joining(known), run.now)
         more = goes_on and more
         rough = charts.less_certain_than(run.tolerance)
         missing = run.missing(charts, rough)
         chosen = [contact for contact in missing if contact is not None][: run.most - run.done]
         if not (again and chosen and more):
             break
-        new, more = yield from _told(run.touch(chosen, float(charts.radii[rough].max())), run.now())
-        more = (yield run.now(new)) is not False and more
+        farthest = float(charts.radii[rough].max())
+        new, more = yield from _told(run.touch(chosen, farthest, [SMALL] * len(chosen)), run.now)
+        more = (yield run.now(new=new)) is not False and more
         more = yield from _all_over(run, more)
     gone = [i for i, contact in zip(rough, missing, strict=True) if contact is None]
     kept = np.setdiff1d(np.arange(len(run.found)), gone)
     patches, charts = tuple(run.found[i].result for i in kept), charts.chosen(kept)
-    # Patches alone may be off at their rims by so much that others seem not to cover them.
-    return Atlas(patches, charts, run.tolerance, tuple(still_open(uncovered, charts)))
-
-
-def _charts(
-    run: _Run, uncovered: int, known: dict[int, tuple[int, Table]]
-) -> Generator[Progress, bool | None, tuple[Charts, bool]]:
-    """Joined patches, and whether nobody has sent False; yields how far that is."""
-    assert run.frontier.charts is not None
-    more = (yield Progress(run.done, uncovered, joining=0.0)) is not False
-    contours, results = [e.contours for e in run.found], [e.result for e in run.found]
-    steps = joined(contours, results, run.frontier.charts, run.wanted["noise"], known)
-    while True:
-        try:
-            progress = Progress(run.done, uncovered, joining=next(steps))
-        except StopIteration as end:
-            return end.value, more
-        more = (yield progress) is not False and more
+    uncovered, _ = yield from _told(run.frontier.uncovered(charts), lambda _: run.now(1.0))
+    return Atlas(patches, charts, run.tolerance, tuple(uncovered))
 
 
 def explore_object(

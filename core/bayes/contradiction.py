@@ -23,7 +23,7 @@ from .posterior import FREE, Posterior
 def measured_normals(contours: Sequence[Contour], frame: Frame, radius: float) -> tuple[Array, Array]:
     """Contacts with measured normals, besides the reference point, in the frame and in unit radius, (n, 3).
 
-    And these normals over their standard deviations, (n, 3).
+    The second array holds these normals over their standard deviations, (n, 3).
     """
     points, present, normals = stacked(frame.origin[None], [contours])
     if normals is None:

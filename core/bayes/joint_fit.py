@@ -81,7 +81,7 @@ def joint_fit(
     k1: Array,
     k2: Array,
     tangent: Array,
-    accuracy: Array,
+    noise: Array,
     normals: Array | None = None,
     through: bool = True,
 ) -> tuple[Array, Posterior, Array]:
@@ -91,7 +91,7 @@ def joint_fit(
     weights : (b, n), 1 for a contact, 0 where there is none
     k1, k2 : (b,), a first guess of the curvatures along its axes
     tangent : (b, 3), in that frame, which d1 is to follow
-    accuracy : (b,), standard deviation of a contact, at least
+    noise : (b,), standard deviation of a contact, at least
     normals : (b, n, 3), measured, over their standard deviation; 0 where there is none
     through : whether the surfaces pass through the origin; where not, their height there is free
 
@@ -102,7 +102,7 @@ def joint_fit(
     """
     axes = np.eye(3)[None].repeat(len(contacts), axis=0)
     given = contacts[:, :0] if normals is None else normals
-    floor, usual = np.maximum(accuracy, MISFIT), prior_variances(np.full(len(contacts), USUAL_WAVINESS))
+    floor, usual = np.maximum(noise, MISFIT), prior_variances(np.full(len(contacts), USUAL_WAVINESS))
     unknown = np.zeros((*usual.shape, usual.shape[1]))
     first = axes, k1, k2, weights, usual, usual, floor, unknown, weights
     touches = _Touches(contacts, given, tangent, floor, *first)
@@ -168,12 +168,12 @@ def _with_evidence(touches: _Touches, system: System, stale: NDArray[np.bool_]) 
     return changed
 
 
-def posterior_of(k1: float, k2: float, contacts: Array, accuracy: float) -> Posterior:
+def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> Posterior:
     """What contacts (n, 3) say in a frame and about curvatures that are given; all in unit radius."""
     weights, expected = np.ones((1, len(contacts))), prior_mean(np.array([k1]), np.array([k2]))
     system = linear_system(contacts[None], weights, expected, contacts[None, :0])
     data = restricted(system.equations)
-    hyper = hyperparameters(system, data, np.array([max(accuracy, MISFIT)]))
+    hyper = hyperparameters(system, data, np.array([max(noise, MISFIT)]))
     return posterior(expected + solution(system, hyper), system, data.triangle, hyper, weights).at(0)
 
 

@@ -58,7 +58,7 @@ class System(NamedTuple):
 def prior_mean(k1: Array, k2: Array) -> Array:
     """The prior's mean, (b, 27): the quartic and sextic of a surface that goes on with its curvatures (b,).
 
-    With Q = (k1 x^2 + k2 y^2) / 2 and G = |grad Q|^2 they are Q G / 4 and Q G^2 / 8, as on a sphere and
+    Where Q = (k1 x^2 + k2 y^2) / 2 and G = |grad Q|^2 they are Q G / 4 and Q G^2 / 8, as on a sphere and
     a cylinder. A torus, whose parallels have k2 at the point, has k1 k2^2 / 4 for x^2 y^2: here is the
     mean of that and of the other case.
     """

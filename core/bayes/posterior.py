@@ -176,7 +176,7 @@ def coefficients_of(patch: MongePatch) -> Array:
 def _turn(angle: Array) -> Array:
     """(..., 27, 27): coefficients in axes turned by `angle` about the normal.
 
-    Of z = x + iy and its conjugate z' a turn changes nothing but the phase of the terms z^i z'^j.
+    A turn only changes the phase of the terms z^i z'^j in z = x + iy and its conjugate z'.
     """
     (parts, from_complex), angles = _complex_terms(), np.asarray(angle)[..., None]
     turned = from_complex * np.exp(angles * WINDING)[..., None, :]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether contacts ask for a residual, how large it is, and what they say of it.
 
-Where a sextic describes the contacts to their accuracy there is none; nor where it describes most of them,
+Where a sextic describes the contacts to their noise there is none; nor where it describes most of them,
 and makes all as likely, with outliers, as a residual does. Otherwise its variances and the noise follow from
 the marginal likelihood on a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
 """
@@ -97,7 +97,7 @@ class Sizes(NamedTuple):
 
 
 def sizes(touch: Observations, system: System) -> Sizes:
-    """By the marginal likelihood of the heights.
+    """How large residual and noise are, and whether one is asked for, by the marginal likelihood.
 
     Heights ~ N(0, K), K = basis prior basis' + v k + noise^2, by one Cholesky factor of K bordered by the
     heights, as in evidence.py; each contact's row times the root of its weight.
@@ -173,7 +173,7 @@ def _surprise(terms: Array, work: Array, twice: float, kernel: Array, variance: 
 def _surprises_alone(basis: Array, heights: Array) -> Array:
     """The evidence without a residual for each of ALONE, over the noise and but for its logarithm, (3,).
 
-    By the terms' precision, bordered by what the heights say of them.
+    It follows from the terms' precision, bordered by what the heights say of them.
     """
     rows, (precisions, logs) = np.column_stack([basis, heights]), _priors_alone()
     bordered = np.tile(rows.T @ rows, (len(ALONE), 1, 1))

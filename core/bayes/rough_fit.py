@@ -32,7 +32,7 @@ from .residual_evidence import (
     system_of,
 )
 
-UNEXPLAINED_MISFIT = 1.3  # times their accuracy, that contacts are off a sextic (benchmarks.real)
+UNEXPLAINED_MISFIT = 1.3  # times their noise, that contacts are off a sextic (benchmarks.real)
 QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's (benchmarks.real).
 
 
@@ -52,7 +52,7 @@ def rough_fit(
     contacts: Array,
     weights: Array,
     posterior: Posterior,
-    accuracy: Array,
+    noise: Array,
     told: NDArray[np.bool_],
     tangent: Array,
     normals: Array | None = None,
@@ -63,7 +63,7 @@ def rough_fit(
     contacts : (b, n, 3), in unit radius and in the Darboux frame of the sextic
     weights : (b, n), 0 where there is none
     posterior : the stack of the sextics that were fitted to them
-    accuracy : (b,), standard deviation of a contact, at least
+    noise : (b,), standard deviation of a contact, at least
     told : (b,), whether that is known to be all their noise
     tangent : (b, 3), which d1 is to follow
     normals : (b, n, 3), measured, over their standard deviation; they act on the terms alone
@@ -72,12 +72,12 @@ def rough_fit(
     b = len(contacts)
     found = RoughFit(np.eye(3)[None].repeat(b, axis=0), np.ones(b), posterior, [None] * b)
     missed = _misfit(contacts, weights, posterior)
-    candidates = _asking(missed.rms, accuracy)
+    candidates = _asking(missed.rms, noise)
     if not len(candidates):
         return found
     found = found._replace(posterior=Posterior(*(values.copy() for values in posterior)))
     for i in candidates.tolist():
-        there, least = weights[i] > 0.0, max(float(accuracy[i]), ROUGH_MISFIT)
+        there, least = weights[i] > 0.0, max(float(noise[i]), ROUGH_MISFIT)
         point = np.zeros((int(through), 3))  # a contact like the others: on facets it may be off as they are
         touch = Observations(
             np.vstack([contacts[i][there], point]),
@@ -88,7 +88,7 @@ def rough_fit(
         )
         system = system_of(touch)
         size = sizes(touch, system)
-        if not (size.asked or (told[i] and _is_texture(missed.off[i][there], float(accuracy[i])))):
+        if not (size.asked or (told[i] and _is_texture(missed.off[i][there], float(noise[i])))):
             continue
         if missed.rms[i] <= MISFIT:
             _refine(found, i, fitted(touch, system, size.variances, size.noise))
@@ -112,17 +112,17 @@ def _misfit(contacts: Array, weights: Array, posterior: Posterior) -> _Misfit:
     return _Misfit(off, np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0)))
 
 
-def _asking(rms: Array, accuracy: Array) -> NDArray[np.intp]:
-    """Which of b touches have contacts that their sextics do not describe to an accuracy (b,)."""
-    return np.flatnonzero(rms > UNEXPLAINED_MISFIT * np.maximum(accuracy, ROUGH_MISFIT))
+def _asking(rms: Array, noise: Array) -> NDArray[np.intp]:
+    """Which of b touches have contacts that their sextics do not describe to their noise (b,)."""
+    return np.flatnonzero(rms > UNEXPLAINED_MISFIT * np.maximum(noise, ROUGH_MISFIT))
 
 
-def _is_texture(off: Array, accuracy: float) -> bool:
+def _is_texture(off: Array, noise: float) -> bool:
     """Whether most contacts of a touch, |dz| (n,) off their sextic, are so by more than it may be off.
 
     White noise beside the sextic, or outliers, would not do there: its deviation would not know of them.
     """
-    return 1.4826 * float(np.median(off)) > max(UNEXPLAINED_MISFIT * accuracy, MISFIT)
+    return 1.4826 * float(np.median(off)) > max(UNEXPLAINED_MISFIT * noise, MISFIT)
 
 
 def _settle(
@@ -166,8 +166,8 @@ def _put(found: RoughFit, place: int, residual: Residual) -> None:
 def _projection() -> tuple[Array, Array]:
     """Points (n, 2) and weights (27, n) that take the heights there to the nearest polynomial's coefficients.
 
-    To degree 2 those of the quartic nearest over the disk of QUARTIC_SHARE; the others nearest to what these
-    leave over DISK.
+    Up to degree 2 it is the quartic nearest over the disk of QUARTIC_SHARE; the other terms are nearest to
+    what these leave over DISK.
     """
     x, y, shares = nodes()
     whole, root = np.column_stack([x, y]), np.sqrt(shares)

@@ -79,7 +79,7 @@ def _misses(point: Array, feet: Array, tangents: Array) -> Array:
 def _starts(contours: Sequence[Contour]) -> Array:
     """The contacts nearest to all curves in the sense of least squares, best first, apart from each other.
 
-    Of many contacts some: Gauss-Newton goes on from there.
+    Where there are many contacts, some of them do: Gauss-Newton goes on from there.
     """
     from scipy.spatial import cKDTree
 

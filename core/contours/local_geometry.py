@@ -54,7 +54,7 @@ def principal_curvatures(
 ) -> tuple[Array, Array, Array]:
     """kappa1 <= kappa2 and the angle of d1, in (-90, 90] degrees; (...) each.
 
-    From normal curvatures (..., c) at angles (..., c), those that are `known`. Euler's formula (2) as
+    They follow from normal curvatures (..., c) at angles (..., c), where these are `known`: formula (2) as
     kappa_i = H + A cos 2 phi_i + B sin 2 phi_i: linear, exact for three curves and least squares for
     more. At an umbilic (A and B within rounding of 0, measured against 1 and the curvatures: pass them
     in unit radius) d1 is at angle 0.

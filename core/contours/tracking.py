@@ -72,6 +72,7 @@ def following(
         curves.append(_Curve(across, halves, p[None], np.array([up])))
 
     def contours(extent: float) -> list[Contour]:
+        """The contours to this extent, a length; raises ValueError where it is not one of many steps."""
         count = _count(extent, step)
         return [_followed(curve, count, noise, generator) for curve in curves]
 

@@ -26,18 +26,20 @@ from ..reconstruction.status import DOUBTFUL_STD
 # Numbers of contacts of the longest half curve: the first that is enough is taken.
 CONTACT_COUNTS = (12, 24, 48)
 SHORTEST = 4  # contacts of the shortest half curve
-FELT = 96  # contacts of a half curve as long as may be
-SEEDS = (24, 12, 6, 3)  # Numbers of these contacts that a half curve may begin with.
+FELT = 96  # steps of a half curve as long as may be
+SEEDS = ((24, 1), (12, 1), (6, 2), (3, 4))  # Steps that a half curve may begin with, and contacts in each.
+DENSE_DOUBT = 1.2  # of one with more contacts than steps, up to which none is tried that is shorter still
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
-STRETCH = 1.5  # A half curve grows by this factor at once.
+STRETCH = 1.5  # A half curve grows by this factor at once, by its square where it is in next to no doubt,
+EASY = 0.1  # of what ends growth.
 NEARLY_ENDED = 0.75  # of what ends growth: where twice as long is in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
-TOO_ROUGH = 0.0085  # Roughness of contacts whose fit ends growth, in all but one of a hundred
-EXPLAINED = 3.0  # times its accuracy, that a contact is off: root mean square of a half curve
+TOO_ROUGH = 0.0068  # Roughness of contacts whose fit ends growth, in all but three of a hundred
+EXPLAINED = 3.0  # times its noise, that a contact is off: root mean square of a half curve
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
 Fits = Generator[list[Contour], Reconstruction | DegenerateCurvesError, "Grown"]
-Feel = Callable[[float], list[Contour]]  # contours of an extent, which becomes longer each time
+Feel = Callable[[float, float], "Felt"]  # with a step and to a length, which becomes longer each time
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,7 @@ class Felt:
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
         """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
 
-        Above 1 is too much for their accuracy.
+        Above 1 is too much for their noise.
         """
         each = list(zip(self.contours, self.places, counts.tolist(), strict=True))
         points = np.vstack([contour.points[at - n[0] : at + n[1] + 1] for contour, at, n in each])
@@ -100,7 +102,7 @@ class Felt:
         starts = np.cumsum(sizes) - sizes.ravel()
         squares = np.append((z - r.height(x, y)) ** 2, 0.0)
         sums = np.add.reduceat(squares, starts).reshape(-1, 3)[:, ::2]
-        limit = max(EXPLAINED * max(r.accuracy, MISFIT) * r.radius, self.largest_std or 0.0)
+        limit = max(EXPLAINED * max(r.noise, MISFIT) * r.radius, self.largest_std or 0.0)
         return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0) / limit
 
 
@@ -123,48 +125,73 @@ class Grown(NamedTuple):
         return max(float(self.misfits.max()), self.spread)
 
     @property
+    def length(self) -> float:
+        """That of the longest half curve."""
+        return float(self.counts.max()) * self.felt.step
+
+    @property
     def sure(self) -> bool:
         """Whether its status is "ok"."""
         return self.result.status == "ok"
 
 
-def grown(feel: Feel, point: Array, farthest: float, step: float, largest_std: float | None) -> Fits:
-    """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
-    first = SEEDS[0] * step
-    felt = Felt(feel(min(first, farthest)), point, step, largest_std, partial=first < farthest)
-    known: dict[bytes, Grown] = {}
-    found = yield from _seed(felt, known)
+def grown(feel: Feel, farthest: float, step: float, least: float) -> Fits:
+    """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit.
+
+    Short ones are felt with more contacts in a step, no nearer to each other than `least`; they only grow
+    where it is noise that makes them doubtful.
+    """
+    known: list[Grown] = []
+    found = yield from _seed(feel, step, least, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
-    noisy = found.result.accuracy > MISFIT and found is not list(known.values())[-1]
-    longest = (found.counts == np.minimum(SEEDS[0], felt.whole)).all()
-    most = np.inf if noisy else 1.0 if longest else NEARLY_ENDED
-    growing = np.full(found.counts.shape, noisy or found.doubt <= 1.0)
+    if found.result.noise > MISFIT and found is not known[-1]:
+        return (yield from _longer(feel, farthest, found, np.inf, np.inf))
+    if found.felt.step < step or found.doubt > 1.0:
+        return found
+    longest = (found.counts == np.minimum(SEEDS[0][0], found.felt.whole)).all()
+    doubtful = min((trial.length for trial in known if trial.spread > 1.0), default=np.inf)
+    return (yield from _longer(feel, farthest, found, 1.0 if longest else NEARLY_ENDED, doubtful))
+
+
+def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: float) -> Fits:
+    """The same, longer, as long as the mean deviation is not above `most`, and shorter than `doubtful`."""
+    accepted, felt, growing, quick = [found], found.felt, np.full(found.counts.shape, True), True
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
-        longer = np.where(growing, np.ceil(STRETCH * found.counts), found.counts).astype(np.intp)
+        quick = quick and found.doubt <= EASY
+        stretched = np.ceil((STRETCH**2 if quick else STRETCH) * found.counts)
+        longer = np.where(growing, stretched, found.counts).astype(np.intp)
+        length = float(longer.max()) * felt.step
+        if length >= doubtful:
+            break
         if (felt.open & (longer > felt.whole)).any():
-            reach = min(
-                (float(longer.max()) + 1.0) * step, farthest
-            )  # one more, so that where they end shows
-            felt = Felt(feel(reach), point, step, largest_std, partial=reach < farthest)
-        longer = np.minimum(longer, felt.whole)
+            further = min(length + felt.step, farthest)  # by one more, so that where they end shows
+            felt = feel(felt.step, further)
         try:
-            trial = known.get(longer.tobytes()) or (yield from tried(felt, longer))
+            trial = yield from tried(felt, np.minimum(longer, felt.whole))
         except DegenerateCurvesError:
             break
-        if trial.misfits.max() > 1.0:  # the half curve that is explained worst ends here
+        if quick and trial.doubt > 1.0:
+            quick = False
+        elif trial.misfits.max() > 1.0:  # the half curve that is explained worst ends here
             growing.flat[np.argmax(np.where(growing, trial.misfits, -1.0))] = False
-        elif trial.spread > max(1.0, found.spread) or (found.sure and not trial.sure):
-            break  # what is known for sure is not given away for more
+        elif trial.spread > max(1.0, found.spread):
+            break
         else:
-            found = trial
-    return found
+            accepted.append(found := trial)
+    # What is known for sure is not given away for more.
+    return next((trial for trial in reversed(accepted) if trial.sure), found)
 
 
-def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
+def _seed(feel: Feel, step: float, least: float, known: list[Grown]) -> Fits:
     """The longest of SEEDS that is in no doubt, or the one in the least; what is tried becomes `known`."""
     error, seeds, rough = None, list(SEEDS), []
+    felt = feel(step, SEEDS[0][0] * step)
     while seeds:
-        counts = np.minimum(seeds.pop(0), felt.whole)
+        steps, dense = seeds.pop(0)
+        dense = dense if step / dense >= least else 1
+        if dense > 1:
+            felt = feel(step / dense, steps * step)
+        counts = np.minimum(steps * dense, felt.whole)
         doubt = felt.roughness(counts) if seeds else 0.0  # the shortest are fitted however rough they are
         if doubt <= 1.0:
             try:
@@ -172,24 +199,24 @@ def _seed(felt: Felt, known: dict[bytes, Grown]) -> Fits:
             except DegenerateCurvesError as why:
                 error = why
                 continue
-            known[counts.tobytes()] = trial
-            if trial.doubt <= 1.0:
+            known.append(trial)
+            if trial.doubt <= (1.0 if felt.step == step else DENSE_DOUBT):
                 break
             doubt = trial.spread
         else:
-            rough.append(counts)
+            rough.append((felt, counts))
         if doubt > HOPELESS and len(seeds) > 1:
             seeds.pop(0)
     if not known and rough:  # where a shorter one carries no fit
-        known[rough[-1].tobytes()] = yield from tried(felt, rough[-1])
+        known.append((yield from tried(*rough[-1])))
     if not known and error is not None:
         raise error
-    best = min(known.values(), key=lambda trial: (trial.doubt, trial.counts.max()))
+    best = min(known, key=lambda trial: (trial.doubt, trial.length))
     if best.doubt <= 1.0 or felt.largest_std is not None:
         return best
     # Growth does not go on from any, but the longest that is sure is as good as a short one in less doubt.
-    enough = [trial for trial in known.values() if trial.sure and trial.misfits.max() <= 1.0]
-    return max((best, *enough), key=lambda trial: trial.counts.max())
+    enough = [trial for trial in known if trial.sure and trial.misfits.max() <= 1.0]
+    return max((best, *enough), key=lambda trial: trial.length)
 
 
 def tried(felt: Felt, counts: Counts) -> Fits:

@@ -9,13 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..bayes.joint_fit import MISFIT
-from ..bayes.residual_evidence import MOST_PLACES
 from ..contours.contour import Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
-from ..patch.residual import cholesky, solved
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
+from .enough import is_enough
 from .growth import (
     CONTACT_COUNTS,
     FELT,
@@ -30,9 +28,7 @@ from .growth import (
 )
 from .taps import Tapped, beside
 
-# benchmarks.amount judges the first, benchmarks.speed --base what adding planes costs.
-NOTICEABLE = 0.15  # Share of the mean deviation of the height that twice as many contacts must take off.
-HELPS = 0.1  # Share of it that one more plane must take off.
+HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
 SHORTER = 1.15  # A half curve beside what contradicts a fit is shortened by this factor at once.
 
 
@@ -75,7 +71,7 @@ class Touch:
     is_grown : whether what makes curves grow is the fit that is asked for
     """
 
-    follow: Callable[..., Feel]
+    follow: Callable[..., Callable[[float], list[Contour]]]
     point: Array
     reference: Array
     planes: tuple[SamplingPlane, ...]
@@ -116,15 +112,15 @@ class Touch:
         steps = [extent / count for count in CONTACT_COUNTS] if self.step is None else [self.step]
 
         def at(step: float) -> Contacts:
+            """Contacts so far apart."""
             return self.follow(self.planes, step=step)(extent), step, None
 
         return (yield from self._enough(at, extent, steps))
 
     def _grown(self) -> Steps:
         """The touch that is as large as it can be trusted."""
-        between = max(self.step or 0.0, self.farthest / FELT)
-        feel = self.follow(self.planes, step=between)
-        fits = grown(feel, self.point, self.farthest, between, self.largest_std)
+        least = self.step or 0.0
+        fits = grown(self._feeling(), self.farthest, max(least, self.farthest / FELT), least)
         contours = next(fits)
         while True:
             answer = yield Ask(contours, growing=not self.is_grown)
@@ -163,6 +159,19 @@ class Touch:
         r = found.result
         taps, where = self.tap(r)
         return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std)), where
+
+    def _feeling(self) -> Feel:
+        """What is felt along the planes, with any step; it goes on from where it was."""
+        feels: dict[float, Callable[[float], list[Contour]]] = {}
+
+        def felt(step: float, length: float) -> Felt:
+            """Half curves of a length."""
+            if step not in feels:
+                feels[step] = self.follow(self.planes, step=step)
+            contours = feels[step](min(length, self.farthest))
+            return Felt(contours, self.point, step, self.largest_std, partial=length < self.farthest)
+
+        return felt
 
     def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
         """The touch with half curves of so many of the contacts that were felt; with these where they do."""
@@ -218,28 +227,3 @@ class Touch:
             if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * SHORTEST:
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
             counts.flat[worst] = max(2 * SHORTEST, int(counts.flat[worst] / STRETCH) // 2 * 2)
-
-
-def is_enough(r: Reconstruction) -> bool:
-    """Whether twice as many contacts would take less than NOTICEABLE off the mean deviation of the height.
-
-    They would tell nothing where that is less than a polynomial may be off.
-    """
-    if r.mean_height_std <= MISFIT * r.radius:
-        return True
-    (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
-    if r.residual is None:
-        which = np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)
-        some = contacts[which] / r.radius
-    else:
-        some = r.residual.places
-    over, m = points / r.radius, len(some)
-    shared, seen = r.uncertainty.covariances_with(over)(some)
-    # A patch by another method departs from the posterior's mean, of which no contact takes anything off.
-    own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
-    variance = own**2
-    seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
-    told = solved(cholesky(seen), shared)
-    lost = r.geometry.node_widening**2 * np.einsum("in,in->n", told, told)
-    then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
-    return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))

@@ -50,7 +50,7 @@ def explore(
     tolerance : mean deviation of the height to reach: until then the plane that tells most is added, up to
         `most_planes`, as long as one takes a tenth off. None adds no planes
     extent : length of each half curve, as in `track`; with "auto" each grows until the default fit no
-        longer explains its contacts by their accuracy, or the patch could no longer be trusted
+        longer explains its contacts by their noise, or the patch could no longer be trusted
     step : as in `track`; "auto" chooses the number of contacts such that twice as many would not lower the
         deviation of the height noticeably
     noise, rng, tangent : as in `track`; the contours tell the fit of the noise

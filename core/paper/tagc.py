@@ -36,7 +36,7 @@ class _Fields(NamedTuple):
 class Objective:
     """g(a) + lambda f(a) of (9), in unit radius, on the grid of (8).
 
-    With W = 1 + z_x^2 + z_y^2 and D = z_xx z_yy - z_xy^2 the integrand |K| sqrt(W) is |D| W^(-3/2).
+    Where W = 1 + z_x^2 + z_y^2 and D = z_xx z_yy - z_xy^2 the integrand |K| sqrt(W) is |D| W^(-3/2).
     |D| has a kink where the surface turns from elliptic to hyperbolic; a rounding r > 0 makes it
     sqrt(D^2 + r^2).
     """

@@ -113,7 +113,7 @@ class Geometry(HeightField):
 
 
 def _widened(outward: Array) -> Array:
-    """By the share of the domain's radius."""
+    """The factors of the deviation, by how far out places are as shares of the domain's radius."""
     return NEAR_POINT + 1.5 * (1.0 - NEAR_POINT) * outward
 
 

@@ -86,6 +86,7 @@ class Residual:
         at_q = self.signed(q)
 
         def covariances(p: Array) -> tuple[Array, Array]:
+            """Covariances of heights at p with those at q, (..., n, m), and with each other, (..., n, n)."""
             if p is self.places:  # at which the places tell all of k
                 terms = monomials(p[:, 0], p[:, 1], TERMS).T
                 left = solved(self.factor, np.vstack([terms, self.places_factor.T])).T
@@ -96,7 +97,7 @@ class Residual:
         return covariances
 
     def _covariance(self, p: Array, at_p: Array, q: Array, at_q: Array) -> Array:
-        """By what `signed` gives of the points."""
+        """The covariances of heights, from what `signed` gives of the points."""
         covariance, told = kernel(p, q, self.variances), at_p.copy()
         told[..., : len(self.places)] *= -1.0
         covariance += told @ np.swapaxes(at_q, -1, -2)
@@ -215,10 +216,8 @@ def own_variance(p: Array, variances: Array) -> Array:
 
 
 def _maternes(distance: Array) -> list[Array]:
-    """M of distances (...), which are used up, over each of LENGTHS; the shorter's by the other's.
-
-    What is worked on is passed over memory as seldom as can be.
-    """
+    """M of distances (...), which are used up, over each of LENGTHS; the shorter's by the other's."""
+    # In place, for passes over memory take most of the time.
     short, long = LENGTHS.tolist()
     a = np.multiply(distance, math.sqrt(3.0) / long, out=distance)
     decay, ratio = np.exp(-a), long / short

@@ -35,8 +35,8 @@ Size = Callable[[Array], Array]
 def patch_mesh(surface: HeightField, domain: Domain, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
     """Points (n, 3) on the patch over its domain, and counterclockwise triangles (m, 3).
 
-    As many as it takes to be off the patch by the tolerance at most, as long as that asks for no less
-    than FINEST_EDGE between neighbors; the rim is off the boundary by VISIBLE at most.
+    There are as many as it takes to be off the patch by the tolerance at most, as long as that asks for no
+    less than FINEST_EDGE between neighbors; the rim is off the boundary by VISIBLE at most.
     """
     mean_radius = math.sqrt(domain.area / math.pi)
 

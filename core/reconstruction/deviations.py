@@ -23,7 +23,7 @@ def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
     """Reconstructions whose mean_height_std is known, which status and message need first."""
     stds = mean_height_stds(results)
-    # With a residual they know it already, and more than the mean.
+    # Reconstructions with a residual know it already, and more than the mean.
     pairs = zip(results, stds, strict=True)
     return [replace(r, known_height_std=std) if r.residual is None else r for r, std in pairs]
 

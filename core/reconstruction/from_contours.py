@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From contacts to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
+"""The way from contacts to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
 
 from collections.abc import Sequence
 

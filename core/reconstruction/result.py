@@ -34,7 +34,7 @@ class Reconstruction:
     patch : equation (1) of the degree asked for, in the frame
     contours : the fitted contours, in the world
     strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
-    accuracy : least standard deviation of a contact, in units of L
+    noise : least standard deviation of a contact, in units of L
     method : of the fit
     converged : whether its solver did
     joint_posterior : the posterior of "bayes"
@@ -48,7 +48,7 @@ class Reconstruction:
     geometry: Geometry
     patch: MongePatch
     contours: tuple[Contour, ...]
-    accuracy: float
+    noise: float
     method: str
     converged: bool = True
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
@@ -96,7 +96,7 @@ class Reconstruction:
         if self.joint_posterior is not None:
             return self.joint_posterior
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
-        return posterior_of(k1, k2, self.contacts / self.radius, self.accuracy)
+        return posterior_of(k1, k2, self.contacts / self.radius, self.noise)
 
     @property
     def uncertainty(self) -> Residual | Posterior:
@@ -106,8 +106,8 @@ class Reconstruction:
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height of the surface at local (x, y), in their shape.
 
-        Of "bayes" it is the posterior's mean, a sextic and the residual, whatever the patch's degree; of the
-        paper's methods that of the patch.
+        For "bayes" it is the posterior's mean, a sextic and the residual, whatever the patch's degree; for
+        the paper's methods that of the patch.
         """
         return self.geometry.height(x, y)
 
@@ -242,5 +242,5 @@ class Reconstruction:
             return 0.0, 0.0
         contacts, normals = measured_normals(self.contours, self.frame, self.radius)
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
-        alone = posterior_of(k1, k2, self.contacts / self.radius, self.accuracy)
+        alone = posterior_of(k1, k2, self.contacts / self.radius, self.noise)
         return contradiction(contacts, normals, alone)

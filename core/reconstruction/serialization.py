@@ -29,7 +29,7 @@ COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Coefficien
 def to_dict(r: Reconstruction) -> dict[str, Any]:
     """`r` as a dict of numbers, words, lists and dicts, as in JSON; `from_dict` reads it.
 
-    Lengths are in the caller's unit, those of the geometry in its frame; `accuracy` and `posterior` are in
+    Lengths are in the caller's unit, those of the geometry in its frame; `noise` and `posterior` are in
     units of the radius. `status` and `message` are for readers only: they follow from the rest.
     """
     posterior, residual = r.joint_posterior, r.residual
@@ -39,7 +39,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "status": r.status,
         "message": r.message,
         "converged": r.converged,
-        "accuracy": r.accuracy,
+        "noise": r.noise,
         "mean_height_std": r.mean_height_std,
         "geometry": {
             "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
@@ -91,7 +91,7 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         geometry=_geometry(_of(d, "geometry")),
         patch=_polynomial(_of(d, "patch")),
         contours=contours,
-        accuracy=number("accuracy", _of(d, "accuracy"), least=0.0),
+        noise=number("noise", _of(d, "noise"), least=0.0),
         method=method,
         converged=bool(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),

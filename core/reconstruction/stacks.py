@@ -45,7 +45,7 @@ class _Parts(NamedTuple):
     known: Curves  # The same as a stack of one, in the world.
     k1: float
     k2: float
-    accuracy: float
+    noise: float
     degree: int
     posterior: Posterior | None  # What the joint fit has found, where that makes the patch.
     residual: Residual | None  # beside it, where the contacts ask for one
@@ -155,8 +155,8 @@ def _in_unit_radius(radii: Array, contacts: Array, places: int) -> tuple[Array, 
 def _joint(start: Start, contacts: Array, present: NDArray[np.bool_]) -> tuple[Array, Posterior, Array]:
     """The joint fit of all the contacts of each touch."""
     normals = _normals(start.curves, start.axes, contacts)
-    tangent, accuracy = (start.tangents[:, None] @ start.axes)[:, 0], start.stds / start.radii
-    first, through = (start.k1, start.k2, tangent, accuracy), not start.alone
+    tangent, noise = (start.tangents[:, None] @ start.axes)[:, 0], start.stds / start.radii
+    first, through = (start.k1, start.k2, tangent, noise), not start.alone
     most = present.sum(axis=1).max()
     if most == present.shape[1]:
         return joint_fit(contacts, present.astype(float), *first, normals, through)
@@ -206,7 +206,7 @@ def _result(
         Geometry(touch.frame, scale, surface.scaled(scale), domain, touch.residual),
         patch.scaled(scale),
         tuple(contours),
-        accuracy=touch.accuracy,
+        noise=touch.noise,
         method=options.method,
         converged=converged,
         strokes=touch.frame.to_world(scale * touch.strokes),

@@ -20,7 +20,7 @@ LIKELY = 0.5  # Probability of that on a rough surface, whose directions are oth
 DOUBTFUL_CURVATURE = 0.1  # Deviation in units of 1 / radius: what a curve tells that ends at a quarter of it.
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point,
 SIGNIFICANT = 5.0  # and standard deviations of it.
-LEAST_SCATTER = 0.3  # Share of a contact's accuracy: few contacts may happen to scatter less.
+LEAST_SCATTER = 0.3  # Share of a contact's noise: few contacts may happen to scatter less.
 CONTRADICTED = 0.01  # Radians by which normals may contradict the contacts, beside SIGNIFICANT deviations.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts may be missed, beside the noise.
 CONTRADICTING = 3.0  # A surface that is off by more than so many deviations on average contradicts the patch.
@@ -55,7 +55,7 @@ class _Judged(Protocol):
         """The radius L."""
 
     @property
-    def accuracy(self) -> float:
+    def noise(self) -> float:
         """The least standard deviation of a contact, in units of L."""
 
     @property
@@ -154,7 +154,7 @@ def _about_data(r: _Judged) -> tuple[str, str] | None:
             "leave them out."
         )
     missed = r.typical_miss / r.radius
-    if missed > DOUBTFUL_FIT + r.accuracy:
+    if missed > DOUBTFUL_FIT + r.noise:
         return "uncertain", (
             f"Half of the contacts are off the patch by more than {100.0 * missed:.1f} % of the radius, "
             "which their noise does not explain: use a shorter extent or give their noise."
@@ -174,7 +174,7 @@ def _about_heights(r: _Judged) -> tuple[str, str] | None:
 
 def _about_frame(r: _Judged) -> tuple[str, str] | None:
     distances, stds = r.misses.T / r.radius
-    stds = np.maximum(stds, LEAST_SCATTER * r.accuracy)
+    stds = np.maximum(stds, LEAST_SCATTER * r.noise)
     apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))
     if len(apart):
         return "uncertain", (

@@ -72,9 +72,9 @@ def gathered(strokes: Sequence[ArrayLike | Contour], contours: Sequence[Contour]
 def means(contacts: Array, along: Array, strips: int = STRIPS) -> tuple[Array, int]:
     """Contacts (n, 3) in unit radius, or strips^2 means of neighbors; and of how many these are, at least.
 
-    By equal shares of the area that was felt, in strips across the direction `along` (2,) and in each strip:
-    where a sensor dwells it tells no more of the shape. Contacts that follow each other share the error of
-    their row, so where these are far apart strips are fewer.
+    Each mean has an equal share of the area that was felt, in strips across the direction `along` (2,): where
+    a sensor dwells it tells no more of the shape. Contacts that follow each other share the error of their
+    row, so where these are far apart strips are fewer.
     """
     n = len(contacts)
     if n <= strips**2:

@@ -13,7 +13,7 @@ from mathutils import Matrix
 from ... import core
 from ..probes import probe
 from ..probes.in_slices import InSlices
-from ..probes.operators import is_in_object_mode, is_unlocked, target_object
+from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import patch_record
 from ..touch.surface import MeshSurface
 from ..touch.wording import registration_summary
@@ -61,10 +61,12 @@ class Search:
 
     @property
     def seconds(self):
+        """How long it has been searching."""
         return perf_counter() - self._begun
 
     @property
     def poses(self):
+        """The core.Poses that were found; raises the error with which the search ended."""
         if self._error is not None:
             raise self._error
         return self._found
@@ -122,10 +124,11 @@ class TACTILE_OT_register(InSlices, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if probe.patch_near(context.view_layer.objects.active) is None:
-            cls.poll_message_set("Select a mesh and then the patch to put onto it")
-            return False
-        return is_in_object_mode(cls, context, "Patches are registered") and is_unlocked(cls, context)
+        return (
+            has_patch(cls, context, "Select a mesh and then the patch to put onto it")
+            and is_in_object_mode(cls, context, "Patches are registered")
+            and is_unlocked(cls, context)
+        )
 
     def _begin(self, context):
         patch = probe.patch_near(context.view_layer.objects.active)

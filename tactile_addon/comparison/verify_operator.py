@@ -10,7 +10,7 @@ from ... import core
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices
-from ..probes.operators import is_in_object_mode, is_unlocked, target_object
+from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import mesh_data, patch_object, patch_record
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import judgment
@@ -129,10 +129,11 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if probe.patch_near(context.view_layer.objects.active) is None:
-            cls.poll_message_set("Select a patch; to compare it with another mesh, select that first")
-            return False
-        return is_in_object_mode(cls, context, "Patches are verified") and is_unlocked(cls, context)
+        return (
+            has_patch(cls, context, "Select a patch; to compare it with another mesh, select that first")
+            and is_in_object_mode(cls, context, "Patches are verified")
+            and is_unlocked(cls, context)
+        )
 
     def _begin(self, context):
         obj = context.view_layer.objects.active

@@ -44,7 +44,7 @@ def read(path):
 
 def contacts_of(r):
     """The Contacts that a reconstruction was fitted to: a fit of them gives the same again."""
-    noise, (origin, normal) = r.accuracy * r.radius, (r.frame.origin, r.frame.axes[:, 2])
+    noise, (origin, normal) = r.noise * r.radius, (r.frame.origin, r.frame.axes[:, 2])
     contours = [replace(contour, noise=noise) for contour in r.contours]
     strokes = (core.Contour(r.strokes, noise=noise),) if len(r.strokes) else ()
     return Contacts(contours, "", origin.tolist(), normal.tolist(), strokes)

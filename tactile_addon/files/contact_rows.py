@@ -81,6 +81,7 @@ class Rows:
         return list(self._curves)
 
     def contours(self):
+        """The contours of all rows, in the order of `labels`. Raises ValueError where there are none."""
         numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
         if not len(numbers):
             raise ValueError(f"{self._name}: expected contacts below the header, got none")
@@ -180,6 +181,7 @@ def _first(labels, points):
 
 
 def fields_of(at, line, separator):
+    """The fields of a line, without spaces around them. Raises ValueError, which names the place `at`."""
     try:
         (fields,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
     except csv.Error:

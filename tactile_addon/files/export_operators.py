@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..probes import probe
-from ..probes.operators import report_error
+from ..probes.operators import has_patch, report_error
 from ..scene import patch_record
 from . import contact_file, patch_table
 
@@ -19,10 +19,7 @@ class _PatchExport(ExportHelper):
 
     @classmethod
     def poll(cls, context):
-        if probe.patch_near(context.view_layer.objects.active) is None:
-            cls.poll_message_set("Select a patch, its probe or its contours first")
-            return False
-        return True
+        return has_patch(cls, context, "Select a patch, its probe or its contours first")
 
     def invoke(self, context, event):
         if not self.filepath:

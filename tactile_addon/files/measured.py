@@ -57,7 +57,7 @@ class MeasuredObject:
     """
 
     def __init__(self, contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
-        """Of contact_file.Contacts.
+        """Prepares contact_file.Contacts.
 
         outward : on the outer side of all contacts; None for the normals that were measured, or for that of
             the files; `flip` takes the other side

@@ -71,7 +71,7 @@ def settle(probe, extent):
     if not is_carried(probe):
         return
     to_world = np.array(probe.tactile_probe.target.matrix_world, dtype=float)
-    # From where it is seated: from where it is, it would creep by rounding.
+    # The place is where it is seated: from where it is, it would creep by rounding.
     at, x, z = (to_world[:3, :3] @ np.reshape(seat(probe, extent)[:9], (3, 3)).T).T
     if not np.isfinite([at, x, z]).all():
         return
@@ -87,7 +87,7 @@ def settle(probe, extent):
 def seat(probe, extent):
     """Where the probe is on its target, SEAT numbers: the same wherever both are moved or turned together.
 
-    Those that it keeps, unless it is no longer there.
+    They are those that it keeps, unless it is no longer there.
     """
     settings, target = probe.tactile_probe, probe.tactile_probe.target
     above = np.eye(4).ravel().tolist() if target is None else _numbers(target.matrix_world)

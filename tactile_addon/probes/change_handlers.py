@@ -114,7 +114,7 @@ def _has_come_or_gone(depsgraph):
 def _concerned(depsgraph):
     """The probes that something has happened to: to them, their patch or target, or to what is there.
 
-    And whether anything may have happened to them, as after undo, or in a scene that was not there.
+    Also whether anything may have happened to any of them, as after undo, or in a scene not seen before.
     """
     global _unsure, _seen
     layer = depsgraph.scene.session_uid, depsgraph.view_layer.name

@@ -82,6 +82,7 @@ def relink(probe):
 
 
 def has_contours():
+    """Whether contours were seen that may lose their patch."""
     return bool(_owners)
 
 

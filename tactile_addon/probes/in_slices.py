@@ -5,10 +5,11 @@
 import sys
 from time import perf_counter
 
+import bpy
 from bpy.props import BoolProperty
 
 from ..touch.settings import UNSAVED
-from .operators import report_error
+from .operators import report_error, target_object
 
 FIRST_SLICE = 0.2  # seconds of work before a window is told that there is more
 TIMER_SLICE = 0.03  # seconds of work between two events
@@ -43,6 +44,17 @@ class InSlices:
         except ValueError as error:
             return report_error(self, error)
         return self._go_on(context)
+
+    def _ask(self, context):
+        """A dialog before it begins, which names the mesh to touch."""
+        if bpy.app.background:
+            return self.execute(context)
+        self._in_window = True
+        try:
+            self.target = target_object(context, self.target).name
+        except ValueError as error:
+            return report_error(self, error)
+        return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
     def execute(self, context):
         try:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lengths as panels and dialogs have them: dragged, they move by the object's size, from what was found.
 
-By how much the mouse moves a number is a constant of Blender's property, so there is one more property for
-each power of ten, which shows and sets the length itself; a panel takes the one that suits the object.
+How far the mouse moves a number is a constant of Blender's property, so there is one more property for each
+power of ten, which shows and sets the length itself; a panel takes the one that suits the object.
 """
 
 import math

@@ -20,7 +20,7 @@ from ..touch.settings import (
 from ..touch.touch_object import completed, touch
 from ..touch.wording import fit_summary, sentence
 from .number_fields import dragged, fields
-from .probe import lock_of, probe_of, record_of
+from .probe import lock_of, patch_near, probe_of, record_of
 
 
 @dragged
@@ -87,6 +87,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
 
 
 def report_error(operator, error):
+    """Has an operator say what is wrong, and end."""
     operator.report({"ERROR"}, sentence(error))
     return {"CANCELLED"}
 
@@ -111,7 +112,7 @@ def target_object(context, name):
 
 
 def fields_of(context, name):
-    """By which of its properties an operator shows lengths, for what it touches, as number_fields.fields."""
+    """The properties by which an operator shows lengths, for what it touches: see number_fields.fields."""
     try:
         return fields(max(target_object(context, name).dimensions))
     except ValueError:
@@ -151,6 +152,14 @@ def has_target(operator, context):
     if obj.type != "MESH":
         operator.poll_message_set("Select the mesh object to touch")
     return obj.type == "MESH"
+
+
+def has_patch(operator, context, hint):
+    """Whether the active object is a patch, its probe or its contours; the operator's poll gives the hint."""
+    found = patch_near(context.view_layer.objects.active) is not None
+    if not found:
+        operator.poll_message_set(hint)
+    return found
 
 
 def is_unlocked(operator, context):

@@ -112,6 +112,7 @@ def _chosen(settings, context):
 
 
 def is_probe(obj):
+    """Whether an object, or None, is the Empty that keeps a patch up to date."""
     return obj is not None and obj.type == "EMPTY" and obj.tactile_probe.is_probe
 
 
@@ -122,6 +123,7 @@ def is_result(obj):
 
 
 def patch_of(probe):
+    """The patch of a probe, or None."""
     return next((child for child in children_of(probe) if _is_patch(child)), None)
 
 

@@ -14,7 +14,7 @@ from ..touch.settings import MOST_PLANES, length_property
 from ..touch.wording import added_planes
 from . import probe, touch_again
 from .number_fields import dragged
-from .operators import fields_of, is_in_object_mode, is_unlocked, report_error, waiting
+from .operators import fields_of, has_patch, is_in_object_mode, is_unlocked, report_error, waiting
 
 
 class _ProbeOperator:
@@ -195,10 +195,7 @@ class TACTILE_OT_share_range(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if probe.patch_near(context.view_layer.objects.active) is None:
-            cls.poll_message_set("Select a patch, or its probe")
-            return False
-        return True
+        return has_patch(cls, context, "Select a patch, or its probe")
 
     def execute(self, context):
         patch = probe.patch_near(context.view_layer.objects.active)

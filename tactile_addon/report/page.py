@@ -31,14 +31,17 @@ def page(title, parts):
 
 
 def section(heading, *parts):
+    """A heading in plain text, and parts of HTML below it."""
     return f"<h2>{escape(heading)}</h2>\n" + "\n".join(parts)
 
 
 def verdict(words, is_good):
+    """A sentence in the color of what is good or in doubt."""
     return f'<p class="{"ok" if is_good else "doubt"}">{escape(words)}</p>'
 
 
 def words(text):
+    """A paragraph of plain text."""
     return f"<p>{escape(text)}</p>"
 
 
@@ -50,6 +53,7 @@ def swatch(color, text):
 
 
 def figure(picture, caption):
+    """A picture as SVG with a caption in plain text."""
     return f"<figure>{picture}<figcaption>{escape(caption)}</figcaption></figure>"
 
 

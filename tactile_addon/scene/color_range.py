@@ -29,7 +29,7 @@ def share(patch, patches):
 
 
 def set_range(patch, limit):
-    """The range in units of the world; 0 for the patch's own."""
+    """Gives the colors of a patch this range, in units of the world; 0 chooses it by the values."""
     patch[RANGE] = limit
     if limit <= 0.0:
         del patch[RANGE]

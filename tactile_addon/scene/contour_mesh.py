@@ -43,7 +43,7 @@ def fill_contours(mesh, touched):
         _across(path) if contour.plane_normal is None else frame.axes.T @ contour.plane_normal
         for path, contour in zip(contours, result.contours, strict=True)
     ]
-    paths = [*contours, _rim(result)]  # by which a flat patch is told from a flat face below it
+    paths = [*contours, _rim(result)]  # the rim tells a flat patch from a flat face below it
     form = _form(tuple(len(path) for path in paths), len(strokes))
     lengths = [len(path) for path in paths]
     sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM_THICKNESS]), lengths)
@@ -60,7 +60,7 @@ def fill_contours(mesh, touched):
 
 
 def _has_form(mesh, form):
-    """Whether it is of contours of as many contacts: then its points are all that changes."""
+    """Whether the mesh is one of contours with as many contacts: then only its points change."""
     contact = mesh.attributes.get("contact")
     if contact is None or (contact.data_type, contact.domain) != ("INT", "POINT"):
         return False

@@ -10,6 +10,7 @@ _remembered = None  # within `remembered`, the children by their parents; empty 
 
 
 def children_of(obj):
+    """A list of the children of an object."""
     if _remembered is None:
         return list(obj.children)
     if not _remembered:

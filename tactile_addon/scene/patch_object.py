@@ -71,7 +71,7 @@ def remove_objects(objects):
 
 
 def remove_meshes(meshes):
-    """Deletes those that nobody uses, and their materials where nobody uses these."""
+    """Deletes the meshes that nobody uses, and those of their materials that nobody uses then."""
     meshes = [mesh for mesh in meshes if not mesh.users]
     materials = {material for mesh in meshes for material in mesh.materials if material is not None}
     bpy.data.batch_remove(meshes)
@@ -121,8 +121,8 @@ def recolor(patch):
 
 
 def collection(scene):
-    # In a second scene of the file it is "Tactile Patches.001".
-    # To a library's, or its override, nothing can be added.
+    """The collection of the patches of a scene, made where there is none."""
+    # In a second scene of the file it is "Tactile Patches.001". A library's, or its override, takes no more.
     named = (
         c
         for c in scene.collection.children_recursive
@@ -159,7 +159,7 @@ def _fill_patch(obj, touched):
 def _follow(obj, touched):
     """Moves the vertices that are there, each at its place in the domain, to the patch of another touch.
 
-    What is shown is up to date, what is not is left as it was: in a gesture that is all that is seen.
+    Only the values that the colors show are brought up to date: a gesture shows no others.
     """
     result, mesh = touched.result, obj.data
     plane = result.domain.points_at(values(mesh, PLACE)[:, :2])

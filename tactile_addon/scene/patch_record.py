@@ -14,11 +14,11 @@ RECORD = "tactile"  # the patch object's custom property that holds the report,
 RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
 VERDICT = "tactile_verdict"  # and the one with its status and message while these say that it is outdated
 COLOR = "curvature_color"
-RANGE = "tactile_color_range"  # and the one with the range of its colors, where that is given
+RANGE = "tactile_color_range"  # the one with the range of its colors, where that is given
 MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
 ATLAS_RECORD = "tactile_object"  # The one of a whole object that holds the report of its touches.
 GRAPH = "tactile_graph"  # and the one with its patches and their boundaries, core.Atlas.to_dict as JSON
-CONTOURS = "tactile_contours"  # the custom property that tells them from other children of a patch
+CONTOURS = "tactile_contours"  # the one that tells contours from other children of a patch
 # What the colors can show: attribute, name, description, and the power of length it is measured in.
 QUANTITIES = [
     ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
@@ -95,12 +95,12 @@ def _is_whole(mesh):
 
 
 def mark_failed(patch, why):
-    """The patch is from an earlier touch, because the last one failed."""
+    """Has the record say that the patch is from an earlier touch, because the last one failed."""
     _outdate(patch, {"message": f"This patch is from an earlier touch, because the last one failed. {why}"})
 
 
 def mark_stale(patch):
-    """The patch is that of an earlier touch, and nothing has been felt since."""
+    """Has the record say that the patch is from an earlier touch, and that nothing was felt since."""
     _outdate(
         patch,
         {
@@ -120,7 +120,7 @@ def _outdate(patch, verdict):
 
 
 def mark_current(patch):
-    """The patch is again what its probe asks for."""
+    """Has the record say again what it said before: the patch is what its probe asks for."""
     verdict = patch.pop(VERDICT, None)
     if verdict is not None and report_of(patch) is not None:
         patch[RECORD].update(verdict)
@@ -152,7 +152,7 @@ def reconstruction_of(patch):
 
 
 def place(obj, matrix):
-    """Puts an object there in the world, so that it stays there where its parent is deleted."""
+    """Puts an object at a matrix of the world, so that it stays there if its parent is deleted."""
     if obj.parent is not None:
         obj.matrix_parent_inverse = obj.parent.matrix_world.inverted_safe()
     obj.matrix_world = matrix  # known before the next evaluation
@@ -160,9 +160,9 @@ def place(obj, matrix):
 
 
 def hold(patch):
-    """Keeps the patch where it was touched, while its probe moves on without it or by whom it is moved.
+    """Puts the patch back where it was touched, if its probe has moved on or anybody has moved it.
 
-    One that constraints or an animation would take back stays as it is.
+    A patch that constraints or an animation would move again stays where it is.
     """
     if report_of(patch) is None or patch.constraints or patch.animation_data:
         return
@@ -181,7 +181,7 @@ def _place_contours(lines):
 
 
 def touched_frame(patch):
-    """Where it was touched: axes as columns, and origin."""
+    """Where the patch was touched: axes as columns, and origin."""
     frame = patch[RECORD]["frame"]
     return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
 
@@ -202,6 +202,7 @@ def move_record(patch, axes, origin):
 
 
 def is_at(patch, axes, origin):
+    """Whether the patch object is at a frame of the world, but for rounding."""
     near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
     return np.allclose(patch.matrix_world, matrix_of(axes, origin), **near)
 
@@ -212,6 +213,7 @@ def contours_of(patch):
 
 
 def matrix_of(axes, origin):
+    """The matrix (4, 4) of a frame: axes as columns, and origin."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = axes, origin
     return matrix

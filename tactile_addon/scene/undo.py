@@ -13,7 +13,7 @@ import bpy
 
 _is_late = False
 _added = set()  # session_uids of objects and collections that were added
-_replaced = {}  # those of meshes, by those of the copies that have taken their place
+_replaced = {}  # session_uids of meshes, by those of the copies that have taken their place
 _links = []  # what was taken out: a function that puts it back, and session_uids
 
 
@@ -29,19 +29,19 @@ def after_step():
 
 
 def note_added(datablock):
-    """To be called for a new object or collection that is linked to what was there before."""
+    """Notes a new object or collection that is linked to what was there before."""
     if _is_late:
         _added.add(datablock.session_uid)
 
 
 def note_copied(obj, mesh):
-    """To be called for an object that got a copy of `mesh` in its place."""
+    """Notes an object that got a copy of `mesh` in its place."""
     if _is_late:
         _replaced[obj.data.session_uid] = mesh.session_uid
 
 
 def take_out():
-    """To be called before undo and redo."""
+    """Unlinks what was added; to be called before undo and redo."""
     _links.clear()
     if not (_added or _replaced):
         return
@@ -70,7 +70,7 @@ def _give_back_meshes():
 
 
 def put_back():
-    """To be called after undo and redo, and where another file was opened."""
+    """Links again what is still there; to be called after undo and redo, and in another file."""
     for function, *numbers in reversed(_links):
         function(*numbers)
     _links.clear()
@@ -111,6 +111,6 @@ def _found(datablocks, number):
 
 
 def _collections():
-    """All of them by their session_uids, and those of scenes by these scenes'."""
+    """All collections by their session_uids, and each scene's own by that of the scene."""
     found = {collection.session_uid: collection for collection in bpy.data.collections}
     return found | {scene.session_uid: scene.collection for scene in bpy.data.scenes}

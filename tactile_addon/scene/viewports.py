@@ -21,7 +21,7 @@ def has_gesture():
 
 
 def show_colors(chosen=None):
-    """Has a viewport draw them in Solid shading, and all others that nobody has set to anything else.
+    """Has a viewport draw the colors of vertices in Solid shading, and all others that nobody has set.
 
     A file that is made without a window has viewports too, in which it is opened.
     """

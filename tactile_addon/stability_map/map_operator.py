@@ -12,7 +12,6 @@ from ..probes.operators import (
     has_target,
     is_in_object_mode,
     make_active,
-    report_error,
     target_object,
 )
 from ..scene import patch_record
@@ -52,17 +51,10 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         return is_in_object_mode(cls, context, "Maps are made") and has_target(cls, context)
 
     def invoke(self, context, event):
-        if bpy.app.background:
-            return self.execute(context)
-        self._in_window = True
         found = probe.probe_of(context.view_layer.objects.active)
-        for name in NAMES if found is not None else ():
+        for name in NAMES if found is not None and not bpy.app.background else ():
             setattr(self, name, getattr(found.tactile_probe, name))
-        try:
-            self.target = target_object(context, self.target).name
-        except ValueError as error:
-            return report_error(self, error)
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
+        return self._ask(context)
 
     def _begin(self, context):
         self._map = StabilityMap(

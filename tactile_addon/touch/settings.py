@@ -66,6 +66,7 @@ def silent():
 
 
 def is_silent():
+    """Whether settings change within `silent`, where nothing answers."""
     return _is_silent
 
 
@@ -215,6 +216,7 @@ def draw_chosen(layout, settings, name, found=None, fields=None):
 
 
 def draw_sensor(layout, settings, found=None, fields=None):
+    """The rows of the step and the noise; `found` and `fields` as in draw_chosen."""
     draw_chosen(layout, settings, "step", found, fields)
     layout.prop(settings, (fields or {}).get("noise", "noise"))
     if settings.noise:
@@ -222,6 +224,7 @@ def draw_sensor(layout, settings, found=None, fields=None):
 
 
 def draw_solver(layout, settings, found=None, fields=None):
+    """The rows of the method, and of what it has; `found` and `fields` as in draw_chosen."""
     layout.prop(settings, "method")
     draw_chosen(layout, settings, "degree", found, fields)
     if settings.method in ("tagc", "quadratic-variation"):

@@ -87,9 +87,9 @@ class MeshSurface(PlacedMesh):
         return found
 
     def _walk(self, start, location):
-        """Downhill to the nearest point, from the one nearest to `start` as the object measures.
+        """The way downhill to the nearest point, from the one nearest to `start` as the object measures.
 
-        By the foot of the perpendicular on the face found, as long as that brings the surface nearer.
+        Each step goes to the foot of the perpendicular on the face found, as long as that is nearer.
         """
         found = self._foot(start, location)
         for _ in range(WALK):

@@ -25,7 +25,7 @@ def large_meshes(context):
 
 
 def names_below(context, event, names):
-    """Those of the objects whose boxes are below the mouse, or may be."""
+    """The names of the objects whose boxes are below the mouse, or may be."""
     viewport = viewport_below(context, event)
     if viewport is None:
         return []
@@ -80,7 +80,7 @@ def point_below(context, event):
             start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
             hit = surface.ray_cast(start, direction, 2.0 * surface.size)
             return obj, list(point) if hit is None else hit[0], -direction
-        # Behind it, by more than rounding: from close by, for from far away that is more than a small object.
+        # Go on behind it by more than rounding, from close by: from far away that exceeds a small object.
         back = 1e-3 * (point - start).length
         hit, near, *_ = cast(depsgraph, point - back * direction, direction)
         start = (near if hit else point) + 1e-5 * max(back, point.length) * direction
@@ -95,6 +95,7 @@ def _touched_by_map(obj, space):
 
 
 def _require_touchable(obj, matrix):
+    """Raises ValueError where a ray of the scene has hit what no touch can: no mesh, or an instance."""
     if obj.type != "MESH":
         raise ValueError(f'"{obj.name}" is not a mesh: convert it to one first')
     if matrix != obj.matrix_world:

@@ -19,8 +19,8 @@ from .mouse import draw_hints, mouse_ray
 DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 # Sines of the view and a plane, below which nothing can be dragged in it, or not well.
 EDGE_ON, STEEP = 0.03, 0.15
-SNAP = math.radians(5.0)
-PRECISE = 0.1
+SNAP = math.radians(5.0)  # the step of angles with Ctrl
+PRECISE = 0.1  # share of the mouse's way that counts with Shift
 HINTS = (
     ("MOUSE_LMB", "Confirm"),
     ("MOUSE_RMB", "Cancel"),

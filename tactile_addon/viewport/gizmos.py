@@ -12,8 +12,8 @@ from ..touch.touch_object import plane_axes
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .overlay import PLANE_COLORS
 
-HANDLE_REACH = 1.15  # Place of the handles, in extents.
-UPRIGHT = 0.75
+HANDLE_REACH = 1.15  # the place of handles that turn, in extents from the point,
+UPRIGHT = 0.75  # and of those that tilt, along the normal
 BALL, LEAST_BALL = 0.12, 0.05  # sizes of balls, in those of Blender's gizmos,
 SHARE = 0.125  # and that of one in the reach of a patch that is small in the view
 

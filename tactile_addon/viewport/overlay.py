@@ -212,7 +212,7 @@ def _free_strip(context, high):
 
 
 def draw_handlers():
-    """Adds those that are always there; returns what takes them away."""
+    """Adds the drawings that are always there; returns their handles, which remove them."""
     add = bpy.types.SpaceView3D.draw_handler_add
     kinds = ((draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
     return [add(draw, (), "WINDOW", kind) for draw, kind in kinds]

@@ -13,7 +13,6 @@ from ..probes.operators import (
     has_target,
     is_in_object_mode,
     make_active,
-    report_error,
     target_object,
 )
 from ..scene import patch_record
@@ -66,14 +65,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
 
     def invoke(self, context, event):
-        if bpy.app.background:
-            return self.execute(context)
-        self._in_window = True
-        try:
-            self.target = target_object(context, self.target).name
-        except ValueError as error:
-            return report_error(self, error)
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
+        return self._ask(context)
 
     def _go_on(self, context):
         self._growing = whole_mesh.GrowingPatches(context.scene, self._touches.surface)

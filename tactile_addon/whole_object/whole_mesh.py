@@ -41,6 +41,7 @@ class GrowingPatches:
         fill(obj.data, points, triangles, [(patch_record.COLOR, "FLOAT_COLOR", shades)])
 
     def remove(self):
+        """Deletes the object, if it is still there."""
         obj = self._object()
         if obj is not None:
             patch_object.remove_objects([obj])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""As Jia and Tian do it: three upright planes, degree 4, (9) with 9.99/mm^2 at L = 10 mm, and their descent.
+"""Jia and Tian's way: three upright planes, degree 4, (9) with 9.99/mm^2 at L = 10 mm, and their descent.
 
 They do not tell their extents, so these are left to the surface.
 """

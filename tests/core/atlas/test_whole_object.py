@@ -231,7 +231,7 @@ def test_edges_in_steps_are_the_edges(ring):
     assert shares == sorted(shares)
     assert len(shares) >= len(ring.patches)
     assert shares[-1] == 1.0
-    assert again.edges is again.edges
+    assert "edges" in vars(again)
     assert [e.nodes for e in again.edges] == [e.nodes for e in ring.edges]
     assert list(again.bounding()) == []
 
@@ -240,7 +240,7 @@ def test_edges_in_steps_are_the_edges(ring):
 def test_false_while_patches_are_joined_ends_the_touching(answer, monkeypatch):
     """Without it, patches that are less certain than the tolerance are touched again: here the first are."""
     monkeypatch.setattr(Charts, "less_certain_than", lambda charts, tolerance: [0, 1, 2])
-    solid, joins = solids.ring(), False
+    solid, joins = solids.ball(), False
     steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=8e-3, noise=8e-3, rng=0)
     state = next(steps)
     try:
@@ -248,7 +248,7 @@ def test_false_while_patches_are_joined_ends_the_touching(answer, monkeypatch):
             joins = joins or state.joining is not None
             state = steps.send(answer if joins else None)
     except StopIteration as end:
-        assert len(end.value.patches) > 30
+        assert len(end.value.patches) > 5
         assert answer is False
     else:
         assert answer is None

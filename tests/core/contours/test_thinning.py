@@ -13,13 +13,7 @@ from core import Contour, reconstruct
 from core.contours.thinning import MOST_CONTACTS, thinned
 
 EXTENT = 10.0
-SURFACES = {
-    "ellipsoid": surfaces.ellipsoid(35, 25, 20, 0.6, 0.5),
-    "torus": surfaces.torus(40, 20, 0.6),
-    "pear": surfaces.pear(),
-    "saddle": surfaces.saddle(),
-    "sphere": surfaces.sphere(25),
-}
+SURFACES = surfaces.FIVE
 
 
 @cache

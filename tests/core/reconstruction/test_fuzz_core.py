@@ -126,7 +126,7 @@ def examine(r):
     x, y = np.vstack([r.domain.grid(100)[0], r.domain.boundary(12), points[:, :2]]).T
     patch = r.patch
     numbers = [
-        *(r.radius, r.accuracy, r.mean_height_std, r.blind, r.fit_error, r.total_absolute_curvature),
+        *(r.radius, r.noise, r.mean_height_std, r.blind, r.fit_error, r.total_absolute_curvature),
         *(r.condition_number, patch.k1, patch.k2, r.domain.area),
     ]
     arrays = [

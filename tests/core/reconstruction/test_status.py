@@ -255,10 +255,10 @@ def test_a_curve_may_miss_the_point_by_half_a_percent_of_the_radius_or_five_devi
     misses = np.zeros((3, 2))
     misses[2] = share * r.radius, std * r.radius
     assert (with_misses(r, misses).status == "uncertain") == doubt
-    # A contact's accuracy is the least that curves scatter by, but for a third.
+    # A contact's noise is the least that curves scatter by, but for a third.
     far = [[0.01 * r.radius, 0.0]] * 3
-    assert with_misses(r, far, accuracy=0.01).status == "ok"
-    assert with_misses(r, far, accuracy=0.006).status == "uncertain"
+    assert with_misses(r, far, noise=0.01).status == "ok"
+    assert with_misses(r, far, noise=0.006).status == "uncertain"
 
 
 @pytest.mark.parametrize(("share", "doubt"), [(0.0199, False), (0.0201, True)])

@@ -23,13 +23,7 @@ from core import (
 from core.reconstruction.strokes import LEAST_STRIPS, STRIPS, means
 
 EXTENT = 10.0
-SURFACES = {
-    "ellipsoid": surfaces.ellipsoid(35, 25, 20, 0.6, 0.5),
-    "torus": surfaces.torus(40, 20, 0.6),
-    "pear": surfaces.pear(),
-    "saddle": surfaces.saddle(),
-    "sphere": surfaces.sphere(25),
-}
+SURFACES = surfaces.FIVE
 
 
 @cache
@@ -318,7 +312,7 @@ def test_a_stroke_may_be_a_contour_and_brings_its_noise():
         outward=SURFACES["pear"].normal,
         strokes=[Contour(points[:40], noise=0.2), Contour(points[40:])],
     )
-    assert r.accuracy == one.accuracy == pytest.approx(0.2 / r.radius)
+    assert r.noise == one.noise == pytest.approx(0.2 / r.radius)
     assert np.array_equal(r.height(1.0, 2.0), one.height(1.0, 2.0))
 
 

@@ -243,8 +243,8 @@ def test_bad_arguments_are_refused_with_a_sentence(arguments, says):
 
 
 def test_few_triangles_are_enough():
-    poses = register(touch(surfaces.plane()), 50.0 * SQUARE, [[0, 1, 2]], best=3)
-    assert len(poses) == 3
+    poses = register(touch(surfaces.plane()), 50.0 * SQUARE, [[0, 1, 2]], best=1)
+    assert len(poses) == 1
     assert poses[0].residual < 1e-6
     assert np.isfinite(poses[0].rotation).all()
 
