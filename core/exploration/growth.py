@@ -34,7 +34,7 @@ STRETCH = 1.5  # A half curve grows by this factor at once, by its square where 
 EASY = 0.1  # of what ends growth.
 NEARLY_ENDED = 0.75  # of what ends growth: where twice as long is in doubt, nothing between is tried
 HOPELESS = 3.0  # times it: with half as many contacts it is too large still
-TOO_ROUGH = 0.0068  # Roughness of contacts whose fit ends growth, in all but three of a hundred
+TOO_ROUGH = 0.0085  # Roughness of contacts whose fit ends growth, in all but one of a hundred
 EXPLAINED = 3.0  # times its noise, that a contact is off: root mean square of a half curve
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
@@ -212,9 +212,9 @@ def _seed(feel: Feel, step: float, least: float, known: list[Grown]) -> Fits:
     if not known and error is not None:
         raise error
     best = min(known, key=lambda trial: (trial.doubt, trial.length))
-    if best.doubt <= 1.0 or felt.largest_std is not None:
+    if (best.doubt <= 1.0 and best.felt.step == step) or felt.largest_std is not None:
         return best
-    # Growth does not go on from any, but the longest that is sure is as good as a short one in less doubt.
+    # Growth does not go on from any: the longest that is sure is as good as a short one in less doubt.
     enough = [trial for trial in known if trial.sure and trial.misfits.max() <= 1.0]
     return max((best, *enough), key=lambda trial: trial.length)
 
