@@ -85,10 +85,10 @@ def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_leng
 
 def short_waves():
     return bowl_with(
-        lambda x, y: 0.25 * np.sin(2.0 * x) * np.sin(2.0 * y),
+        lambda x, y: 0.4 * np.sin(2.0 * x) * np.sin(2.0 * y),
         lambda x, y: (
-            0.5 * np.cos(2.0 * x) * np.sin(2.0 * y),
-            0.5 * np.sin(2.0 * x) * np.cos(2.0 * y),
+            0.8 * np.cos(2.0 * x) * np.sin(2.0 * y),
+            0.8 * np.sin(2.0 * x) * np.cos(2.0 * y),
         ),
     )
 
