@@ -448,3 +448,24 @@ def test_a_deviation_that_is_large_enough_ends_growth():
     assert narrow.result.mean_height_std < wide.result.mean_height_std
     with pytest.raises(ValueError, match="largest_std: expected a finite number above 0"):
         core.explore(place, place.point, place.normal, largest_std=0.0)
+
+
+@pytest.mark.parametrize(("high", "long", "std", "extent"), [(0.15, 6.0, 0.1, 2.5), (0.15, 10.0, 0.03, 2.5)])
+def test_where_a_deviation_is_asked_for_half_curves_that_begin_short_grow(high, long, std, extent):
+    k = 2.0 * np.pi / long
+    waves = surfaces.Exact(
+        lambda x, y, z: z - high * np.sin(k * x) * np.cos(k * y),
+        lambda p: np.array(
+            [
+                -high * k * np.cos(k * p[0]) * np.cos(k * p[1]),
+                high * k * np.sin(k * p[0]) * np.sin(k * p[1]),
+                1.0,
+            ]
+        ),
+        np.zeros(3),
+        0.0,
+        0.0,
+    )
+    found = explore(waves, largest_std=std)
+    assert found.extent > extent
+    assert found.result.mean_height_std < std
