@@ -27,8 +27,7 @@ from ..reconstruction.status import DOUBTFUL_STD
 CONTACT_COUNTS = (12, 24, 48)
 SHORTEST = 4  # contacts of the shortest half curve
 FELT = 96  # steps of a half curve as long as may be
-SEEDS = ((24, 1), (12, 1), (6, 2), (3, 4))  # Steps that a half curve may begin with, and contacts in each.
-DENSE_DOUBT = 1.2  # of one with more contacts than steps, up to which none is tried that is shorter still
+SEEDS = (24, 12, 6, 3)  # Steps that a half curve may begin with.
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
 STRETCH = 1.5  # A half curve grows by this factor at once, by its square where it is in next to no doubt,
 EASY = 0.1  # of what ends growth.
@@ -39,7 +38,7 @@ EXPLAINED = 3.0  # times its noise, that a contact is off: root mean square of a
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
 Fits = Generator[list[Contour], Reconstruction | DegenerateCurvesError, "Grown"]
-Feel = Callable[[float, float], "Felt"]  # with a step and to a length, which becomes longer each time
+Feel = Callable[[float], "Felt"]  # half curves to a length, which becomes longer each time
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,20 +134,16 @@ class Grown(NamedTuple):
         return self.result.status == "ok"
 
 
-def grown(feel: Feel, farthest: float, step: float, least: float) -> Fits:
-    """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit.
-
-    Short ones are felt with more contacts in a step, no nearer to each other than `least`; they only grow
-    where it is noise that makes them doubtful.
-    """
+def grown(feel: Feel, farthest: float, step: float) -> Fits:
+    """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
     known: list[Grown] = []
-    found = yield from _seed(feel, step, least, known)
+    found = yield from _seed(feel, step, known)
     # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
     if found.result.noise > MISFIT and found is not known[-1]:
         return (yield from _longer(feel, farthest, found, np.inf, np.inf))
-    if found.felt.step < step or found.doubt > 1.0:
+    if found.doubt > 1.0:
         return found
-    longest = (found.counts == np.minimum(SEEDS[0][0], found.felt.whole)).all()
+    longest = (found.counts == np.minimum(SEEDS[0], found.felt.whole)).all()
     doubtful = min((trial.length for trial in known if trial.spread > 1.0), default=np.inf)
     return (yield from _longer(feel, farthest, found, 1.0 if longest else NEARLY_ENDED, doubtful))
 
@@ -165,7 +160,7 @@ def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: fl
             break
         if (felt.open & (longer > felt.whole)).any():
             further = min(length + felt.step, farthest)  # by one more, so that where they end shows
-            felt = feel(felt.step, further)
+            felt = feel(further)
         try:
             trial = yield from tried(felt, np.minimum(longer, felt.whole))
         except DegenerateCurvesError:
@@ -182,16 +177,12 @@ def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: fl
     return next((trial for trial in reversed(accepted) if trial.sure), found)
 
 
-def _seed(feel: Feel, step: float, least: float, known: list[Grown]) -> Fits:
+def _seed(feel: Feel, step: float, known: list[Grown]) -> Fits:
     """The longest of SEEDS that is in no doubt, or the one in the least; what is tried becomes `known`."""
     error, seeds, rough = None, list(SEEDS), []
-    felt = feel(step, SEEDS[0][0] * step)
+    felt = feel(SEEDS[0] * step)
     while seeds:
-        steps, dense = seeds.pop(0)
-        dense = dense if step / dense >= least else 1
-        if dense > 1:
-            felt = feel(step / dense, steps * step)
-        counts = np.minimum(steps * dense, felt.whole)
+        counts = np.minimum(seeds.pop(0), felt.whole)
         doubt = felt.roughness(counts) if seeds else 0.0  # the shortest are fitted however rough they are
         if doubt <= 1.0:
             try:
@@ -200,19 +191,19 @@ def _seed(feel: Feel, step: float, least: float, known: list[Grown]) -> Fits:
                 error = why
                 continue
             known.append(trial)
-            if trial.doubt <= (1.0 if felt.step == step else DENSE_DOUBT):
+            if trial.doubt <= 1.0:
                 break
             doubt = trial.spread
         else:
-            rough.append((felt, counts))
+            rough.append(counts)
         if doubt > HOPELESS and len(seeds) > 1:
             seeds.pop(0)
     if not known and rough:  # where a shorter one carries no fit
-        known.append((yield from tried(*rough[-1])))
+        known.append((yield from tried(felt, rough[-1])))
     if not known and error is not None:
         raise error
     best = min(known, key=lambda trial: (trial.doubt, trial.length))
-    if (best.doubt <= 1.0 and best.felt.step == step) or felt.largest_std is not None:
+    if best.doubt <= 1.0 or felt.largest_std is not None:
         return best
     # Growth does not go on from any: the longest that is sure is as good as a short one in less doubt.
     enough = [trial for trial in known if trial.sure and trial.misfits.max() <= 1.0]

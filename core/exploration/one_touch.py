@@ -120,10 +120,7 @@ class Touch:
     def _grown(self) -> Steps:
         """The touch that is as large as it can be trusted."""
         between = max(self.step or 0.0, self.farthest / FELT)
-        # Short curves that are felt densely grow no more, so where a deviation is asked for none are: patches
-        # up to it are to be as large as they can, for fewer cover an object (benchmarks.atlas).
-        least = self.step or 0.0 if self.largest_std is None else between
-        fits = grown(self._feeling(), self.farthest, between, least)
+        fits = grown(self._feeling(between), self.farthest, between)
         contours = next(fits)
         while True:
             answer = yield Ask(contours, growing=not self.is_grown)
@@ -163,15 +160,13 @@ class Touch:
         taps, where = self.tap(r)
         return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std)), where
 
-    def _feeling(self) -> Feel:
-        """What is felt along the planes, with any step; it goes on from where it was."""
-        feels: dict[float, Callable[[float], list[Contour]]] = {}
+    def _feeling(self, step: float) -> Feel:
+        """What is felt along the planes; it goes on from where it was."""
+        feel = self.follow(self.planes, step=step)
 
-        def felt(step: float, length: float) -> Felt:
+        def felt(length: float) -> Felt:
             """Half curves of a length."""
-            if step not in feels:
-                feels[step] = self.follow(self.planes, step=step)
-            contours = feels[step](min(length, self.farthest))
+            contours = feel(min(length, self.farthest))
             return Felt(contours, self.point, step, self.largest_std, partial=length < self.farthest)
 
         return felt

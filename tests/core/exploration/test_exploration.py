@@ -68,7 +68,7 @@ def test_on_a_sphere_the_patch_is_large_and_as_good_as_it_says(radius, noise):
     assert off < 3.0 * r.mean_height_std
 
 
-@pytest.mark.parametrize(("high", "wide"), [(1.0, 2.0), (1.4, 2.2), (1.2, 2.2), (2.0, 2.5)])
+@pytest.mark.parametrize(("high", "wide"), [(1.6, 2.4), (1.4, 2.3), (3.2, 2.8)])
 def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_lengths_tried_first(high, wide):
     def waves(x, y):
         return high * np.sin(x / wide) * np.sin(y / wide)
@@ -78,7 +78,7 @@ def test_among_waves_curves_that_are_short_for_their_noise_grow_between_the_leng
         return high / wide * np.cos(a) * np.sin(b), high / wide * np.sin(a) * np.cos(b)
 
     surface = bowl_with(waves, slopes)
-    found = explore(surface, noise=0.12, rng=0)
+    found = explore(surface, noise=0.08, rng=0)
     assert found.extent == pytest.approx(9 * 30.0 / 96)  # 6, 12 and 24 of 96 are the lengths tried first
     assert true_error(surface, found) < 1.5 * found.result.mean_height_std
 
@@ -109,15 +109,6 @@ def fits_of(monkeypatch, surface, **more):
     return explore(surface, **more), results
 
 
-def test_short_curves_are_felt_densely_so_that_the_last_fit_tried_is_the_result(monkeypatch):
-    found, results = fits_of(monkeypatch, short_waves())
-    assert found.result.contours == results[-1].contours
-    assert found.extent == pytest.approx(3 * 30.0 / 96)
-    assert found.step == pytest.approx(found.extent / 12)
-    found, _ = fits_of(monkeypatch, short_waves(), step=0.2)  # as near to each other as may be
-    assert found.step >= 0.2
-
-
 def test_curves_in_next_to_no_doubt_grow_fast(monkeypatch):
     _, results = fits_of(monkeypatch, surfaces.plane())
     assert len(results) == 3  # of 24, 54 and 96 contacts
@@ -127,7 +118,7 @@ def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
     tried = growth.tried
 
     def of_more_than_the_least(felt, counts):
-        if felt.step == 30.0 / growth.FELT / growth.SEEDS[-1][1]:
+        if counts.max() <= growth.SEEDS[-1]:
             raise core.DegenerateCurvesError("too few")
         return (yield from tried(felt, counts))
 
@@ -157,7 +148,7 @@ def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, mon
     monkeypatch.setattr(growth, "tried", tried)
     felt = Felt()
     felt.largest_std = largest_std
-    found = side_by_side.result_of(growth._seed(lambda step, length: felt, 1.0, 1.0, []))
+    found = side_by_side.result_of(growth._seed(lambda length: felt, 1.0, []))
     assert found.counts.max() == (12 if largest_std is None else 3)
 
 
