@@ -62,7 +62,7 @@ def started(*words):
 def wait_for(true, seconds=60.0):
     until = time.monotonic() + seconds
     while not true() and time.monotonic() < until:
-        time.sleep(0.05)
+        time.sleep(0.01)
     assert true()
 
 
@@ -314,8 +314,11 @@ def test_a_full_disk_ends_the_run_and_loses_nothing(command, objects, plain, tmp
 def test_an_interrupted_run_ends_cleanly_and_goes_on_later(command, objects, plain, tmp_path, ended):
     run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")
     wait_for(lambda: blocks_of(tmp_path))
+    os.killpg(run.pid, signal.SIGSTOP)  # lest it is done before it is interrupted
     below = psutil.Process(run.pid).children(recursive=True)
+    assert len(blocks_of(tmp_path)) < 9
     (os.killpg if ended == signal.SIGINT else os.kill)(run.pid, ended)
+    os.killpg(run.pid, signal.SIGCONT)
     _, error = run.communicate(timeout=60)
     assert run.returncode == 130
     assert "cluster: interrupted; run the same command again to continue" in error
