@@ -37,10 +37,8 @@ NOISE, COMPARED, POINTS, MOST = 0.0005, 0.001, 2500, 1500
 EDGE = 0.01
 FINE = 0.0002  # tolerance and noise at which 1000 touches are not enough
 BLURRED = np.radians(10.0)  # deviation of normals
-CREASE, AROUND = (
-    20.0,
-    8,
-)  # degrees that an object turns within an edge of the mesh; places on a ring of that radius
+CREASE = 20.0  # degrees: where the object turns by more within an edge of the mesh there is a crease
+AROUND = 8  # places on a ring of that radius
 
 
 class Scanned:

@@ -4,10 +4,8 @@
 
 import numpy as np
 
-LARGEST_SINGLE, SMALLEST_SINGLE = (
-    1e15,
-    1e-15,
-)  # lengths whose squares, and those of their inverses, are numbers there
+# Lengths whose squares, and those of their inverses, are numbers in single precision.
+LARGEST_SINGLE, SMALLEST_SINGLE = 1e15, 1e-15
 
 
 def require_single(result):
