@@ -341,7 +341,7 @@ def draw(numbers):
             axis.loglog(x, off, "o-", label=name.split("_")[0], markersize=4)
     axes[0].set(xlabel="touches", ylabel="mean distance, permille of the size")
     axes[1].set(xlabel="CPU seconds: touches, join and mesh")
-    axes[0].legend(frameon=False)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=7, frameon=False)
     for axis in axes:
         axis.grid(alpha=0.3, which="both")
         for ticks in (axis.xaxis, axis.yaxis):

@@ -47,7 +47,7 @@ def draw(scores, seconds, automatic):
         ax.set_xticks(counts)
     axes[1].set_ylim(0.4, 1.0)
     axes[2].set(xlabel="time, ms", xscale="log")
-    axes[2].set_xlim(1.0, 100.0)
+    axes[2].set_xlim(0.5, 100.0)
     axes[2].xaxis.set_major_formatter("{x:g}")
     axes[2].xaxis.set_minor_formatter("")
     for ax in axes[::2]:
