@@ -86,7 +86,7 @@ def make_target():
     obj.name = "Target"
     bpy.context.view_layer.update()
     corners = [obj.matrix_world @ corner for corner in map(Vector, obj.bound_box)]
-    look(sum(corners, Vector((0, 0, 0))) / 8, (0.4, -1, 0.5), 2.2 * max(obj.dimensions))
+    look(sum(corners, Vector((0, 0, 0))) / 8, (1.0, -0.3, 0.5), 2.2 * max(obj.dimensions))
     bpy.ops.ed.undo_push(message="Target")
 
 
