@@ -74,7 +74,7 @@ def _off(surface: Surface, r: Reconstruction, foot: Vector) -> float:
 
 
 def beside(r: Reconstruction, where: Array) -> NDArray[np.intp]:
-    """Of the two half curves beside each of the places (k, 2) the longer: indices into raveled Counts."""
+    """The longer of the two half curves beside each of the places (k, 2): indices into raveled Counts."""
     x, y, _ = r.frame.to_local(np.vstack([contour.points[[0, -1]] for contour in r.contours])).T
     turns = np.arctan2(where[:, 1], where[:, 0])[:, None] - np.arctan2(y, x)
     turns[:, np.hypot(x, y) <= SAME_END * r.radius] = np.nan  # a curve to one side only
