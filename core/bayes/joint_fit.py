@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import along, cross, dot, scaled
-from ..patch.smoothing_spline import STUDENT
 from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances, restricted
 from .linear_system import (
     System,
@@ -43,6 +42,7 @@ STALE_WEIGHT = 0.5  # Change of a weight since waviness and noise were found, at
 ALIKE_CURVATURES = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
 LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
 OUTLYING = 5.0  # standard deviations
+STUDENT = 4.0  # degrees of freedom
 
 
 class _Touches(NamedTuple):

@@ -149,7 +149,7 @@ def grown(feel: Feel, farthest: float, step: float) -> Fits:
 
 
 def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: float) -> Fits:
-    """Half curves that grow from those found while their mean deviation is not above `most`, up to `doubtful`."""
+    """Half curves that grow from those found, to a mean deviation of `most` and a length below `doubtful`."""
     accepted, felt, growing, quick = [found], found.felt, np.full(found.counts.shape, True), True
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         quick = quick and found.doubt <= EASY

@@ -78,5 +78,5 @@ def beside(r: Reconstruction, where: Array) -> NDArray[np.intp]:
     x, y, _ = r.frame.to_local(np.vstack([contour.points[[0, -1]] for contour in r.contours])).T
     turns = np.arctan2(where[:, 1], where[:, 0])[:, None] - np.arctan2(y, x)
     turns[:, np.hypot(x, y) <= SAME_END * r.radius] = np.nan  # a curve to one side only
-    beside = np.array([np.nanargmin(sign * turns % math.tau, axis=1) for sign in (1.0, -1.0)])
-    return np.unique(np.choose(np.argmax(np.hypot(x, y)[beside], axis=0), beside))
+    both = np.array([np.nanargmin(sign * turns % math.tau, axis=1) for sign in (1.0, -1.0)])
+    return np.unique(np.choose(np.argmax(np.hypot(x, y)[both], axis=0), both))
