@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from core import Contour, reconstruct, register
 from core.scan import pose_search, scanned_mesh
 
-pytestmark = pytest.mark.xdist_group("poses")
 PLANES = surfaces.planes((0, 60, 120))
 TURN, SHIFT = Rotation.from_euler("xyz", (0.7, -1.1, 2.3)).as_matrix(), np.array([310.0, -40.0, 75.0])
 WAVES = ((1.0, (0.27, 0.08, -0.14), 0.4), (0.8, (-0.1, 0.3, 0.19), 1.9), (0.9, (0.16, -0.19, 0.24), 3.0))
