@@ -19,8 +19,8 @@ CLUSTER := $(VENV)/.cluster
 SITE := build/site
 # Tests run beside each other, one process a processor, each with one thread.
 BESIDE := -n auto --dist worksteal
-# Those of core share what takes longest to touch.
-test-core: BESIDE := -n auto --dist loadgroup
+# Tests of core share touched objects, so one process runs a whole file; the longest files come first.
+test-core: BESIDE := -n auto --dist loadfile --no-loadscope-reorder
 test test-core test-cluster: export OMP_NUM_THREADS = 1
 test test-core test-cluster: export OPENBLAS_NUM_THREADS = 1
 
@@ -62,7 +62,7 @@ test: $(ZIP)
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) --ignore tests/cluster
 
 test-core: $(READY)
-	$(VENV_PY) -m pytest $(BESIDE) --hypothesis-profile=quick tests/core tests/test_rooms.py
+	$(VENV_PY) -m pytest $(BESIDE) --hypothesis-profile=quick tests/core/scan tests/core tests/test_rooms.py
 
 test-cluster: $(CLUSTER)
 	$(VENV_PY) -m pytest tests/cluster
@@ -122,10 +122,11 @@ $(SITE)/.ready: tools/site_requirements.txt
 	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<
 	@touch $@
 
-# One by one: a chart goes without a peer that is not made for this Python or system.
+# One by one: a chart goes without a peer that is not made for this Python or system, or for Blender's numpy.
 $(PEERS): benchmarks/requirements.txt $(READY)
 	@echo 'Installing what the charts are drawn with and compare to: once.'
-	@grep -v '^#' $< | xargs -n 1 $(VENV_PY) -m pip install --quiet --disable-pip-version-check || true
+	@sed '/^#/d; /^$$/d' $< | while read -r peer; do $(VENV_PY) -m pip install --quiet --disable-pip-version-check \
+		--constraint tools/requirements.txt "$$peer" </dev/null || true; done
 	@touch $@
 
 $(CLUSTER): cluster/requirements.txt | $(READY)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Surface patches from tracked contours, after Jia and Tian: numpy and scipy, no Blender.
 
-Points are rows (n, 3), frames are columns (d1, d2, n), lengths are in the caller's unit, and a
-convex body has negative curvatures under its outward normal.
+Points are rows (n, 3), frames are columns (d1, d2, n), and lengths are in the caller's unit. A convex body
+has negative curvatures, because normals point outward.
 """
 
 from .atlas.boundaries import Edge
@@ -24,8 +24,9 @@ from .contours.contour import (
 from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
+from .exploration.nearby import Nearby, explore_nearby, reaches_of
 from .exploration.one_touch import Exploration
-from .exploration.touches import explore, explore_many
+from .exploration.touches import explore, explore_many, exploring_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
@@ -58,6 +59,7 @@ __all__ = [
     "Geometry",
     "Mesh",
     "MongePatch",
+    "Nearby",
     "NextTouch",
     "Pose",
     "Progress",
@@ -71,7 +73,9 @@ __all__ = [
     "distances",
     "explore",
     "explore_many",
+    "explore_nearby",
     "explore_object",
+    "exploring_many",
     "fit_error",
     "from_dict",
     "height_error",
@@ -80,6 +84,7 @@ __all__ = [
     "mean_height_stds",
     "overlapped",
     "reachable",
+    "reaches_of",
     "reconstruct",
     "reconstruct_many",
     "register",

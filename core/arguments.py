@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of what callers pass in: a ValueError names the argument, what was expected and what came."""
+"""Checks of arguments: a ValueError names the argument, what was expected and what was given."""
 
 import math
 import reprlib
@@ -12,22 +12,22 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-UNIT_ROUNDING = 4e-16  # Rounding of a unit vector's length.
-LARGEST, SMALLEST = 1e50, 1e-50  # lengths whose sixth powers are numbers
+UNIT_ROUNDING = 4e-16  # Rounding changes a unit vector's length by at most this.
+LARGEST, SMALLEST = 1e50, 1e-50  # The sixth powers of lengths between these are finite numbers.
 
 
 def finite_array(
     name: str, value: ArrayLike, shape: tuple[int | None, ...], largest: float = math.inf
 ) -> Array:
-    """`value` as a float64 array of `shape`, where None stands for any length.
+    """`value` as a float64 array of `shape`, in which None stands for any length.
 
-    Raises ValueError where the shape differs, or a number is masked, not finite or beyond +-`largest`.
+    Raises ValueError if the shape differs, or a number is masked, not finite or beyond +-`largest`.
     """
     if np.ma.is_masked(value):  # type: ignore[no-untyped-call]
         raise ValueError(f"{name}: expected numbers, got masked ones among them: remove them")
     try:
         array = np.array(value)
-        if array.dtype.kind not in "biufO":  # text, and complex numbers
+        if array.dtype.kind not in "biufO":  # It is text or complex.
             raise TypeError
         array = array.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError):
@@ -50,7 +50,7 @@ def finite_array(
 
 
 def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:
-    """A list of `values`. Raises ValueError where they are none, or one of them is of another kind."""
+    """The list of `values`. Raises ValueError if they are no list, or one of them is of another kind."""
     try:
         found = list(values)
     except TypeError:
@@ -62,7 +62,7 @@ def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:
 
 
 def shown(value: object) -> str:
-    """Any value in a line, cut short where it is long."""
+    """Any value in a line, cut short if it is long."""
     return " ".join(reprlib.repr(value).split())
 
 
@@ -71,20 +71,21 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 
 
 def unit_vector(name: str, value: ArrayLike) -> Array:
-    """`value` (3,) scaled to length 1. Raises ValueError where it has no direction."""
+    """`value` (3,) scaled to length 1. Raises ValueError if it has no direction."""
     x, y, z = finite_array(name, value, (3,)).tolist()
-    if abs(math.hypot(x, y, z) - 1.0) <= UNIT_ROUNDING:  # once is enough: twice would change its last bit
+    if abs(math.hypot(x, y, z) - 1.0) <= UNIT_ROUNDING:  # Scaling again would change its last bit.
         return np.array([x, y, z])
     largest = max(abs(x), abs(y), abs(z))
     if largest == 0.0:
         raise ValueError(f"{name}: expected a vector with a direction, got (0, 0, 0)")
-    x, y, z = x / largest, y / largest, z / largest  # the square of a denormal or of 1e200 has no length
+    # The squares of 1e200 and of denormal numbers would be lost.
+    x, y, z = x / largest, y / largest, z / largest
     length = math.hypot(x, y, z)
     return np.array([x / length, y / length, z / length])
 
 
 def number(name: str, value: float, *, above: float | None = None, least: float | None = None) -> float:
-    """`value` as a float, above one bound or at least the other. Raises ValueError elsewhere."""
+    """`value` as a float that is above one bound, or at least the other. Raises ValueError if it is not."""
     try:
         if getattr(value, "ndim", 0) or isinstance(value, np.complexfloating):
             raise TypeError

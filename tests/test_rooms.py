@@ -4,6 +4,7 @@
 
 import ast
 import re
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -38,16 +39,18 @@ def modules(package):
         yield ".".join(path.relative_to(ROOT).with_suffix("").parts), path
 
 
+@cache
 def imports(name, path):
     """Dotted names of all that a module imports relatively, wherever in it."""
-    inside = name.split(".")
+    inside, found = name.split("."), []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = inside[: len(inside) - node.level] + (node.module.split(".") if node.module else [])
             for alias in node.names:
                 full = [*base, alias.name]
                 is_module = (ROOT.joinpath(*full).with_suffix(".py")).exists()
-                yield ".".join(full if is_module else base)
+                found.append(".".join(full if is_module else base))
+    return found
 
 
 def floor(name):

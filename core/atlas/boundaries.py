@@ -15,13 +15,21 @@ from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts, Pairs
 from .field import FACING, LAYER, node_weights
 
-RAYS, RAY_PLACES = 32, 16  # rays from the middle of each patch, and places on each
-OUTWARD_STD = 0.5  # more deviation of K at a radius: a surface has terms beyond a sextic's, felt at a rim
-SLOPES_AND_BENDS = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # derivatives that curvatures consist of
+# Boundaries are looked for on so many rays from each patch's middle, at so many places.
+RAYS, RAY_PLACES = 32, 16
+# Surfaces have terms beyond a sextic's, which count near a rim: at a radius from the middle they add
+# this share to the deviation of K (python -m benchmarks.atlas).
+OUTWARD_STD = 1.0
+SLOPES_AND_BENDS = (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # Curvatures follow from these derivatives.
 
 
 class Edge(NamedTuple):
-    """Two patches that share a boundary: their indices, its points (m, 3), angles of their normals (m,)."""
+    """Two patches that share a boundary.
+
+    nodes : their indices
+    curve : (m, 3), points of the boundary
+    angle : (m,), angles between their normals there, in radians
+    """
 
     nodes: tuple[int, int]
     curve: Array
@@ -33,7 +41,7 @@ class Edge(NamedTuple):
 
 
 class _Crossing(NamedTuple):
-    """Where on rays a patch gives way: its index, the other's, the ray, the point, the angle of normals."""
+    """Where patches give way to others along rays: both indices, ray, point, angle between the normals."""
 
     node: NDArray[np.intp]
     other: NDArray[np.intp]
@@ -43,7 +51,7 @@ class _Crossing(NamedTuple):
 
 
 def node_dict(r: Reconstruction, std: float) -> dict[str, Any]:
-    """A patch as a node of this mean deviation: where it is and how it bends, as plain values."""
+    """A patch of mean deviation `std` as a node of the graph, in plain values: its place and its shape."""
     return {
         "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
         "radius": r.radius,
@@ -55,7 +63,7 @@ def node_dict(r: Reconstruction, std: float) -> dict[str, Any]:
 
 
 def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
-    """All pairs that share a boundary, each as seen from that of the two patches of which more rays cross it.
+    """All pairs of patches that share a boundary, which is taken from the patch more of whose rays cross it.
 
     Yields the share that is done.
     """
@@ -79,8 +87,8 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
 def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Array]:
     """K of a patch's polynomial at points (m, 3) on it, (m,), and standard deviations (m,), in 1/length^2.
 
-    By the gradient of K in the coefficients, and by the variance of z_xx z_yy - z_xy^2 beyond that, for
-    normally distributed second derivatives: at a rim it is not small.
+    The deviation follows from the gradient of K in the coefficients and, since that does not suffice at a
+    rim, from the second-order variance of z_xx z_yy - z_xy^2 for normally distributed second derivatives.
     """
     x, y, _ = ((points - r.frame.origin) @ r.frame.axes).T
     by = np.swapaxes(derived_monomials(x / r.radius, y / r.radius, TERMS, SLOPES_AND_BENDS), 1, 2)
@@ -100,7 +108,7 @@ def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Arra
 
 
 def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:
-    """Crossings in the order of their rays, from the one after the widest gap on."""
+    """Crossings in the order of their rays, beginning after the widest gap between two rays."""
     rays = ray[which]
     gaps = np.diff(rays, append=rays[0] + RAYS)
     start = int(np.argmax(gaps)) + 1
@@ -108,7 +116,7 @@ def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:
 
 
 def _crossings(charts: Charts, node: int) -> _Crossing:
-    """Where a patch gives way to another, on rays from its middle."""
+    """Where one patch gives way to others, on rays from its middle."""
     turns = 2.0 * np.pi * np.arange(RAYS) / RAYS
     out = MARGIN * np.arange(1, RAY_PLACES + 1) / (RAY_PLACES + 1)
     rays = np.stack([np.cos(turns), np.sin(turns)], axis=1)

@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many patches as tables, so that what all of them say of many places is one pass over arrays.
+"""Many patches as tables, so that all of them can be asked about many places in one pass over arrays.
 
-A patch with a residual costs a kernel with each of its contacts at every place. Here it costs 16 numbers of a
-cubic B-spline, which is C2 and off the patch by less than a tenth of its deviation.
+The height of a patch with a residual is a sum over its contacts. In a table it is a sum of 16 coefficients of
+a cubic B-spline, which is C2 and off the patch by less than a tenth of its deviation.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,21 +20,22 @@ from ..arguments import Array
 from ..contours.contour import Vector, cross, vector_of
 from ..patch.smoothing_spline import SIDE, weights_at
 
-MARGIN = 1.12  # times a domain's radius: how far a patch is asked, for beside a crease it ends a step early
-AZIMUTHS = 96  # samples of a domain's radius
-REACH = 0.5  # share of the radius: how far a place may be off its patch
-DISK_PLACES = 36  # places of a disk around a place
-CHUNK = 200_000  # pairs at once
+# python -m benchmarks.atlas judges these.
+MARGIN = 1.12  # A patch counts to this share of its domain's radius: beside a crease it ends a step early.
+AZIMUTHS = 96  # The radius of a domain is stored in so many directions.
+REACH = 0.5  # A patch is asked about places up to this share of its radius above or below it.
+DISK_PLACES = 36  # A disk around a contact is felt at so many places.
+CHUNK = 200_000  # So many pairs of a place and a patch fit into memory at once.
 
 
 class Pairs(NamedTuple):
     """What patches say of places near them: m pairs of a place and a patch, sorted by place.
 
     place, node : (m,), indices
-    share : (m,), how far out the place's foot is, as a share of the domain's radius there, below MARGIN
-    distance : (m,), signed
-    normal : (m, 3), of the patch below the place
-    std : (m,), of the distance
+    share : (m,), how far out the foot of the place is, as a share of the domain's radius there
+    distance : (m,), signed distance of the place from the patch
+    normal : (m, 3), unit normal of the patch at the foot
+    std : (m,), standard deviation of the distance
     """
 
     place: NDArray[np.intp]
@@ -50,11 +52,12 @@ class Pairs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Charts:
-    """n patches; a table's knots are evenly spaced over [-half, half]^2, in unit radius.
+    """n patches as tables whose knots are evenly spaced over [-half, half]^2, in unit radius.
 
-    origins (n, 3), axes (n, 3, 3), radii (n,), halves (n,)
-    heights, stds : (n, SIDE, SIDE), spline coefficients of heights; deviations; in unit radius
-    rims : (n, AZIMUTHS), the domains' radii, in unit radius
+    origins, axes, radii : (n, 3), (n, 3, 3) and (n,), of the patches, in the caller's unit
+    halves : (n,), half the side of each table, in unit radius
+    heights, stds : (n, SIDE, SIDE), spline coefficients of the heights, and their deviations, in unit radius
+    rims : (n, AZIMUTHS), the radii of the domains, in unit radius
     """
 
     origins: Array
@@ -67,27 +70,27 @@ class Charts:
 
     @cached_property
     def reaches(self) -> Array:
-        """How far from its origin a patch is asked, (n,)."""
+        """The largest distance (n,) from its origin at which each patch is asked."""
         flat: Array = MARGIN * self.rims.max(axis=1)
         return self.radii * np.hypot(flat, np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5) + REACH)
 
     def pairs(self, points: Array, room: float = 0.0) -> Pairs:
-        """What patches say of places (k, 3) within REACH of them, and within `room`, a length."""
+        """What patches say of places (k, 3) that are within REACH, or within the length `room`, of them."""
         found = [self._pairs_at(points, room, *some) for some in self._near(points, room)]
         return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
     def _near(self, points: Array, room: float) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Pairs of places and patches that may be within reach, sorted by place, CHUNK at once or so."""
+        """Pairs of places and patches that may be within reach, sorted by place, about CHUNK at once."""
         from scipy.spatial import cKDTree
 
         rows = max(1, CHUNK // 16)
         for start in range(0, max(len(points), 1), rows):
             some = points[start : start + rows]
             reaches = self.reaches + room
-            lists = cKDTree(some).query_ball_point(self.origins, reaches).tolist() if len(some) else [[]]
+            lists = cKDTree(some).query_ball_point(self.origins, reaches) if len(some) else [[]]
             counts = [len(near) for near in lists]
             node = np.repeat(np.arange(len(lists)), counts)
-            place = np.fromiter((i for near in lists for i in near), dtype=np.intp, count=sum(counts))
+            place = np.fromiter(chain.from_iterable(lists), dtype=np.intp, count=sum(counts))
             order = np.argsort(place, kind="stable")
             yield start + place[order], node[order]
 
@@ -98,7 +101,7 @@ class Charts:
         return found
 
     def shares(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
-        """Shares (m,) of the domain's radius at local (x, y); smooth in the azimuth."""
+        """How far out local (x, y) are, as shares (m,) of the domain's radius; smooth in the azimuth."""
         at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
         first = at.astype(np.intp)
         weights = _catmull_rom(at - first)
@@ -107,11 +110,13 @@ class Charts:
         return np.hypot(x, y) / np.maximum(radius, 1e-6)
 
     def _pairs_at(self, points: Array, room: float, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
-        """The pairs among these that are within reach, by the tangent plane at the foot of each place."""
+        """Those of these pairs that are within reach, measured from the tangent plane at each foot."""
         x, y, z = self.local(points, place, node).T
         reach = np.maximum(REACH, room / self.radii[node])
-        inside = (self.shares(x, y, node) < MARGIN + reach) & (np.abs(z) < 1.5 + reach)
-        place, node, x, y, z, reach = (values[inside] for values in (place, node, x, y, z, reach))
+        near = np.flatnonzero(x**2 + y**2 < ((MARGIN + reach) * self.rims.max(axis=1)[node]) ** 2)
+        near = near[np.abs(z[near]) < 1.5 + reach[near]]
+        near = near[self.shares(x[near], y[near], node[near]) < MARGIN + reach[near]]
+        place, node, x, y, z, reach = (values[near] for values in (place, node, x, y, z, reach))
         h, hx, hy, _ = self._heights(x, y, node)
         off = (z - h) / (1.0 + hx**2 + hy**2)
         foot_x, foot_y = x + off * hx, y + off * hy
@@ -134,7 +139,7 @@ class Charts:
         )
 
     def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
-        """Heights, slopes and deviations (m,) at local (x, y)."""
+        """Heights, slopes in x and y, and deviations (m,) at local (x, y)."""
         pitch = 2.0 * self.halves[node] / (SIDE - 1)
         (column, by_x, slopes_x), (row, by_y, slopes_y) = weights_at(x / pitch), weights_at(y / pitch)
         start, flat = (node * SIDE + column - 1) * SIDE + row - 1, self.heights.reshape(-1)
@@ -157,7 +162,7 @@ class Charts:
         return self.radii * sums
 
     def less_certain_than(self, std: float) -> list[int]:
-        """Patches whose mean deviation is above it, the worst first."""
+        """Indices of the patches whose mean deviation is above `std`, the worst first."""
         order = np.argsort(-self.mean_stds, kind="stable")
         found: list[int] = order[self.mean_stds[order] > std].tolist()
         return found
@@ -182,17 +187,20 @@ class Charts:
         return points[0], normals[0]
 
     def chosen(self, which: NDArray[Any]) -> "Charts":
-        """Some of the patches."""
+        """The tables of some of the patches."""
         return Charts(*(getattr(self, f.name)[which] for f in fields(Charts)))
 
     def joined(self, others: "Charts") -> "Charts":
-        """These patches and others."""
+        """The tables of these patches, followed by others."""
         return Charts(
             *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
         )
 
     def rim(self, count: int, out: float) -> tuple[Array, Array, Array]:
-        """Points at a share of the first domain's radius, normals and ways outward there, (count, 3) each."""
+        """Points around the first patch at the share `out` of its domain's radius, (count, 3).
+
+        Also the normals there, and the tangents that point outward, (count, 3) each.
+        """
         turns = 2.0 * np.pi * np.arange(count) / count
         xy = out * self.rims[0, :: AZIMUTHS // count, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
         points, normals = self.world(np.zeros(count, dtype=np.intp), *xy.T)
@@ -214,7 +222,7 @@ class Charts:
 
 
 def _catmull_rom(t: Array) -> Array:
-    """Weights (m, 4) of four neighbors at shares t of the way between the middle two."""
+    """Weights (m, 4) of four neighbors at shares t (m,) of the way between the middle two."""
     return (
         np.stack(
             [
@@ -230,7 +238,7 @@ def _catmull_rom(t: Array) -> Array:
 
 
 def disk_around(normal: Vector, ahead: Vector) -> Array:
-    """Places (DISK_PLACES, 3) spread evenly over the unit disk across a normal: a sunflower's."""
+    """Places (DISK_PLACES, 3) spread evenly over the unit disk across a normal, as in a sunflower."""
     i = np.arange(DISK_PLACES) + 0.5
     turn, out = math.pi * (3.0 - math.sqrt(5.0)) * i, np.sqrt(i / DISK_PLACES)
     e1 = np.array(cross(normal, ahead))

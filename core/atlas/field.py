@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One surface of many patches: a partition of unity of their signed distances, and its deviation.
 
-Only patches that face one way at a place are blended there. Others are its other walls: of two that face away
-from each other the inside is in both (a crease, a thin wall), of two that face each other it is in either (a
-valley, a gap). Beside the paper; weights are those of Ohtake et al. 2003, over the variance of each patch.
+Beside the paper. At each place only patches that face one way are blended. Others belong to another wall: if
+two walls face away from each other, the inside is where both say so (a crease, a thin wall); if they face
+each other, where either does (a valley, a gap). Weights are those of Ohtake et al. 2003 over each patch's
+variance.
 """
 
 from typing import Any, NamedTuple
@@ -15,20 +16,58 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from .charts import MARGIN, Charts, Pairs
 
-OUTERMOST = 0.999  # of MARGIN, at which a weight stays: no more than that is one beyond it
-FLOOR = 1e-3  # share of the radius: no smaller deviation counts in a weight
-AGREE, FACING = 0.64, 0.34  # cosines of 50 and 70 degrees: a patch fades out of a blend, faces another way
-LAYER = 0.15  # share of the radius by which places of one wall differ in height at most
-SLANT = 0.5  # share of their distance from it, which is added
-INSIDE = 1.0  # of a domain's radius: farther out a place is not covered
-WALLS = 3  # that meet at a place
-WELL_INSIDE = 0.8  # share of a domain's radius
+# python -m benchmarks.atlas judges these.
+OUTERMOST = 0.999  # Weights beyond this share of MARGIN are those there, so that none is 0.
+FLOOR = 1e-3  # No deviation below this share of the radius counts in a weight.
+# Cosines of 50 and 70 degrees: between these angles a patch fades out of a blend; beyond, it is another
+# wall's.
+AGREE, FACING = 0.64, 0.34
+# Patches of one wall differ in distance by at most this share of the radius, and this share of the distance
+# more.
+LAYER, SLANT = 0.15, 0.5
+INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
+WALLS = 3  # At most so many walls are told apart at a place.
+WELL_INSIDE = 0.8  # What is within this share of a domain's radius is surely on the patch.
+NEIGHBORS = 8  # Where no patch reaches, so many contacts tell of the surface.
+
+
+class Felt(NamedTuple):
+    """n contacts, the normals of their patches there, the indices of these patches, and a KD-tree of points.
+
+    points, normals : (n, 3); node : (n,)
+    """
+
+    points: Array
+    normals: Array
+    node: NDArray[np.intp]
+    tree: Any
+
+    def told_alone(self, points: Array) -> tuple[Array, Array]:
+        """Signed distances (k,) of places (k, 3) and gradients (k, 3), by the contacts nearest to them alone.
+
+        It is that of the nearest one's tangent plane, and where the surface turns of others': the inside is
+        in both where their normals part (a crease), in either where they meet (a valley).
+        """
+        nearest = self.tree.query(points, NEIGHBORS)[1]
+        feet, normals = self.points[nearest], self.normals[nearest]
+        planes = np.einsum("kci,kci->kc", points[:, None] - feet, normals)
+        distance, normal = planes[:, 0].copy(), normals[:, 0].copy()
+        turned = np.einsum("kci,ki->kc", normals, normal) < AGREE
+        parts = np.einsum("kci,kci->kc", normals - normal[:, None], feet - feet[:, :1]) > 0.0
+        for plane, up, turns, convex in zip(
+            planes.T, normals.transpose(1, 0, 2), turned.T, parts.T, strict=True
+        ):
+            takes = turns & ((plane > distance) == convex)
+            distance[takes], normal[takes] = plane[takes], up[takes]
+        return distance, normal
 
 
 class Blend(NamedTuple):
-    """For k places: signed distance and std (k,), gradient (k, 3), the patch of most weight (k,).
+    """The field at k places.
 
-    Where no patch reaches, the distance is 0, the deviation inf and the patch -1.
+    distance, std : (k,), signed, and its deviation; 0 and inf where no patch reaches
+    normal : (k, 3), the gradient
+    node : (k,), index of the patch of most weight; -1 where no patch reaches
     """
 
     distance: Array
@@ -38,20 +77,22 @@ class Blend(NamedTuple):
 
 
 def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
-    """The field at places (k, 3); `room` is a length that patches reach at least.
+    """The field at places (k, 3); `room` is a length to which patches reach at least.
 
-    Beyond its rim a patch tells on which side of it a place is, where no other does.
+    Beyond its rim a patch tells on which side of it a place is, if no other patch does. The deviation is inf
+    there.
     """
     pairs = charts.pairs(points, room)
-    if room:
-        sure = (pairs.share <= 1.0) & (np.abs(pairs.distance) < room)
-        known = np.bincount(pairs.place[sure], minlength=len(points)) > 0
-        pairs = pairs.chosen((pairs.share < MARGIN) | ~known[pairs.place])
-    return blend_of(charts, pairs, points)
+    if not room:
+        return blend_of(charts, pairs, points)
+    sure = (pairs.share <= 1.0) & (np.abs(pairs.distance) < room)
+    known = np.bincount(pairs.place[sure], minlength=len(points)) > 0
+    found = blend_of(charts, pairs.chosen((pairs.share < MARGIN) | ~known[pairs.place]), points)
+    return found._replace(std=np.where(known, found.std, np.inf))
 
 
 def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
-    """Which of the places (k, 3) lie inside a patch that faces their way."""
+    """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3)."""
     pairs = charts.pairs(points)
     on = pairs.share < INSIDE
     on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
@@ -61,7 +102,7 @@ def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
 
 
 def blend_of(charts: Charts, pairs: Pairs, points: Array) -> Blend:
-    """The field at places (k, 3), from what patches say there."""
+    """The field at places (k, 3), given what patches say there."""
     weights = node_weights(charts, pairs)
     first, taken = _wall(charts, pairs, weights, points, np.ones(len(weights), dtype=bool))
     found, left = first, ~taken
@@ -73,11 +114,12 @@ def blend_of(charts: Charts, pairs: Pairs, points: Array) -> Blend:
     return found[0]
 
 
-_Wall = tuple[Blend, Array]  # the field of a wall, and the nearest point well inside its patch (k, 3)
+# The field of a wall, and for each place a point (k, 3) that is surely on the wall.
+_Wall = tuple[Blend, Array]
 
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
-    """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), u the share of MARGIN times the domain's radius."""
+    """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), where u is how far out a foot is, 1 at MARGIN."""
     u = np.minimum(pairs.share / MARGIN, OUTERMOST)
     floor = FLOOR * charts.radii[pairs.node]
     weights: Array = (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (pairs.std**2 + floor**2)
@@ -87,7 +129,7 @@ def node_weights(charts: Charts, pairs: Pairs) -> Array:
 def _wall(
     charts: Charts, pairs: Pairs, weights: Array, points: Array, active: NDArray[np.bool_]
 ) -> tuple[_Wall, NDArray[np.bool_]]:
-    """The blend of the active pairs that face the way of the nearest at each place, and which they are."""
+    """The blend of those active pairs that face like the nearest one at each place, and a mask of them."""
     which = np.flatnonzero(active)
     place, node, out, distance, normal, std = pairs.chosen(which)
     radius = charts.radii[node]
@@ -114,7 +156,7 @@ def _wall(
 
 
 def _first(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
-    """For each of `count` places the pair of the least key; -1 where there is none."""
+    """The pair of the least key at each of `count` places; -1 where there is none."""
     order = np.lexsort((key, place))
     found = np.full(count, -1)
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))
@@ -131,11 +173,11 @@ def _mean(
     w: Array,
     count: int,
 ) -> Blend:
-    """Weighted means; patches that share contacts err alike, so that their deviations do not average out."""
+    """Weighted means. Deviations do not average out, because patches that share contacts err alike."""
 
     def total(values: Array) -> Array:
         """Weighted sums (count,) of what the pairs at each place say."""
-        return np.bincount(place, w * values, count).astype(np.float64)  # of none: integers
+        return np.bincount(place, w * values, count).astype(np.float64)  # It counts no pairs in integers.
 
     some = total(np.ones(len(w)))
     there = some > 0.0
@@ -154,7 +196,7 @@ def _mean(
 
 
 def _combined(found: _Wall, first: _Wall, other: _Wall) -> _Wall:
-    """What is inside both walls where they face away from each other, inside either elsewhere."""
+    """What is inside both walls where these face away from each other, and inside either elsewhere."""
     (a, feet), (b, others) = found, other
     across = others - first[1]
     away = np.einsum("ki,ki->k", first[0].normal - b.normal, across) < 0.0

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where what was felt ends, and how a finger goes on from there.
 
-Patches cover an object when each place of their rims lies inside another, or the finger that goes on beyond
-it comes to what is covered, or to nothing. It moves by rays alone, ahead, down, back and up, each from where
-the last one ended: so it bumps into walls and bends around edges.
+Patches cover an object when each place on their rims lies inside another patch, or a finger that goes on from
+there meets only what is covered, or nothing. The finger moves by rays alone: ahead, down, back and up, each
+from where the last one ended. So it bumps into walls and bends around edges.
 """
 
 import heapq
@@ -24,24 +24,25 @@ from .charts import DISK_PLACES, Charts, disk_around
 from .field import FACING, INSIDE, covered
 from .join import charts_of
 
-RIM = 24  # places of a rim
-REACHES = (0.35, 0.12, 0.04)  # shares of the radius that the finger goes on, until it finds anything new
-DISK_REACHES = 3.0  # times this: the radius of the disk, at most the patch's, in which that is measured
-SLIVER = 0.03  # share of the disk: the blend of patches bridges less
-TRIES = 3  # touches that a place of a rim is worth
-LOOK = 7  # more places that are looked at with the first
-TOUCHES_APART = 2.2  # radii between touches that are made side by side
-LOW = 0.1  # share of the radius: how high above a place the finger is when it comes down
-ABOVE = 0.6  # share of the radius: how high the finger is above what it feels around a contact
-HAIR = 0.02  # share of a reach: how high the finger is above the surface
+# python -m benchmarks.atlas judges these.
+RIM = 24  # Each rim has so many places.
+REACHES = (0.35, 0.12, 0.04)  # The finger goes on by these shares of the radius, until something is new.
+DISK_REACHES = 3.0  # What is new is measured on a disk of so many reaches, at most the patch's radius.
+SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
+TRIES = 3  # Touches go on from a place at most so many times.
+LOOK = 7  # So many other places are looked at together with the first of the queue, which is faster.
+TOUCHES_APART = 2.2  # Touches that are made side by side are so many radii apart.
+LOW = 0.1  # The finger comes down on a place from at most this share of the radius above it.
+ABOVE = 0.6  # The finger is this share of the disk's radius above a contact when it feels around it.
+HAIR = 0.02  # The finger slides along the surface this share of the radius above it.
 
-Hit = tuple[Sequence[float], Sequence[float]]  # what a surface answers
-Contact = tuple[Vector, Vector]  # a point of the surface and its outward normal
+Hit = tuple[Sequence[float], Sequence[float]]  # A point and a normal, as a surface answers.
+Contact = tuple[Vector, Vector]  # A point of the surface and its outward normal.
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place on a rim, with the normal and the way ahead, (3,) each; and the size of its patch.
+    """A place on a rim, its normal and the way away from its patch, (3,) each, and the radius of the patch.
 
     tried : where touches that went on from it were, (3,) each
     """
@@ -54,7 +55,7 @@ class Place:
 
 
 class Next(NamedTuple):
-    """Where to touch, (3,) each, the area that it would bring, and from which place of a rim."""
+    """Where to touch, the outward direction, (3,) each, the area that it would bring, and whence."""
 
     point: Array
     outward: Array
@@ -64,13 +65,14 @@ class Next(NamedTuple):
 
 @dataclass(eq=False)
 class Frontier:
-    """What was felt, and a queue of the places on its rims, by the area that a touch there can bring at most.
+    """The patches that were felt, and a queue of the places on their rims.
 
-    side : 1 where the surface's normals are on the side of the finger, -1 where they are on the other
-    least : the area that a touch has to bring
-    left : places where touches brought nothing
+    side : 1 if the surface's normals are on the side of the finger, -1 if they are on the other
+    least : the least area that a touch has to bring
+    left : places from which TRIES touches went on, so that no more do
 
-    What a place can bring only shrinks as patches come, so it is measured again only once it is the first.
+    The first place is the one that can bring most. That only shrinks as patches come, so only there it is
+    measured again.
     """
 
     surface: Surface
@@ -82,27 +84,24 @@ class Frontier:
     left: list[Place] = field(default_factory=list)
 
     def add(self, r: Reconstruction, goes_on: bool = True) -> None:
-        """Takes in a patch that was felt, with the places of its rim where others may go on from there."""
+        """Takes in a patch that was felt and, if touches may go on from there, the places of its rim."""
         chart = charts_of([r], deviations=False)
         self.charts = chart if self.charts is None else self.charts.joined(chart)
         for p, n, t in zip(*chart.rim(RIM, 1.01 * INSIDE), strict=True) if goes_on else ():
             self.push(Place(vector_of(p), vector_of(n), vector_of(t), r.radius), np.pi * r.radius**2)
 
     def push(self, place: Place, gain: float) -> None:
-        """Queues a place of a rim by the area that a touch there may bring."""
+        """Queues a place by the area that a touch there may bring."""
         self.pushed += 1
         heapq.heappush(self.queue, (-gain, self.pushed, place))
 
     def tried(self, touch: Next) -> None:
-        """Queues the place of a touch that was made once more: something may be left beyond it."""
+        """Queues the place of a touch again after the touch was made: something may be left beyond it."""
         place, at = touch.place, vector_of(touch.point)
         self.push(replace(place, tried=(*place.tried, at)), touch.gain)
 
     def taking(self, count: int) -> Generator[None, None, list[Next]]:
-        """The touches that bring most, at most so many, far from each other; none where all is covered.
-
-        Yields before places are looked at, some at once.
-        """
+        """At most `count` touches, far apart, that bring most. Yields each time before it looks at places."""
         self._forget_covered()
         found: list[Next] = []
         aside: list[tuple[float, int, Place]] = []
@@ -133,10 +132,10 @@ class Frontier:
         return found
 
     def uncovered(self, charts: Charts) -> Generator[None, None, list[Place]]:
-        """Places where a touch would bring something beside joined patches, but there was none, or in vain.
+        """Places where a touch would still bring something once patches are joined.
 
         Patches alone may be off at their rims by so much that others seem not to cover them. Yields before
-        each place where touches were in vain.
+        each place from which touches went on in vain.
         """
         self.charts = charts
         found = still_open([place for _, _, place in sorted(self.queue)], charts)
@@ -147,13 +146,13 @@ class Frontier:
         return found
 
     def _forget_covered(self) -> None:
-        """Places that patches have come to cover, all at once."""
+        """Takes the places that patches now cover out of the queue."""
         still = {id(place) for place in still_open([place for _, _, place in self.queue], self.charts)}
         self.queue = [entry for entry in self.queue if id(entry[2]) in still]
         heapq.heapify(self.queue)
 
     def beyond(self, places: Sequence[Place]) -> list[Next | None]:
-        """The touches that go on from places; None where one would bring nothing."""
+        """The touch that goes on from each place, or None if it would bring nothing."""
         found: list[Next | None] = [None] * len(places)
         for share in REACHES:
             left = [i for i, touch in enumerate(found) if touch is None]
@@ -166,7 +165,7 @@ class Frontier:
         return found
 
     def _uncovered(self, disks: Sequence[list[Contact]]) -> list[NDArray[np.intp]]:
-        """Which contacts of each disk no patch covers."""
+        """The indices of those contacts of each disk that no patch covers."""
         assert self.charts is not None
         flat = np.array([contact for hits in disks for contact in hits]).reshape(-1, 2, 3)
         free = ~covered(self.charts, flat[:, 0], flat[:, 1])
@@ -174,7 +173,7 @@ class Frontier:
         return [np.flatnonzero(some) for some in np.split(free, ends[:-1])]
 
     def _touch(self, place: Place, share: float, hits: list[Contact], new: NDArray[np.intp]) -> Next | None:
-        """The touch in the middle of those of a disk's contacts that are new, if it brings enough."""
+        """The touch in the middle of the new ones among a disk's contacts, if it brings enough."""
         disk = math.pi * (min(1.0, DISK_REACHES * share) * place.radius) ** 2
         area = len(new) / (DISK_PLACES + 1) * disk
         if area <= max(SLIVER * disk, self.least):
@@ -183,7 +182,7 @@ class Frontier:
         return Next(np.array(point), np.array(outward), area, place)
 
     def felt(self, hit: Hit | None, way: Vector) -> Contact | None:
-        """The contact of a ray that goes that way; none at its back: there the finger is inside."""
+        """The contact where a ray in this direction has hit, or None if it came from inside the object."""
         if hit is None:
             return None
         normal = scaled(vector_of(hit[1]), self.side)
@@ -193,7 +192,7 @@ class Frontier:
         """The first contact of a finger that goes s ahead from a place, then down, back and up."""
         up, down, t = place.normal, scaled(place.normal, -1.0), place.ahead
         height = min(s, LOW * place.radius)
-        for start in (0.0, -0.5 * s):  # the patch may end a little beyond its surface
+        for start in (0.0, -0.5 * s):  # The patch may end a little beyond its surface.
             above = along(along(place.point, up, height), t, start)
             found = self.felt(self.surface.ray_cast(above, down, 2.0 * height), down)
             if found is not None:
@@ -209,9 +208,9 @@ class Frontier:
         return None
 
     def disk(self, place: Place, share: float) -> list[Contact]:
-        """The contact that is a share of the radius ahead of a place, if any, and those on a disk around it.
+        """The contact at a share of the radius ahead of a place, followed by those on a disk around it.
 
-        Rays onto the disk measure it: beyond an edge there is nothing to add.
+        Rays onto the disk measure how much surface there is. Without a contact ahead the list is empty.
         """
         contact = self.ahead(place, share * place.radius)
         if contact is None:
@@ -242,7 +241,7 @@ def _is_near(place: Place, touch: Next) -> bool:
 
 
 def _between(points: Array, tried: Sequence[Vector]) -> int:
-    """Which of the points (n, 3) is in the middle of them, or farthest from where touches were in vain."""
+    """The index of the point (n, 3) in the middle of all, or farthest from where touches were in vain."""
     if not tried:
         return int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
     apart = points[:, None] - np.array(tried)

@@ -1,14 +1,13 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches of one object as tables, and joined: each a spline through all contacts on it, of all patches.
+"""Patches of one object as tables, and joined: each becomes a spline through the contacts of all patches.
 
-A patch alone knows its own few curves, and the blend of such patches is farther off than a surface through
-all contacts. Where patches overlap they are made to agree.
+A patch alone knows only its own few curves, and the blend of such patches is farther off than a surface
+through all contacts. Where patches overlap, they are moved until they agree.
 """
 
 from collections.abc import Generator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,37 +17,27 @@ from ..contours.contour import Contour
 from ..patch.smoothing_spline import SIDE, between, smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
-from .field import FACING, Blend, blended
+from .field import FACING, LAYER, Blend, Felt, blended
 
 # python -m benchmarks.atlas chose these.
-ALIGNED = 0.75  # cosine of the angle between a contact's normal and the patch's there, at least
-UNDOUBTED = 2.0  # deviations of a patch: a contact that is off by fewer weighs 1
-LOOSER = 5.0  # how much larger they are a radius beyond the rim, where a patch alone is less certain
-FARTHEST = 3.0  # times that: a contact farther off is of another wall
-LEAST_NOISE = 5e-4  # share of the radius
-PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # patches, and contacts or other places of all, in a step
-KNOTS_WITHIN = 1.3  # times a domain's radius: how far out heights are asked at knots
-MOVED = 0.03  # share of the radius: a place of a patch is moved by less
-ASKEW = 0.3  # share of the way to a contact: how far the field may be off the contact's tangent plane
-AROUND = 2.0  # times the room: how near a contact tells alone,
-SURE = 0.5  # if the place is off its plane by this share of the way to it
-NEARER = 0.5  # share of how far the field is off that plane, that a patch of the contact's wall is at most
+ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.
+UNDOUBTED = 2.0  # A contact that is off a patch by fewer of its deviations weighs 1.
+LOOSER = 5.0  # So many times larger they count a radius beyond the rim, where a patch is less certain.
+FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another wall.
+LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
+PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes so many patches, or so many places.
+KNOTS_WITHIN = 1.3  # A patch is asked for heights at knots up to so many times its domain's radius.
+MOVED = 0.03  # A place of a patch is moved by less than this share of the radius.
+ASKEW = 0.3  # The field contradicts a contact if it is off its tangent plane by this share of the way to it.
+SURE = 0.7  # A place that is off a contact's plane by this share of the way to it is surely on that side.
+NEARER = 0.5  # A patch of the contact's wall is off that plane by at most this share of what the field is.
 
-Table = tuple[Array, float, Array, Array]  # radii of the domain, half the side, coefficients, deviations
+Table = tuple[Array, float, Array, Array]  # Radii of the domain, half the side, coefficients, deviations.
 Joining = Generator[float, None, Charts]
 
 
-class Felt(NamedTuple):
-    """Contacts and normals of their patches there, (n, 3), indices of these patches (n,), and a tree."""
-
-    points: Array
-    normals: Array
-    node: NDArray[np.intp]
-    tree: Any
-
-
 def felt_by(results: Sequence[Reconstruction], charts: Charts) -> Felt:
-    """The contacts of patches."""
+    """The contacts that patches were fitted to; `charts` are the tables of these patches."""
     from scipy.spatial import cKDTree
 
     parts = [np.vstack([r.strokes, *(contour.points for contour in r.contours)]) for r in results]
@@ -58,20 +47,42 @@ def felt_by(results: Sequence[Reconstruction], charts: Charts) -> Felt:
 
 
 def told(charts: Charts, felt: Felt, points: Array, room: float = 0.0) -> Blend:
-    """The field at places (k, 3), as `blended` has it where no contact contradicts that.
+    """The field at places (k, 3): that of `blended`, where the nearest contact does not contradict it.
 
     Near an edge, patches alone do not tell whether the inside is in both walls or in either. Contacts are on
     the surface: if the nearest one contradicts the field, and is inside the wall that the field took, the
-    inside is in both that wall and the contact's; if it is outside of it, in either. Beyond a corner that no
-    patch reaches, the nearest contact's plane tells the side of a place within a few times `room`, a length.
+    inside is in both that wall and the contact's; if it is outside of it, in either.
+
+    Beyond the rims of all patches contacts tell alone, where no patch reaches or the nearest contact is for
+    certain on the other side. There the deviation is inf, unless a contact is as near as a patch would reach.
     """
     field = blended(charts, points, room)
     away, nearest = felt.tree.query(points)
     plane = np.einsum("ki,ki->k", points - felt.points[nearest], felt.normals[nearest])
+    _take_walls(charts, felt, field, points, nearest, plane, away)
+    against = ((plane < 0.0) != (field.distance < 0.0)) & (np.abs(plane) > SURE * away)
+    alone = np.flatnonzero((field.node < 0) | (against & ~np.isfinite(field.std)))
+    node, away = felt.node[nearest[alone]], away[alone]
+    field.distance[alone], field.normal[alone] = felt.told_alone(points[alone])
+    near = np.hypot(charts.mean_stds[node], away)
+    field.std[alone] = np.where(away < LAYER * charts.radii[node], near, np.inf)
+    field.node[alone] = node
+    return field
+
+
+def _take_walls(
+    charts: Charts,
+    felt: Felt,
+    field: Blend,
+    points: Array,
+    nearest: NDArray[np.intp],
+    plane: Array,
+    away: Array,
+) -> None:
+    """Changes the field where the nearest contacts, which are `away` by so much, contradict it."""
     off = np.abs(field.distance - plane)
     some = np.flatnonzero((off > ASKEW * away) & (field.node >= 0))
-    pairs = charts.pairs(points[some], room)
-    pairs = pairs.chosen(pairs.share < MARGIN)
+    pairs = charts.pairs(points[some])
     miss = np.abs(pairs.distance - plane[some[pairs.place]])
     order = np.lexsort((miss, pairs.place))
     pair = order[np.flatnonzero(np.diff(pairs.place[order], prepend=-1))]
@@ -81,17 +92,13 @@ def told(charts: Charts, felt: Felt, points: Array, room: float = 0.0) -> Blend:
     takes = inside == (other.distance > field.distance[at])
     for values, better in zip(field, (other.distance, other.std, other.normal, other.node), strict=True):
         values[at[takes]] = better[takes]
-    alone = (field.node < 0) & (away < AROUND * room) & (np.abs(plane) > SURE * away)
-    field.distance[alone], field.node[alone] = plane[alone], felt.node[nearest[alone]]
-    return field
 
 
 def _inside(charts: Charts, node: NDArray[np.intp], points: Array) -> NDArray[np.bool_]:
-    """Whether points (k, 3) are below one patch each."""
+    """Whether each of the points (k, 3) is below the patch `node` (k,)."""
     x, y, _ = charts.local(points, np.arange(len(points)), node).T
     feet, normals = charts.world(node, x, y)
-    below: NDArray[np.bool_] = np.einsum("ki,ki->k", points - feet, normals) < 0.0
-    return below
+    return np.less(np.einsum("ki,ki->k", points - feet, normals), 0.0)
 
 
 def joined(
@@ -101,9 +108,10 @@ def joined(
     noise: float,
     known: dict[int, tuple[int, Table]],
 ) -> Joining:
-    """The charts of patches by all contacts on them; `charts` know but their own. Yields the share done.
+    """The tables of patches fitted to all contacts on them, moved to agree. Yields the share that is done.
 
-    known : for patches that were joined before, the number of contacts and the table; changed in place
+    charts : the tables of the same patches, fitted to their own contacts alone
+    known : number of contacts and table of each patch that was joined before; changed in place
     """
     points, normals, owner = _contacts(contours)
     parts = []
@@ -129,7 +137,7 @@ def joined(
 def _joined_table(
     r: Reconstruction, some: Pairs, points: Array, normals: Array, own: NDArray[np.bool_], noise: float
 ) -> Table:
-    """The table of a patch with those contacts of `some` that are likely to be on it."""
+    """The table of a patch, fitted to those contacts among `some` that are likely to be on it."""
     rim, half = _square(r)
     least = max(noise / r.radius, LEAST_NOISE)
     likely = np.hypot(least, UNDOUBTED * r.mean_height_std / r.radius)
@@ -145,7 +153,7 @@ def _joined_table(
 
 
 def _agreed(charts: Charts) -> Joining:
-    """Patches moved onto the surface that all of them make; yields 1."""
+    """The patches moved onto the blend of all of them; yields 1 after each part."""
     from scipy.ndimage import spline_filter
 
     x, y = charts.knots().reshape(2, -1)
@@ -162,7 +170,7 @@ def _agreed(charts: Charts) -> Joining:
 
 
 def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
-    """How far patches are from the surface of all above local (x, y), along their axes and in unit radius."""
+    """How far patches (k,) have to move above local (x, y), in unit radius, to lie on the blend."""
     points, _ = charts.world(node, x, y)
     field = blended(charts, points)
     up = np.einsum("ki,ki->k", field.normal, charts.axes[node, :, 2])
@@ -172,7 +180,7 @@ def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
 
 
 def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[np.intp]]:
-    """All contacts, their unit normals, (n, 3), and whose they are, (n,)."""
+    """All contacts and their unit normals, (n, 3) each, and the indices (n,) of the patches they are of."""
     flat = [(i, contour) for i, some in enumerate(contours) for contour in some]
     points = np.vstack([contour.points for _, contour in flat])
     normals = np.vstack([contour.normals for _, contour in flat])  # type: ignore[misc]
@@ -182,12 +190,12 @@ def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[
 
 
 def charts_of(results: Sequence[Reconstruction], deviations: bool = True) -> Charts:
-    """Patches alone as tables; without their deviations where these, which cost most, are not asked for."""
+    """The tables of patches, each fitted to its own contacts alone; `deviations` may be left out, as 0."""
     return stacked(results, [table_of(r, deviations) for r in results])
 
 
 def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Charts:
-    """Patches with their tables."""
+    """The tables of patches put together."""
     rims, halves, heights, stds = (np.array(values) for values in zip(*tables, strict=True))
     return Charts(
         np.array([r.frame.origin for r in results]),
@@ -201,7 +209,7 @@ def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Chart
 
 
 def table_of(r: Reconstruction, deviations: bool) -> Table:
-    """The table of a patch alone."""
+    """The table of a patch fitted to its own contacts alone."""
     from scipy.ndimage import spline_filter
 
     rim, half = _square(r)
@@ -209,7 +217,7 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
     x, y = (axis.ravel() for axis in np.meshgrid(knots, knots, indexing="ij"))
     at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
     share = np.hypot(x, y) / np.interp(at, np.arange(AZIMUTHS + 1), np.append(rim, rim[0]))
-    # A sextic that is asked farther out runs away, and the spline would carry that inward.
+    # Farther out a sextic runs away, and the spline would carry that inward.
     pull = r.radius * np.minimum(1.0, KNOTS_WITHIN / np.maximum(share, 1e-9))
     heights = r.height(pull * x, pull * y).reshape(SIDE, SIDE) / r.radius
     stds = _stds(r, pull * x, pull * y) if deviations else np.zeros((SIDE, SIDE))
@@ -217,15 +225,15 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
 
 
 def _square(r: Reconstruction) -> tuple[Array, float]:
-    """The domain's radii, and half the side of the square of knots, which leaves a margin for the spline."""
+    """The domain's radii, and half the side of the square of knots, with a margin for the spline."""
     rim = _rim(r)
     return rim, float(1.05 * MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 5)
 
 
 def _rim(r: Reconstruction) -> Array:
-    """The domain's radii (AZIMUTHS,), in unit radius, nowhere larger than the curves on either side are long.
+    """The domain's radii (AZIMUTHS,), in unit radius, nowhere beyond what lies between the ends of curves.
 
-    Between ends at very different distances the spline swings out to where nothing was felt.
+    Between ends at very different distances the domain's spline swings out to where nothing was felt.
     """
     ends = r.domain.ends / r.radius
     turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
@@ -236,7 +244,7 @@ def _rim(r: Reconstruction) -> Array:
 
 
 def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
-    """Deviations (SIDE, SIDE), found at every other knot: they are smooth, and cost the most."""
+    """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and cost the most."""
     coarse = slice(None, None, 2)
     x, y = x.reshape(SIDE, SIDE)[coarse, coarse], y.reshape(SIDE, SIDE)[coarse, coarse]
     return between(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

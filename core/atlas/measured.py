@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An atlas of contacts that were measured, such as a robot's rasters: no surface can be asked for more."""
+"""An atlas of contacts that were measured before, such as a robot's rasters, where no more can be felt."""
 
 from collections.abc import Generator, Sequence
 from typing import Any, NamedTuple
@@ -17,13 +17,14 @@ from .field import FACING
 from .join import charts_of
 from .object_atlas import Atlas
 
-FEWEST = 40  # contacts of the smallest patch
-SOME_PLACES = 24  # which are asked how large a patch has to be
-WIDENING, WIDENINGS = 1.4, 10  # the factor by which patches grow, and how often
-MISSED = 3.0  # times what is expected: how far contacts may be off a patch in the median
-PATCHES_APART = 0.6  # radii from one patch to the next
-NEIGHBORS = 16  # contacts whose plane gives the normal of one where none was measured
-GROWN = 0.012  # share of the radius: how uncertain a patch may be on average where there is no tolerance
+# python -m benchmarks.robot judges these.
+FEWEST = 40  # The smallest patch has so many contacts.
+SOME_PLACES = 24  # At so many places it is tried how large a patch has to be.
+WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most so often.
+MISSED = 3.0  # Contacts are off a patch, in the median, by at most so many times what is expected.
+PATCHES_APART = 0.6  # Patches are so many radii from each other.
+NEIGHBORS = 16  # The plane of so many neighbors gives the normal of a contact where none was measured.
+GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 
 
 def atlas_of(
@@ -33,9 +34,9 @@ def atlas_of(
     tolerance: float | None = None,
     noise: float | None = None,
 ) -> Atlas:
-    """The atlas of measured contacts: contours, with normals or without, and strokes (n, 3).
+    """The atlas (paper, VI) of measured contacts: contours, with normals or without, and strokes (n, 3).
 
-    outward : (3,), on the outer side of all contacts; required where some have no normals that face outward
+    outward : (3,), a direction to the outer side of all contacts; required if some have no outward normals
     tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
     noise : standard deviation of a contact; None for the contours' own
 
@@ -69,7 +70,7 @@ def cover_contacts(
 
 
 def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -> tuple[Array, Array, float]:
-    """Contacts and outward normals (n, 3), and the largest noise that is known."""
+    """Contacts and outward normals, (n, 3) each, and the largest noise that any contour states."""
     strokes = [
         stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
         for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
@@ -89,7 +90,7 @@ def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -
 
 
 def _normals(points: Array, up: Array) -> Array:
-    """Normals (n, 3) of the planes nearest to the neighbors of each contact, on the side of `up`."""
+    """Normals (n, 3) of the planes through the neighbors of each contact, on the side of `up`."""
     from scipy.spatial import cKDTree
 
     near = cKDTree(points).query(points, min(NEIGHBORS, len(points)))[1]
@@ -99,7 +100,7 @@ def _normals(points: Array, up: Array) -> Array:
 
 
 class _Cloud(NamedTuple):
-    """Contacts and normals (n, 3), a tree of them, their noise, and the deviation that patches grow to."""
+    """Contacts and normals (n, 3), a KD-tree, the noise, and the deviation up to which patches grow."""
 
     points: Array
     normals: Array
@@ -108,7 +109,7 @@ class _Cloud(NamedTuple):
     largest: float | None
 
     def patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The patch of the contacts around one of them that face its way, if they carry one."""
+        """The patch of those contacts around contact i that face the same way, or None if they carry none."""
         near = np.array(self.tree.query_ball_point(self.points[i], radius))
         near = near[self.normals[near] @ self.normals[i] > FACING]
         strokes, place, outward = [[self.points[near]]], self.points[i][None], self.normals[i][None]
@@ -116,7 +117,7 @@ class _Cloud(NamedTuple):
         return r if isinstance(r, Reconstruction) else None
 
     def largest_patch(self, i: int, radius: float) -> Reconstruction | None:
-        """The largest patch around a contact that is certain enough, or the smallest where none is."""
+        """The largest patch around contact i that is certain enough, or the smallest, or None."""
         best = None
         for _ in range(WIDENINGS):
             r = self.patch(i, radius)
@@ -130,7 +131,10 @@ class _Cloud(NamedTuple):
         return best
 
     def least_radius(self) -> Generator[float, None, float]:
-        """The radius at which half of some contacts carry a patch: they may lie in lines. Else ValueError."""
+        """The least radius at which patches exist at half of some places, for contacts may lie in lines.
+
+        Raises ValueError if there is none. Yields 0 after each trial.
+        """
         some = np.linspace(0, len(self.points) - 1, SOME_PLACES).astype(np.intp)
         radius = float(np.median(self.tree.query(self.points[some], FEWEST)[0][:, -1]))
         for _ in range(WIDENINGS):
@@ -145,7 +149,7 @@ class _Cloud(NamedTuple):
 
 
 def _patches(cloud: _Cloud) -> Generator[float, None, list[Reconstruction]]:
-    """Patches at contacts that none so far covers, one after the other, each as large as it may be."""
+    """Patches, as large as they may be, at contacts that no earlier one covers; yields the share covered."""
     radius = yield from cloud.least_radius()
     left, found = np.ones(len(cloud.points), dtype=bool), []
     for i in range(len(left)):

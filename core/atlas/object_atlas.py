@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole object as what it was felt to be: the paper's graph of patches, and one surface of all of them."""
+"""A whole object as it was felt (paper, VI): the graph of its patches, and one surface of all of them."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -16,17 +16,17 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
-from .field import AGREE, FACING, INSIDE, LAYER, blended, node_weights
+from .field import AGREE, FACING, INSIDE, LAYER, Felt, blended, node_weights
 from .frontier import Place
-from .join import Felt, felt_by, told
+from .join import felt_by, told
 from .meshing import LEAST_DIVISOR, Mesh, meshed
 
-GRAPH_VERSION = 1  # of the graph as data
-SAMPLE_TURNS, SAMPLES_OUTWARD = 16, 6  # samples of each patch, from which what is far away is measured
+GRAPH_VERSION = 1  # The version of the graph as plain values.
+SAMPLE_TURNS, SAMPLES_OUTWARD = 16, 6  # From far away distances are those of so many samples of each patch.
 
 
 class NextTouch(NamedTuple):
-    """Where to touch next, (3,) each, and the gain: the area that is not known well enough."""
+    """Where to touch next, (3,) each, and the gain: the area there that is not known well enough."""
 
     point: Array
     outward: Array
@@ -34,7 +34,7 @@ class NextTouch(NamedTuple):
 
 
 class _Samples(NamedTuple):
-    """Points and normals (n, 3) of the surface, deviations (n,), and a tree; at an open rim they are inf."""
+    """Points and normals (n, 3) of the surface, deviations (n,), inf at an open rim, and a KD-tree."""
 
     points: Array
     normals: Array
@@ -44,11 +44,11 @@ class _Samples(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Overlapping patches: the nodes of a graph whose edges are the curves where one takes over from another.
+    """Overlapping patches: the nodes of a graph (paper, VI) whose edges are the curves where they meet.
 
-    patches : those of the n nodes
-    charts : the same as tables
-    tolerance : a length that the touches were to reach; None if there was none
+    patches : the n nodes
+    charts : the same patches as tables
+    tolerance : mean deviation of the height that the touches were to reach, a length; None if there was none
     uncovered : places on rims beyond which the object goes on unfelt
     """
 
@@ -59,19 +59,19 @@ class Atlas:
 
     @cached_property
     def edges(self) -> list[Edge]:
-        """Pairs of patches that share a boundary, with this boundary."""
+        """All pairs of patches that share a boundary, each with this boundary."""
         edges: list[Edge] = result_of(edges_of(self.charts))
         return edges
 
     def bounding(self) -> Generator[float, None, None]:
-        """What `edges` does, in steps: yields the share that is done, after which `edges` are known."""
+        """Finds `edges` in steps: yields the share that is done."""
         if "edges" not in vars(self):
             vars(self)["edges"] = yield from edges_of(self.charts)  # where cached_property looks
 
     def bends(self, edge: Edge) -> tuple[Array, Array]:
-        """Gaussian curvatures (2, m) of both patches along their boundary, and standard deviations there.
+        """Gaussian curvatures (2, m) of both patches along their boundary, and standard deviations (2, m).
 
-        They are those of the touches' polynomials, which know less of them at a rim than at the point.
+        They follow from the polynomials of the touches, which are less certain at a rim than at the point.
         """
         curvatures, stds = zip(
             *(gaussian_curvature_of(self.patches[node], edge.curve) for node in edge.nodes), strict=True
@@ -107,11 +107,11 @@ class Atlas:
 
     @cached_property
     def _uncertain(self) -> list[int]:
-        """Patches less certain than the tolerance, the worst first."""
+        """Indices of the patches less certain than the tolerance, the worst first."""
         return self.charts.less_certain_than(np.inf if self.tolerance is None else self.tolerance)
 
     def next_touch(self) -> NextTouch | None:
-        """Where the next touch would bring most; None if all is covered to the tolerance."""
+        """Where the next touch would bring most, or None if all is covered to the tolerance."""
         if self.uncovered:
             place = max(self.uncovered, key=lambda place: place.radius)
             area = np.pi * place.radius**2
@@ -124,18 +124,18 @@ class Atlas:
     def distance(self, points: ArrayLike) -> tuple[Array, Array]:
         """Signed distances (n,) of points (n, 3), negative inside, and their standard deviations (n,).
 
-        Beyond the patches' reach the distance is that of the nearest place that was felt, and the deviation
-        inf where that is at an open rim, so that something unfelt might be nearer.
+        Beyond the reach of the patches it is the distance of the nearest place that was felt. If that is on
+        an open rim, something unfelt might be nearer, and the deviation is inf.
         """
         p = finite_array("points", points, (None, 3), LARGEST)
         field = told(self.charts, self._felt, p)
-        distance, std, far = field.distance.copy(), field.std.copy(), np.flatnonzero(field.node < 0)
+        distance, std, far = field.distance.copy(), field.std.copy(), np.flatnonzero(~np.isfinite(field.std))
         if len(far):
             distance[far], std[far] = self._far(p[far])
         return distance, std
 
     def _far(self, points: Array) -> tuple[Array, Array]:
-        """Distances and deviations (n,) by the nearest sample: positive on the side that it faces."""
+        """Distances and deviations (n,) from the nearest sample, positive on the side that it faces."""
         samples = self._samples
         away, nearest = samples.tree.query(points)
         ahead = np.einsum("ni,ni->n", points - samples.points[nearest], samples.normals[nearest])
@@ -173,9 +173,9 @@ class Atlas:
         return mesh
 
     def suggested_edge(self) -> float:
-        """An edge at which triangles are off the surface by half its deviation, in the median of the patches.
+        """The edge at which triangles are off the surface by half its deviation, as a median of the patches.
 
-        A chord e of a circle of curvature k is off it by k e^2 / 8; an edge is no longer than half a radius.
+        A chord e of a circle of curvature k is off it by k e^2 / 8. The edge is at most half a radius long.
         """
         bends = np.array([max(abs(r.patch.k1), abs(r.patch.k2)) for r in self.patches])
         stds, radii = self.charts.mean_stds, self.charts.radii
@@ -183,7 +183,7 @@ class Atlas:
         return float(np.median(np.minimum(chords, 0.5 * radii)))
 
     def curvatures(self, mesh: Mesh) -> dict[str, Array]:
-        """Those of `curvatures_at` at the vertices of its mesh."""
+        """The curvatures of `curvatures_at` at the vertices of a mesh of this atlas."""
         return self.curvatures_at(mesh.vertices, mesh.normals)
 
     def curvatures_at(self, points: Array, normals: Array) -> dict[str, Array]:
@@ -192,12 +192,11 @@ class Atlas:
         points, normals : (n, 3)
 
         K and H are means over the polynomials (1) of the touches there, each with its patch's weight in the
-        blended surface; the others follow from these. Where there is no patch, all are 0.
-
-        Joined patches follow facets: their second derivatives are rougher than the polynomials'.
+        blended surface; the others follow from these. Where there is no patch, all are 0. Joined patches are
+        not asked, because they follow facets, which makes their second derivatives rougher.
         """
         gauss, mean = _blended_curvatures(self, points, normals)
-        half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # of the difference of kappa1 and kappa2
+        half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # half the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,
             "mean_curvature": mean,
@@ -206,17 +205,17 @@ class Atlas:
         }
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
-        """What `mesh` does, in steps: yields the share that is done, and returns the mesh."""
+        """Makes the `mesh` in steps: yields the share that is done, and returns the mesh."""
         return meshed(self.charts, self._felt, number("edge", edge, above=0.0))
 
     def to_dict(self) -> dict[str, Any]:
-        """The graph as a dict of numbers, words, lists and dicts, as JSON has them, in the caller's unit.
+        """The graph as JSON has it: a dict of numbers, words, lists and dicts, in the caller's unit.
 
         nodes : frame, radius, polynomial (1), ends of the domain, deviation and status of each patch
         edges : indices of two nodes, their boundary curve, and the angle of their normals along it
         uncovered, next_touch : where the object goes on, and where a touch would bring most, or None
 
-        The `to_dict` of a patch has all of it, and is thirty times as large.
+        The `to_dict` of each patch tells all about it, and is thirty times as large.
         """
         touch, stds = self.next_touch(), self.charts.mean_stds
         return {
@@ -230,7 +229,7 @@ class Atlas:
 
 
 def _blended_curvatures(atlas: Atlas, points: Array, normals: Array) -> tuple[Array, Array]:
-    """Means of K and H (n,) at points, over the patches of their own wall."""
+    """Means of K and of H, (n,) each, at points (n, 3), over the patches that face their normals (n, 3)."""
     charts = atlas.charts
     pairs = charts.pairs(points)
     facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])

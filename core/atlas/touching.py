@@ -21,22 +21,26 @@ from .frontier import Frontier
 from .join import Table, joined
 from .object_atlas import Atlas
 
-MOST = 1000  # touches, unless the caller says otherwise
-FIRST_EXTENT = 300.0  # times the tolerance: the longest half curve of the first touch
-SIZE = 1.5  # times the tolerance: how uncertain a patch may be before its neighbors are known
-SMALL = 5.0  # times it: others do not go on from a patch of a smaller radius
-NARROW = 1.0  # times it: the least radius of a patch where a touch was in vain before
-SIDE_BY_SIDE = 4  # touches at once: some times as fast, and still done in a tenth of a second
-AGAIN = 2  # how often patches less certain than the tolerance are touched again
-LARGER = 2.0  # times the radius of the patch where it begins: how far a touch may reach
+# python -m benchmarks.atlas judges these.
+MOST = 1000  # There are at most so many touches, unless the caller says otherwise.
+FIRST_EXTENT = 300.0  # A half curve of the first touch is at most so many tolerances long.
+SIZE = 1.5  # A patch may have a mean deviation of so many tolerances before its neighbors are known.
+SMALL = 5.0  # Touches do not go on from a patch whose radius is below so many tolerances.
+NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only so many tolerances.
+SIDE_BY_SIDE = 4  # So many touches at once are faster, and still done in a tenth of a second.
+AGAIN = 2  # Patches less certain than the tolerance are touched again at most so often.
+LARGER = 2.0  # A touch reaches at most so many radii of the patch from which it goes on.
 
-Contact = tuple[Array, Array]  # a point and its normal, (3,) each
+Contact = tuple[Array, Array]  # A point and its normal, (3,) each.
 
 
 class Progress(NamedTuple):
-    """Touches done, places known to be uncovered, and the touches since the last Progress.
+    """How far the touches of an object are.
 
-    joining : the share of the patches that are joined; None while the object is touched
+    done : number of touches
+    uncovered : number of places that are known to be uncovered
+    found : the touches since the last Progress
+    joining : share of the patches that are joined; None while the object is touched
     """
 
     done: int
@@ -58,10 +62,10 @@ def touch_all_over(
     most: int = MOST,
     rng: np.random.Generator | int | None = None,
 ) -> Steps:
-    """What `explore_object` does, in steps: yields a Progress after each, and returns the Atlas.
+    """Does what `explore_object` does in steps: yields a Progress after each, and returns the Atlas.
 
     If it is sent False, it stops touching and joins the patches so far. Arguments and errors are those of
-    `explore_object`; the errors come with the first step.
+    `explore_object`; errors are raised in the first step.
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     tolerance, noise = number("tolerance", tolerance, above=0.0), number("noise", noise, least=0.0)
@@ -75,7 +79,7 @@ def touch_all_over(
 
 
 def _all_over(run: "_Run", more: bool) -> Generator[Progress, bool | None, bool]:
-    """Touches until nothing within reach is uncovered; returns whether nobody has sent False."""
+    """Touches until nothing within reach is uncovered. Returns whether to go on: False once False is sent."""
     while more and run.done < run.most:
         chosen, more = yield from _told(run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)), run.now)
         if not chosen or not more:
@@ -93,7 +97,7 @@ def _all_over(run: "_Run", more: bool) -> Generator[Progress, bool | None, bool]
 def _told(
     steps: Generator[Any, None, Any], progress_of: Callable[[Any], Progress]
 ) -> Generator[Progress, bool | None, tuple[Any, bool]]:
-    """What steps return, and whether nobody has sent False; tells the progress of what they yield."""
+    """Runs steps and yields a Progress for each. Returns their result, and False once False is sent."""
     more = True
     while True:
         try:
@@ -104,7 +108,7 @@ def _told(
 
 
 class _Run:
-    """Touches so far, and what all of them have in common."""
+    """The touches so far, and what all of them have in common."""
 
     def __init__(self, surface: Surface, tolerance: float, most: int, wanted: dict[str, Any]) -> None:
         self.surface, self.tolerance, self.most, self.wanted = surface, tolerance, most, wanted
@@ -112,7 +116,7 @@ class _Run:
         self.done = 0
 
     def first(self, point: Array, up: Array) -> Progress:
-        """The touch from which all others go on; raises ValueError where there is none."""
+        """Makes the touch from which all others go on. Raises ValueError if it fails."""
         first = explore(self.surface, point, up, farthest=FIRST_EXTENT * self.tolerance, **self.wanted)
         p, n = vector_of(point), vector_of(up)
         side = first_contact(self.surface, p, n, tangent_of(n, None), first.step)[2]
@@ -122,22 +126,22 @@ class _Run:
         return self.now(new=[first])
 
     def now(self, joining: float | None = None, new: Sequence[Exploration] = ()) -> Progress:
-        """The Progress so far, with new touches."""
+        """The Progress so far, with the new touches."""
         return Progress(self.done, len(self.frontier.queue), tuple(new), joining)
 
     def touch(
         self, contacts: Sequence[Contact], farthest: float, least: Sequence[float]
     ) -> Generator[None, None, list[Exploration]]:
-        """Touches at places, where there can be one as wide as the least; the frontier has their rims.
+        """Touches at contacts; returns those that succeed, and adds their rims to the frontier.
 
-        least : times the tolerance; along a crease narrow ones would go on without end
+        least : the least radius of each, in tolerances; along a crease narrow ones would go on without end
         """
         points, outward = (np.array(values) for values in zip(*contacts, strict=True))
         results = yield from exploring(self.surface, points, outward, farthest=farthest, **self.wanted)
         new = []
         for e, up, times in zip(results, outward, least, strict=True):
             if isinstance(e, ValueError) or e.result.frame.axes[:, 2] @ up < FACING:
-                continue  # at an edge a fit may end on its other side
+                continue  # At an edge a fit may end up on the other side.
             if e.result.radius >= times * self.tolerance:
                 self.frontier.add(e.result, goes_on=e.result.radius >= SMALL * self.tolerance)
                 new.append(e)
@@ -147,14 +151,14 @@ class _Run:
         return new
 
     def joining(self, known: dict[int, tuple[int, Table]]) -> Generator[float, None, Charts]:
-        """Joined patches; yields the share of them."""
+        """The joined patches; yields the share that is done."""
         assert self.frontier.charts is not None
         contours, results = [e.contours for e in self.found], [e.result for e in self.found]
         yield 0.0
         return (yield from joined(contours, results, self.frontier.charts, self.wanted["noise"], known))
 
     def missing(self, charts: Charts, rough: list[int]) -> list[Contact | None]:
-        """For each of these patches the contact in the middle of those that no other covers, or None."""
+        """For each patch of `rough` the contact in the middle of those that no other covers, or None."""
         others = charts.chosen(np.setdiff1d(np.arange(len(self.found)), rough))
         found: list[Contact | None] = []
         for i in rough:
@@ -169,7 +173,7 @@ class _Run:
 def _joined(run: _Run, more: bool) -> Steps:
     """The atlas of what was found, after more touches where patches are less certain than the tolerance.
 
-    Patches that stay less certain are left out where others cover all that they felt.
+    Patches that stay less certain are left out if others cover all that they have felt.
     """
     known: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
@@ -202,13 +206,15 @@ def explore_object(
     rng: np.random.Generator | int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Atlas:
-    """Touches a whole object, from one reference point on, and joins the patches to one surface.
+    """Touches a whole object (paper, VI), from one reference point on, and joins the patches to one surface.
 
-    point, outward : (3,), where to begin, and the outward direction
-    tolerance : a length; the mean deviation of each patch's height should be below it
+    point, outward : (3,), where to begin, and the outward direction there
+    tolerance : a length; touches go on until the mean deviation of each patch's height is below it, if
+        possible
     noise, rng : as in `explore`
-    most : touches
-    progress : called with the touches done and the places known to be uncovered; it returns False to end
+    most : the largest number of touches
+    progress : called with the numbers of touches and of places known to be uncovered; may return False to
+        stop
 
     The surface only has to answer rays. Raises ValueError for bad arguments, for a tolerance below the noise,
     and if the first touch fails. Where a later touch fails, the Atlas has an uncovered place.

@@ -3,8 +3,8 @@
 """Whether measured normals contradict the contacts that they were measured at.
 
 Beside the paper. Contacts alone show the surface's slopes and second derivatives at the point, and so do
-normals: how far apart the two are is judged by the deviations of both. The normals of a texture scatter
-about the patch by more than was claimed, which is no contradiction: so their scatter counts too.
+normals. How far apart the two are is judged by the deviations of both. The normals of a texture scatter about
+the patch by more than their deviation, which is no contradiction; so their scatter counts as deviation too.
 """
 
 import math
@@ -21,9 +21,9 @@ from .posterior import FREE, Posterior
 
 
 def measured_normals(contours: Sequence[Contour], frame: Frame, radius: float) -> tuple[Array, Array]:
-    """Contacts with measured normals, besides the reference point, in the frame and in unit radius, (n, 3).
+    """Contacts with measured normals, except the reference point, in the frame and in unit radius, (n, 3).
 
-    The second array holds these normals over their standard deviations, (n, 3).
+    Also these normals, divided by their standard deviations, (n, 3).
     """
     points, present, normals = stacked(frame.origin[None], [contours])
     if normals is None:
@@ -33,12 +33,12 @@ def measured_normals(contours: Sequence[Contour], frame: Frame, radius: float) -
 
 
 def contradiction(contacts: Array, normals: Array, posterior: Posterior) -> tuple[float, float]:
-    """The deviations, and the angle in the root mean square, by which normals contradict contacts.
+    """The number of deviations, and the angle in the root mean square, by which normals contradict contacts.
 
     contacts, normals : (n, 3), of `measured_normals`
-    posterior : what contacts leave open without any normal, in the same frame and unit
+    posterior : what contacts alone tell, in the same frame and unit
 
-    The angle is in radians. Both are 0 where there are too few normals to tell.
+    The angle is in radians. Both are 0 if there are too few normals to tell.
     """
     if 2 * len(normals) <= FREE:
         return 0.0, 0.0
@@ -50,7 +50,8 @@ def contradiction(contacts: Array, normals: Array, posterior: Posterior) -> tupl
         np.column_stack([steepness - slopes @ posterior.mean, slopes[:, :FREE]]),
     )
     off, free = whitened[:, 0], whitened[:, 1:]
-    apart = np.linalg.lstsq(free, off, rcond=None)[0]  # of the free terms, as normals and contacts show them
+    # The free terms of the normals less those of the contacts.
+    apart = np.linalg.lstsq(free, off, rcond=None)[0]
     told = free @ apart
     scatter = max(1.0, float(np.sum((off - told) ** 2)) / (len(off) - FREE))
     certainty = np.minimum(np.linalg.norm(normals, axis=1), 1.0 / SLOPE_MISFIT)

@@ -10,24 +10,24 @@ from ..arguments import Array
 from ..patch.monge import TERMS
 from .posterior import FREE, ORDERS
 
-WAVINESS_POWERS = ORDERS[FREE:] - 1.0  # Powers of the waviness, one for each term.
+WAVINESS_POWERS = ORDERS[FREE:] - 1.0  # The prior deviation of each term is this power of the waviness.
 # Chosen with benchmarks.accuracy.
 PRIOR_SCALE = 0.1
 WAVINESS = np.geomspace(0.15, 1.3, 6)
-USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # median and sigma of its log-normal prior
-NOISES = 5  # grid points, from the floor up
+USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # Median and sigma of the waviness's log-normal prior.
+NOISES = 5  # The grid of the noise has so many points, from the floor up.
 UPWARD = np.arange(NOISES) / (NOISES - 1.0)
 FREE_PRECISION = 1e-4  # Prior precision of the five free terms: nearly none, it keeps the matrix invertible.
-ROUNDING = 1e-13  # Share of the trace of a system.
-UNLIKELY = 1400.0  # -2 log likelihood beside the best, of which the exponential is still a number
-GROUP = 4  # touches whose likelihoods are computed at once (benchmarks.speed)
+ROUNDING = 1e-13  # Rounding takes at most this share of a system's trace.
+UNLIKELY = 1400.0  # The exponential of half this difference of -2 log likelihood is still a number.
+GROUP = 4  # The likelihoods of so many touches are computed at once (benchmarks.speed).
 
 
 class Restricted(NamedTuple):
-    """What contacts say of the terms of degree 3 to 6, whatever the free ones are.
+    """What b touches say of the terms of degree 3 to 6, whatever the free terms are.
 
-    triangle (b, 22, 22) @ coefficients ~ target (b, 22) in the sense of least squares, which leaves
-    `square` (b,) over; there are so many `contacts` (b,).
+    triangle (b, 22, 22) @ coefficients ~ target (b, 22) in the sense of least squares, which leaves the sum
+    of squares `square` (b,); each touch has `contacts` (b,) contacts.
     """
 
     triangle: Array
@@ -37,7 +37,7 @@ class Restricted(NamedTuple):
 
 
 class Hyperparameters(NamedTuple):
-    """Prior variances (b, 22), of the mean waviness, typical, and averaged over it; and noise (b,)."""
+    """Prior variances (b, 22), typical for the waviness and averaged over it, and the noise (b,)."""
 
     typical: Array
     variances: Array
@@ -45,7 +45,7 @@ class Hyperparameters(NamedTuple):
 
 
 class NormalEquations(NamedTuple):
-    """gram @ coefficients ~ seen, of so many `contacts` (b,) of this sum of squares, as one matrix.
+    """The normal equations gram @ coefficients = seen of b touches with `contacts` (b,), as one matrix each.
 
     bordered : (b, 28, 28), [[gram, seen], [seen', square]]
     """
@@ -55,17 +55,17 @@ class NormalEquations(NamedTuple):
 
     @property
     def gram(self) -> Array:
-        """(b, 27, 27)."""
+        """The matrix of the normal equations, (b, 27, 27)."""
         return self.bordered[:, :-1, :-1]
 
     @property
     def seen(self) -> Array:
-        """(b, 27)."""
+        """The right side of the normal equations, (b, 27)."""
         return self.bordered[:, :-1, -1]
 
     @property
     def square(self) -> Array:
-        """(b,)."""
+        """The sum of the squares of the heights, (b,)."""
         return self.bordered[:, -1, -1]
 
 
@@ -76,14 +76,14 @@ def prior_variances(waviness: Array) -> Array:
 
 VARIANCES = prior_variances(WAVINESS)
 LOG_VARIANCES = np.log(VARIANCES)
-UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior
+UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior.
 
 
 def restricted(data: NormalEquations) -> Restricted:
     """What contacts say of the higher terms, by a Cholesky factor of their system bordered by the heights."""
     bordered = data.bordered.copy()
     diagonal = np.einsum("bii->bi", bordered)  # a view
-    # More than rounding takes from what no contact shows, and far less than noise hides.
+    # What is added exceeds what rounding takes from directions that no contact shows, and is far below noise.
     whole = diagonal.cumsum(axis=1)
     diagonal[:, :-1] += ROUNDING * whole[:, -2:-1]
     diagonal[:, -1] += ROUNDING * whole[:, -1]
@@ -93,14 +93,14 @@ def restricted(data: NormalEquations) -> Restricted:
 
 
 def noises(data: Restricted, floor: Array) -> Array:
-    """A grid of the noise, (b, 5), from the floor to beyond what the quadric leaves over."""
+    """A grid of the noise, (b, NOISES), from the floor to beyond what a quadric leaves of the contacts."""
     left = np.einsum("bi,bi->b", data.target, data.target) + data.square
     largest = 2.0 + 3.0 / floor * np.sqrt(left / data.contacts)
     return floor[:, None] * largest[:, None] ** UPWARD
 
 
 def evidence(data: Restricted, noises: Array) -> Hyperparameters:
-    """Waviness and noise by their marginal likelihood, group by group: one fits into a processor's cache."""
+    """Waviness and noise by their marginal likelihood, in groups that fit into a processor's cache."""
     if len(noises) <= GROUP:
         return _evidence_of(data, noises)
     groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
@@ -117,24 +117,24 @@ def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
     triangle, target, squares = data.triangle, data.target, noises**2
     b, size = target.shape
     explained = (triangle[:, None] * VARIANCES[:, None]) @ triangle.transpose(0, 2, 1)[:, None]
-    corner = 2.0 * np.einsum("bi,bi->b", target, target) / squares[:, 0] + 1.0  # more than t' K^-1 t
+    corner = 2.0 * np.einsum("bi,bi->b", target, target) / squares[:, 0] + 1.0  # c exceeds t' K^-1 t
     bordered = np.empty((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
     bordered[..., :size, :size] = explained[:, :, None]
     bordered[..., :size, size] = bordered[..., size, :size] = target[:, None, None]
-    # Beside the noise, what rounding leaves of contacts that are no surface.
+    # Rounding counts as noise, lest contacts that are no surface leave a matrix without a factor.
     rounding = ROUNDING * np.einsum("bwii->bw", explained)
     diagonal = np.einsum("...ii->...i", bordered)  # a view
     diagonal[..., :size] += (squares[:, None] + rounding[..., None])[..., None]
     diagonal[..., size] = corner[:, None, None]
     factors = np.einsum("...ii->...i", np.linalg.cholesky(bordered))
-    others = (data.contacts - len(TERMS))[:, None]  # directions no term explains
+    others = (data.contacts - len(TERMS))[:, None]  # the number of directions that no term explains
     whole = others * np.log(squares) + data.square[:, None] / squares + corner[:, None]
     surprise = 2.0 * np.log(factors[..., :size]).sum(axis=3) - factors[..., size] ** 2 + whole[:, None]
     return _averaged(surprise, noises)
 
 
 def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
-    """Over a grid of waviness and noise, by -2 log likelihood there (b, 6, 5) and the waviness's prior."""
+    """Averages over the grid of waviness and noise, given -2 log likelihood (b, 6, 5) at its points."""
     surprise = (surprise + UNUSUAL[:, None]).reshape(len(noises), -1)
     weights = np.exp(0.5 * np.maximum(surprise.min(axis=1)[:, None] - surprise, -UNLIKELY))
     weights = (weights / weights.sum(axis=1)[:, None]).reshape(len(noises), len(WAVINESS), -1)
@@ -149,9 +149,10 @@ def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
 def evidence_with_slopes(heights: NormalEquations, slopes: NormalEquations, noises: Array) -> Hyperparameters:
     """The evidence where measured slopes, in units of their deviations, tell of the waviness too.
 
-    Slopes leave no term free, so all coefficients are integrated out, by the determinant lemma: with the
-    precision A = gram / noise^2 + slopes' gram + prior^-1 and v = A @ the likeliest coefficients, one
-    Cholesky factor of [[A, v], [v', square]] has log |A| in its diagonal and what is left over in the last.
+    Slopes leave no term free, so all coefficients are integrated out, by the determinant lemma. With the
+    precision A = gram / noise^2 + slopes' gram + prior^-1 and v = A @ the likeliest coefficients, the
+    Cholesky factor of [[A, v], [v', square]] has log |A| in its diagonal, and what is left over in the last
+    of it.
     """
     size, at_noise = len(TERMS), noises[:, None, :, None]
     bordered = np.zeros((*(len(noises), len(WAVINESS), noises.shape[1]), size + 1, size + 1))
@@ -162,7 +163,7 @@ def evidence_with_slopes(heights: NormalEquations, slopes: NormalEquations, nois
     diagonal[..., FREE:size] += 1.0 / VARIANCES[:, None]
     seen = heights.seen[:, None, None] / at_noise**2 + slopes.seen[:, None, None]
     bordered[..., :size, size] = bordered[..., size, :size] = seen
-    # One more, lest rounding leaves less than nothing over.
+    # Adding 1 changes no ratio of likelihoods and keeps rounding from leaving less than 0 over.
     square = (heights.square[:, None] / noises**2 + slopes.square[:, None])[:, None] + 1.0
     bordered[..., size, size] = square
     factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)

@@ -34,21 +34,22 @@ from .linear_system import (
 )
 from .posterior import FREE, Posterior
 
-# benchmarks.accuracy judges MISFIT, the outliers of benchmarks.stability the last two.
-MISFIT = 2e-3  # Share of the radius: no surface is a polynomial, so the noise is never less.
-PASSES = 8  # At most: two passes turn the frame to what they found, and more are for outliers.
-SETTLED_WEIGHT = 0.1  # Change of a weight between passes that counts as none.
-STALE_WEIGHT = 0.5  # Change of a weight since waviness and noise were found, at which they are anew.
-ALIKE_CURVATURES = 1e-4  # the difference of curvatures that is none; heights change by an eighth of it
-LEVEL = 5e-3  # slope left over; it changes heights by its product with a slope and a height
-OUTLYING = 5.0  # standard deviations
-STUDENT = 4.0  # degrees of freedom
+# benchmarks.accuracy judges MISFIT, and the outliers of benchmarks.stability judge the last two.
+MISFIT = 2e-3  # The noise is at least this share of the radius, because no surface is a polynomial.
+# There are at most so many passes: two turn the frame to what they found, others are for outliers.
+PASSES = 8
+SETTLED_WEIGHT = 0.1  # A fit is settled when no weight changes by more between passes.
+STALE_WEIGHT = 0.5  # Waviness and noise are found anew when a weight has changed by more since.
+ALIKE_CURVATURES = 1e-4  # Curvatures that differ by less count as alike; heights change by an eighth of it.
+LEVEL = 5e-3  # Axes are level when the slope is less: heights change by its product with slope and height.
+OUTLYING = 5.0  # A contact off by more standard deviations is an outlier.
+STUDENT = 4.0  # Outliers weigh as under a Student t distribution of so many degrees of freedom.
 
 
 class _Touches(NamedTuple):
-    """What a pass of the fit needs to know of b touches; all from the axes on are what it changes.
+    """What a pass of the fit has to know of b touches. It changes all fields from the axes on.
 
-    told : (b, n), the weights with which hyper (waviness and noise) and triangle, of evidence.py, were found
+    told : (b, n), the weights for which waviness, noise and triangle (evidence.py) were found
     """
 
     contacts: Array
@@ -71,7 +72,7 @@ class _Touches(NamedTuple):
         return Hyperparameters(self.typical, self.variances, self.noise)
 
     def at(self, which: NDArray[np.bool_]) -> "_Touches":
-        """Some of them."""
+        """Some of these touches."""
         return _Touches(*(values[which] for values in self))
 
 
@@ -92,8 +93,8 @@ def joint_fit(
     k1, k2 : (b,), a first guess of the curvatures along its axes
     tangent : (b, 3), in that frame, which d1 is to follow
     noise : (b,), standard deviation of a contact, at least
-    normals : (b, n, 3), measured, over their standard deviation; 0 where there is none
-    through : whether the surfaces pass through the origin; where not, their height there is free
+    normals : (b, n, 3), measured normals, over their standard deviation; 0 where there is none
+    through : whether the surfaces pass through the origin; if not, their height there is free
 
     Returns the columns d1, d2, n (b, 3, 3) in the frame given, the posteriors in the new one, where
     the means of the slopes and of the mixed second derivative are 0, and the weights (b, n) that the
@@ -116,7 +117,7 @@ def joint_fit(
         if not settled.any():
             continue
         touches, pending = touches.at(~settled), pending[~settled]
-    if len(found) == 1:  # all at once, as nearly always: in the order they came
+    if len(found) == 1:  # All have settled at once, as nearly always, so they are in order.
         return found[0][1], Posterior(*found[0][3:]), found[0][2]
     order, turns, found_weights, *surfaces = (np.concatenate(parts) for parts in zip(*found, strict=True))
     back = np.argsort(order)
@@ -126,7 +127,7 @@ def joint_fit(
 def _pass(
     touches: _Touches, step: int, through: bool
 ) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
-    """The fit in the axes and with the weights so far; which touches are settled, and their posteriors."""
+    """One fit in the axes and with the weights so far: a mask of settled touches, and their posteriors."""
     expected = prior_mean(touches.k1, touches.k2)
     local, normals = touches.contacts @ touches.axes, touches.normals @ touches.axes
     system = linear_system(local, touches.weights, expected, normals, through)
@@ -137,7 +138,7 @@ def _pass(
     mean = expected + found
     found_axes = [turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
     axes, k1, k2, angle = (np.array(values) for values in zip(*found_axes, strict=True))
-    # Outliers show against a surface in level axes.
+    # Outliers can be told only once the axes are level.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
     weights, settled, surface = touches.weights, np.full(len(mean), step == PASSES - 1), None
     if step and level.any():
@@ -154,7 +155,7 @@ def _pass(
 
 
 def _with_evidence(touches: _Touches, system: System, stale: NDArray[np.bool_]) -> _Touches:
-    """The touches with waviness and noise of those that are stale, (b,), as their systems have them."""
+    """The touches, where waviness and noise of the stale ones (b,) are found anew from their systems."""
     if not stale.any():
         return touches
     some = system if stale.all() else system.at(stale)
@@ -169,7 +170,7 @@ def _with_evidence(touches: _Touches, system: System, stale: NDArray[np.bool_]) 
 
 
 def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> Posterior:
-    """What contacts (n, 3) say in a frame and about curvatures that are given; all in unit radius."""
+    """The posterior of contacts (n, 3) in a given frame with curvatures k1 and k2, all in unit radius."""
     weights, expected = np.ones((1, len(contacts))), prior_mean(np.array([k1]), np.array([k2]))
     system = linear_system(contacts[None], weights, expected, contacts[None, :0])
     data = restricted(system.equations)
@@ -178,9 +179,9 @@ def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> Posteri
 
 
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:
-    """Weights of the contacts, (b, n): all 1 where none of a touch is outlying; 0 where there is none."""
+    """Weights of the contacts, (b, n): all 1 if none of a touch is outlying, 0 where there is no contact."""
     misses = np.abs(residuals)
-    if np.all(misses <= OUTLYING * floor[:, None]):  # Mostly so: there is no need to look closer.
+    if np.all(misses <= OUTLYING * floor[:, None]):  # This is so in most cases, and quick to find out.
         return present.astype(float)
     ordered, row = np.sort(np.where(present, misses, np.inf), axis=1), np.arange(len(misses))
     count = present.sum(axis=1)
@@ -194,8 +195,11 @@ def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array)
 
 
 def turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:
-    """The axes tilted to a surface's normal and turned to its principal directions; k1, k2; that angle."""
-    # In Python floats: these vectors have three elements.
+    """The axes tilted to a surface's normal and turned to its principal directions; k1, k2; the angle turned.
+
+    mean : coefficients of the surface in the axes (3, 3); tangent : (3,), which d1 is to follow
+    """
+    # Python floats are faster than arrays of three elements.
     sx, sy, xx, xy, yy = mean[:FREE].tolist()
     d1, d2, up = axes.T.tolist()
     given = tangent.tolist()

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..patch.lapack import inverse_definite, solved_definite
 from ..patch.monge import TERMS, monomials
-from ..patch.residual import inverse_definite, solved_definite
 from .evidence import (
     FREE_PRECISION,
     PRIOR_SCALE,
@@ -23,18 +23,18 @@ from .evidence import (
 from .measured_slopes import slope_equations
 from .posterior import FREE, Posterior
 
-LEAST_FREEDOM = 5.0  # of few contacts: a prior tells of them too
+LEAST_FREEDOM = 5.0  # Few contacts count as so many degrees of freedom, because a prior adds to them.
 
 
 class System(NamedTuple):
-    """Heights ~ terms @ coefficients, less the prior's mean, of n contacts; and its normal equations.
+    """Heights of n contacts ~ terms @ coefficients, all less the prior's mean; and the normal equations.
 
     rows : (b, 28, n), the 27 terms and the heights
-    equations : their products, weighted
+    equations : the weighted products of the rows
     slopes : (b, 2n, 27), slopes @ coefficients ~ steepness (b, 2n) in units of their deviation, weighted;
         None without normals
-    pivot : (b, 27), of surfaces that need not pass through the origin the mean of the terms over the
-        contacts; the terms are less that, and the heights are less their mean. None where they do pass
+    pivot : (b, 27), mean of the terms over the contacts, for surfaces that need not pass through the origin:
+        the rows are then less their means. None for surfaces that do
     """
 
     rows: Array
@@ -44,13 +44,13 @@ class System(NamedTuple):
     pivot: Array | None = None
 
     def at(self, which: NDArray[np.bool_]) -> "System":
-        """Some of the b."""
+        """The systems of some of the b touches."""
         rows, equations, *beside = self
         some = NormalEquations(*(part[which] for part in equations))
         return System(rows[which], some, *(part if part is None else part[which] for part in beside))
 
     def residuals(self, coefficients: Array) -> Array:
-        """What coefficients (b, 27) leave of the heights, (b, n)."""
+        """What the coefficients (b, 27) do not explain of the heights, (b, n)."""
         left: Array = self.rows[:, -1] - (coefficients[:, None] @ self.rows[:, :-1])[:, 0]
         return left
 
@@ -58,16 +58,16 @@ class System(NamedTuple):
 def prior_mean(k1: Array, k2: Array) -> Array:
     """The prior's mean, (b, 27): the quartic and sextic of a surface that goes on with its curvatures (b,).
 
-    Where Q = (k1 x^2 + k2 y^2) / 2 and G = |grad Q|^2 they are Q G / 4 and Q G^2 / 8, as on a sphere and
-    a cylinder. A torus, whose parallels have k2 at the point, has k1 k2^2 / 4 for x^2 y^2: here is the
-    mean of that and of the other case.
+    With Q = (k1 x^2 + k2 y^2) / 2 and G = |grad Q|^2 they are Q G / 4 and Q G^2 / 8, as on a sphere and a
+    cylinder. The coefficient of x^2 y^2 is k1 k2^2 / 4 on a torus whose parallels have the curvature k2 at
+    the point, and k1^2 k2 / 4 if they have k1: the prior takes the mean of both.
     """
     return np.array([_going_on(*pair) for pair in zip(k1.tolist(), k2.tolist(), strict=True)])
 
 
 def _going_on(k1: float, k2: float) -> list[float]:
-    """The prior's mean of one surface; in Python floats."""
-    # Where the radius of curvature is less than L no surface goes on like that.
+    """The prior's mean of one surface, in Python floats."""
+    # No surface goes on with a radius of curvature below L.
     k1, k2 = min(max(k1, -1.0), 1.0), min(max(k2, -1.0), 1.0)
     a, b = k1**2, k2**2
     mean = [0.0] * len(TERMS)
@@ -86,7 +86,7 @@ def linear_system(
 ) -> System:
     """The linear system of contacts (b, n, 3) and their weights (b, n), less the prior's means (b, 27).
 
-    normals : (b, n, 3), measured, over their standard deviations, or (b, 0, 3)
+    normals : (b, n, 3), measured normals over their standard deviations, or (b, 0, 3)
     through : whether the surfaces pass through the origin
     """
     b, n = weights.shape
@@ -107,7 +107,7 @@ def linear_system(
 
 
 def hyperparameters(system: System, data: Restricted, floor: Array) -> Hyperparameters:
-    """The most likely waviness and noise; `data` is what the system's heights say of the higher terms."""
+    """Waviness and noise by their evidence; `data` is what the system's heights say of the higher terms."""
     if system.slopes is None or system.steepness is None:
         return evidence(data, noises(data, floor))
     rows = np.concatenate([system.slopes, system.steepness[..., None]], axis=2)
@@ -117,7 +117,7 @@ def hyperparameters(system: System, data: Restricted, floor: Array) -> Hyperpara
 
 def solution(system: System, hyper: Hyperparameters) -> Array:
     """The likeliest coefficients less the prior's mean, (b, 27)."""
-    # The heights come out nearest with the typical prior, the intervals cover with the averaged one.
+    # Heights are nearest with the typical prior, and intervals are true with the averaged one.
     precision = _precision(system, hyper.typical, hyper.noise)
     seen = system.equations.seen / (hyper.noise**2)[:, None]
     if system.slopes is not None and system.steepness is not None:
@@ -128,16 +128,16 @@ def solution(system: System, hyper: Hyperparameters) -> Array:
 def posterior(
     mean: Array, system: System, triangle: Array, hyper: Hyperparameters, weights: Array
 ) -> Posterior:
-    """What is left open, under the averaged prior, about the means (b, 27); triangle as in Restricted."""
+    """The posteriors about the means (b, 27), under the averaged prior; triangle is that of Restricted."""
     covariance = np.array(
         [inverse_definite(each) for each in _precision(system, hyper.variances, hyper.noise)]
     )
-    # Waviness and noise are estimates: with so many degrees of freedom Student's t has this more variance.
+    # Waviness and noise are estimates, so deviations are those of a Student t of this freedom.
     freedom = np.maximum(system.equations.contacts - FREE, LEAST_FREEDOM)
     covariance *= (freedom / (freedom - 2.0))[:, None, None]
     visibility = triangle * (PRIOR_SCALE / hyper.noise)[:, None, None]
     if system.slopes is not None:
-        # What the slopes show of the free terms too: the QR of all there is, each in its deviation.
+        # Slopes show the free terms too, so this is the QR of all rows, each in units of its deviation.
         basis = (np.sqrt(weights) / hyper.noise[:, None])[..., None] * system.rows[:, :-1].transpose(0, 2, 1)
         rows = np.concatenate([basis, system.slopes], axis=1)
         whole: Array = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
@@ -146,7 +146,7 @@ def posterior(
 
 
 def _level(covariance: Array, system: System, hyper: Hyperparameters, weights: Array) -> Array:
-    """The level of a Posterior: the contacts' mean height less what the terms are at the pivot."""
+    """The level of a Posterior: of the contacts' mean height less the surface at the pivot."""
     level = np.zeros((len(weights), len(TERMS) + 1))
     if system.pivot is not None:
         level[:, 1:] = -(covariance @ system.pivot[..., None])[..., 0]
@@ -155,7 +155,7 @@ def _level(covariance: Array, system: System, hyper: Hyperparameters, weights: A
 
 
 def _precision(system: System, variances: Array, noise: Array) -> Array:
-    """(b, 27, 27), the inverse of the covariance."""
+    """The inverse of the coefficients' covariance, (b, 27, 27)."""
     precision = system.equations.gram / (noise**2)[:, None, None]
     if system.slopes is not None:
         precision += np.swapaxes(system.slopes, 1, 2) @ system.slopes

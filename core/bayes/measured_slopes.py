@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measured normals as equations for the coefficients of joint_fit.py.
 
-The unit normal m is off the surface's normal (-z_x, -z_y, 1) by no more than its error: with a and b,
-unit and across m and each other, a . (-z_x, -z_y, 1) is 0 but for |(z_x, z_y, 1)| times the deviation of
-m, and so is b . (-z_x, -z_y, 1). Both are linear in the coefficients.
+The measured unit normal m is off the surface's normal (-z_x, -z_y, 1) by no more than its error. Let a and b
+be unit vectors across m and each other: a . (-z_x, -z_y, 1) and b . (-z_x, -z_y, 1) are 0, except for an
+error of |(z_x, z_y, 1)| times the deviation of m. Both are linear in the coefficients.
 """
 
 import numpy as np
@@ -12,16 +12,18 @@ import numpy as np
 from ..arguments import Array
 from ..patch.monge import TERMS, derived_monomials
 
-SLOPE_MISFIT = 1e-2  # radians: no surface is a polynomial, so no slope is better known (benchmarks.stability)
+# No slope is known better than this angle, because no surface is a polynomial (benchmarks.stability).
+SLOPE_MISFIT = 1e-2
 
 
 def slope_equations(normals: Array, contacts: Array, weights: Array) -> tuple[Array, Array]:
     """slopes (b, 2n, 27) @ coefficients ~ steepness (b, 2n), in units of their deviation.
 
-    normals (b, n, 3) over their standard deviations, 0 where there are none; contacts (b, n, 3) in unit
-    radius and the same frame; weights (b, n): an outlying contact's normal weighs as little as it does.
+    normals : (b, n, 3), over their standard deviations; 0 where there are none
+    contacts : (b, n, 3), in unit radius and the same frame
+    weights : (b, n), those of the contacts: the normal of an outlying contact weighs as little as it does
 
-    A patch has one height a place, so no normal of it points down: one that does was measured inward.
+    A patch has one height at each place, so no normal of it points down: one that does was measured inward.
     """
     m = np.where(normals[..., 2:] < 0.0, -normals, normals)
     certainty = np.sqrt(np.einsum("bni,bni->bn", m, m))

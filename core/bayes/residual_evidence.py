@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether contacts ask for a residual, how large it is, and what they say of it.
 
-Where a sextic describes the contacts to their noise there is none; nor where it describes most of them,
-and makes all as likely, with outliers, as a residual does. Otherwise its variances and the noise follow from
-the marginal likelihood on a grid, at USUAL_WAVINESS: what the residual explains the sextic need not.
+There is none if a sextic describes the contacts to their noise, nor if it describes most of them and makes
+all as likely, counting outliers, as a residual does. Otherwise the variances of the residual and the noise
+follow from the marginal likelihood on a grid. The waviness is USUAL_WAVINESS: the residual explains the rest.
 """
 
 import math
@@ -15,31 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..patch.lapack import cholesky, cholesky_in_place, solved, solved_definite
 from ..patch.monge import TERMS, monomials
-from ..patch.residual import (
-    Residual,
-    cholesky,
-    cholesky_in_place,
-    kernels,
-    places_factor,
-    solved,
-    solved_definite,
-)
+from ..patch.residual import Residual, kernels, places_factor
 from .evidence import USUAL_WAVINESS, prior_variances
 from .measured_slopes import slope_equations
 from .posterior import FREE
 
 # Chosen with benchmarks.real.
-ROUGH_MISFIT = 5e-4  # Share of the radius: facets and rounding, where the residual has taken the rest.
-AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Deviations of the residual, in units of the radius.
-ALONE = np.array([0.3, 0.6, 1.2])  # waviness of a surface that has none
-RESIDUAL_NOISES, MIDDLE = 3, 1  # grid points, from the floor to what the sextic leaves over
+ROUGH_MISFIT = 5e-4  # Beside a residual the noise is at least this share of the radius: facets and rounding.
+AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Grid of the residual's deviation, in unit radius.
+ALONE = np.array([0.3, 0.6, 1.2])  # Grid of the waviness of a surface without a residual.
+RESIDUAL_NOISES, MIDDLE = 3, 1  # Grid points of the noise, up to what the sextic leaves; the middle one.
 RESIDUAL_UPWARD = np.arange(RESIDUAL_NOISES) / (RESIDUAL_NOISES - 1.0)
 MOST_PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
-ODDS = 0.2  # of a residual beside none, at which there is one: it costs a smooth surface little
-NEGLIGIBLE = 160.0  # -2 log likelihood beside the best, at which no other noise is tried
-FREE_VARIANCE = 0.06  # of slopes and second derivatives: where curves end early, of 100 they run away
-TEMPER = 0.1  # of the log likelihood: contacts side by side tell of waves between the curves no more
+ODDS = 0.2  # There is a residual from these odds on: it costs a smooth surface little.
+NEGLIGIBLE = 160.0  # If -2 log likelihood exceeds the best by more, no other noise is tried.
+# Prior variance of slopes and second derivatives beside a residual: with 100 they run away if curves end
+# early.
+FREE_VARIANCE = 0.06
+# The log likelihood counts by this share: neighbors on a curve do not tell of waves between curves.
+TEMPER = 0.1
 
 
 class Observations(NamedTuple):
@@ -47,8 +43,8 @@ class Observations(NamedTuple):
 
     contacts : (n, 3)
     weights : (n,), above 0
-    least, most : noise of the contacts
-    normals : (n, 3), measured, over their standard deviation; None without
+    least, most : bounds of the contacts' noise
+    normals : (n, 3), measured normals over their standard deviation; None if there are none
     """
 
     contacts: Array
@@ -58,7 +54,7 @@ class Observations(NamedTuple):
     normals: Array | None
 
     def moved(self, turn: Array, scale: float) -> "Observations":
-        """This touch in axes (3, 3), with lengths over `scale`."""
+        """This touch in the axes `turn` (3, 3), with lengths divided by `scale`."""
         return self._replace(
             contacts=self.contacts @ turn / scale,
             least=self.least / scale,
@@ -68,9 +64,11 @@ class Observations(NamedTuple):
 
 
 class System(NamedTuple):
-    """Basis (n, 27), heights (n,), places (m,) among the contacts.
+    """What the fits of a touch with a residual are made of.
 
-    kernels : of unit variance, (n, m) each, of contacts and places
+    basis : (n, 27), terms at the contacts; heights : (n,)
+    places : (m,), indices of the contacts that carry the residual
+    kernels : (n, m) each, kernels of unit variance between contacts and places
     """
 
     basis: Array
@@ -80,16 +78,16 @@ class System(NamedTuple):
 
 
 def system_of(touch: Observations) -> System:
-    """What fits of the touch are made of."""
+    """The system of a touch."""
     flat = touch.contacts[:, :2]
     basis = monomials(flat[:, 0], flat[:, 1], TERMS)
-    m = min(len(flat), MOST_PLACES)  # evenly spread
+    m = min(len(flat), MOST_PLACES)  # They are evenly spread.
     places = np.arange(m) * len(flat) // m
     return System(basis, touch.contacts[:, 2], places, kernels(flat, flat[places]))
 
 
 class Sizes(NamedTuple):
-    """Variances (2,) and noise, averaged over their grid; and whether the touch asks for a residual."""
+    """Variances (2,) of the residual and the noise, averaged over a grid; whether a residual is asked for."""
 
     variances: Array
     noise: float
@@ -97,10 +95,10 @@ class Sizes(NamedTuple):
 
 
 def sizes(touch: Observations, system: System) -> Sizes:
-    """How large residual and noise are, and whether one is asked for, by the marginal likelihood.
+    """How large residual and noise are, and whether a residual is asked for, by the marginal likelihood.
 
-    Heights ~ N(0, K), K = basis prior basis' + v k + noise^2, by one Cholesky factor of K bordered by the
-    heights, as in evidence.py; each contact's row times the root of its weight.
+    Heights ~ N(0, K) with K = basis prior basis' + v k + noise^2. As in evidence.py, one Cholesky factor of K
+    bordered by the heights gives their likelihood; the row of each contact is times the root of its weight.
     """
     basis, heights, kernels_within = _weighted(touch, system)
     noises = touch.least * (touch.most / touch.least) ** RESIDUAL_UPWARD
@@ -115,7 +113,7 @@ def sizes(touch: Observations, system: System) -> Sizes:
 
 
 def _weighted(touch: Observations, system: System) -> tuple[Array, Array, list[Array]]:
-    """Basis, heights and kernels of the places, rows times the roots of their weights."""
+    """Basis, heights and kernels of the places, each row times the root of its weight."""
     if len(system.places) == len(touch.weights) and touch.weights.min() == 1.0:
         return system.basis, system.heights, system.kernels
     root = np.sqrt(touch.weights[system.places])
@@ -124,15 +122,15 @@ def _weighted(touch: Observations, system: System) -> tuple[Array, Array, list[A
 
 
 def _prior(waviness: float) -> Array:
-    """Variances (27,) of the coefficients."""
+    """Prior variances (27,) of the coefficients beside a residual."""
     return np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(waviness))])
 
 
 def _surprises(basis: Array, heights: Array, kernels_within: list[Array], noises: Array) -> Array:
-    """-2 log likelihood for each length, amplitude and noise, (2, 5, 3); inf where that is NEGLIGIBLE.
+    """-2 log likelihood for each length, amplitude and noise, (2, 5, 3); inf where it was not computed.
 
-    The middle noise first, from the middle amplitude to where they only become worse; other noises where that
-    does not rule out a length and an amplitude.
+    The middle noise comes first, from the middle amplitude on to where others only become worse. Other noises
+    are tried where the likelihood of a length and an amplitude is not NEGLIGIBLE.
     """
     m, size = len(heights), len(AMPLITUDES)
     terms, work, *kernels_of = np.zeros((2 + len(kernels_within), m + 1, m + 1))
@@ -157,21 +155,22 @@ def _surprises(basis: Array, heights: Array, kernels_within: list[Array], noises
 
 
 def _surprise(terms: Array, work: Array, twice: float, kernel: Array, variance: float, noise: float) -> float:
-    """-2 log likelihood by terms that the heights border, (m + 1, m + 1), as are kernel and work.
+    """-2 log likelihood for one variance of the residual and one squared noise.
 
-    twice : the heights' squares, summed twice; variance, noise : of the residual, and of a contact, squared
+    terms, work, kernel : (m + 1, m + 1), bordered by the heights; twice : twice the sum of the heights'
+        squares
     """
     np.multiply(kernel, variance, out=work)
     work += terms
     diagonal = work.reshape(-1)[:: len(work) + 1]
     diagonal += noise
-    corner = diagonal[-1] = twice / noise + 1.0  # more than heights' K^-1 heights
+    corner = diagonal[-1] = twice / noise + 1.0  # It exceeds heights' K^-1 heights.
     pivots = cholesky_in_place(work)
     return 2.0 * float(np.log(pivots[:-1]).sum()) + corner - float(pivots[-1]) ** 2
 
 
 def _surprises_alone(basis: Array, heights: Array) -> Array:
-    """The evidence without a residual for each of ALONE, over the noise and but for its logarithm, (3,).
+    """-2 log likelihood without a residual for each of ALONE, (3,), in units of noise.
 
     It follows from the terms' precision, bordered by what the heights say of them.
     """
@@ -185,14 +184,14 @@ def _surprises_alone(basis: Array, heights: Array) -> Array:
 
 @cache
 def _priors_alone() -> tuple[Array, Array]:
-    """Precisions of the terms for each of ALONE, and of the heights that border them; sums of logarithms."""
+    """Prior precisions (3, 28) for each of ALONE, with 1 for the heights, and sums of log variances (3,)."""
     priors = np.array([_prior(waviness) for waviness in ALONE])
-    # One more, lest rounding leaves less than nothing over.
+    # Adding 1 for the heights keeps rounding from leaving less than 0 over.
     return np.column_stack([1.0 / priors, np.ones(len(ALONE))]), np.log(priors).sum(axis=1)
 
 
 def mean_given(touch: Observations, system: System, sizes: Sizes) -> Array:
-    """Means of the terms, and of what k(p, places) is multiplied with, (27 + m,), by one Cholesky factor."""
+    """Means of the terms and of the factors c of k(p, places), (27 + m,), by one Cholesky factor."""
     if touch.normals is not None or len(system.places) < len(touch.weights):
         return fitted(touch, system, sizes.variances, sizes.noise).mean
     (basis, heights, within), (one, other) = _weighted(touch, system), sizes.variances
@@ -205,15 +204,15 @@ def mean_given(touch: Observations, system: System, sizes: Sizes) -> Array:
 
 
 def fitted(touch: Observations, system: System, variances: Array, noise: float) -> Residual:
-    """What the contacts say, given these.
+    """The residual, given its variances and the noise.
 
-    The unknowns are the terms and what L^-1 k(u, p) is multiplied with: that makes the prior's precision 1
-    and the system well-conditioned.
+    The unknowns are the coefficients of the terms and of L^-1 k(u, p), because the latter have the prior
+    precision 1, which makes the system well-conditioned.
     """
     index, terms = system.places, len(TERMS)
     to_points = variances[0] * system.kernels[0] + variances[1] * system.kernels[1]
     places = places_factor(to_points[index])
-    # Where each contact is a place the features are the factor itself.
+    # If each contact is a place, the features are the factor itself.
     whole = len(index) == len(to_points)
     features = np.hstack([system.basis, places if whole else solved(places, to_points.T).T])
     weighted = features * (np.sqrt(touch.weights) / noise)[:, None]
@@ -226,12 +225,12 @@ def fitted(touch: Observations, system: System, variances: Array, noise: float) 
     mean = solved(factor, solved(factor, seen), transposed=True)
     mean[terms:] = solved(places, mean[terms:], transposed=True)
     residual = Residual(touch.contacts[index, :2], variances, mean, factor, np.array(noise))
-    vars(residual)["places_factor"] = places  # It need not be found again.
+    vars(residual)["places_factor"] = places  # This saves finding it again.
     return residual
 
 
 def _add_slopes(touch: Observations, precision: Array, seen: Array) -> None:
-    """What measured normals add to the terms' part of the system."""
+    """Adds what measured normals say of the terms to the system, in place."""
     assert touch.normals is not None
     given = touch.normals, touch.contacts, touch.weights
     slopes, steepness = (part[0] for part in slope_equations(*(each[None] for each in given)))

@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The joint fit where contacts ask for a residual: the frame, curvatures and polynomial of the surface.
 
-A real surface has other curvatures at each scale; at the point itself they are those of its texture.
-Those of the patch are of the quartic nearest to sextic and residual over a disk of QUARTIC_SHARE. Off dense
-fits of the scans they are by half as much, or less, as those of the sextic that was fitted to the contacts
-alone, and their intervals are true. Where contacts are off that sextic by less than MISFIT it is
-otherwise, as on a smooth surface whose mesh has facets: its frame and curvatures stay, for it averages them.
+A real surface has different curvatures at each scale, and those at the point itself belong to its texture.
+The patch has the curvatures of the quartic that is nearest to sextic and residual over a disk of
+QUARTIC_SHARE. Compared with dense fits of the scans, they are off at most half as far as those of the sextic
+fitted to the contacts alone, and their intervals are true. If contacts are off that sextic by less than
+MISFIT, as on a smooth surface whose mesh has facets, its frame and curvatures are kept, because it averages
+the facets.
 """
 
 from functools import cache
@@ -32,14 +33,16 @@ from .residual_evidence import (
     system_of,
 )
 
-UNEXPLAINED_MISFIT = 1.3  # times their noise, that contacts are off a sextic (benchmarks.real)
-QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what is none of the point's (benchmarks.real).
+# benchmarks.real chose these.
+UNEXPLAINED_MISFIT = 1.3  # A sextic does not explain contacts that are off it by more times their noise.
+QUARTIC_SHARE = 0.6  # Share of the radius; 0.8 takes in what says nothing of the point.
 
 
 class RoughFit(NamedTuple):
-    """For b touches, columns d1, d2, n (b, 3, 3) in the frame given, radii (b,) in its unit, and more.
+    """The fits of b touches.
 
-    The posteriors and the residuals are in the new frame and unit.
+    turns : (b, 3, 3), columns d1, d2, n in the frame given; scales : (b,), the new radii in its unit
+    posterior, residuals : in the new frames and units
     """
 
     turns: Array
@@ -58,27 +61,28 @@ def rough_fit(
     normals: Array | None = None,
     through: bool = True,
 ) -> RoughFit:
-    """The fits of b touches with a residual where their contacts ask for one; where not, as they were.
+    """The fits of b touches, with a residual where their contacts ask for one, and unchanged elsewhere.
 
     contacts : (b, n, 3), in unit radius and in the Darboux frame of the sextic
     weights : (b, n), 0 where there is none
     posterior : the stack of the sextics that were fitted to them
     noise : (b,), standard deviation of a contact, at least
-    told : (b,), whether that is known to be all their noise
+    told : (b,), whether this is known to be all of the noise
     tangent : (b, 3), which d1 is to follow
-    normals : (b, n, 3), measured, over their standard deviation; they act on the terms alone
+    normals : (b, n, 3), measured normals over their standard deviation; they act on the terms alone
     through : whether the origin was touched
     """
     b = len(contacts)
     found = RoughFit(np.eye(3)[None].repeat(b, axis=0), np.ones(b), posterior, [None] * b)
     missed = _misfit(contacts, weights, posterior)
-    candidates = _asking(missed.rms, noise)
+    candidates = np.flatnonzero(missed.rms > UNEXPLAINED_MISFIT * np.maximum(noise, ROUGH_MISFIT))
     if not len(candidates):
         return found
     found = found._replace(posterior=Posterior(*(values.copy() for values in posterior)))
     for i in candidates.tolist():
         there, least = weights[i] > 0.0, max(float(noise[i]), ROUGH_MISFIT)
-        point = np.zeros((int(through), 3))  # a contact like the others: on facets it may be off as they are
+        # The point is a contact like the others: on facets it may be off as far.
+        point = np.zeros((int(through), 3))
         touch = Observations(
             np.vstack([contacts[i][there], point]),
             np.append(weights[i][there], np.ones(len(point))),
@@ -91,7 +95,9 @@ def rough_fit(
         if not (size.asked or (told[i] and _is_texture(missed.off[i][there], float(noise[i])))):
             continue
         if missed.rms[i] <= MISFIT:
-            _refine(found, i, fitted(touch, system, size.variances, size.noise))
+            beside_sextic = fitted(touch, system, size.variances, size.noise)
+            beside_sextic.mean[: len(TERMS)] -= found.posterior.mean[i]
+            found.residuals[i] = beside_sextic
         else:
             _settle(found, i, touch, system, size, tangent[i])
     return found
@@ -112,15 +118,10 @@ def _misfit(contacts: Array, weights: Array, posterior: Posterior) -> _Misfit:
     return _Misfit(off, np.sqrt((weights * off**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1.0)))
 
 
-def _asking(rms: Array, noise: Array) -> NDArray[np.intp]:
-    """Which of b touches have contacts that their sextics do not describe to their noise (b,)."""
-    return np.flatnonzero(rms > UNEXPLAINED_MISFIT * np.maximum(noise, ROUGH_MISFIT))
-
-
 def _is_texture(off: Array, noise: float) -> bool:
-    """Whether most contacts of a touch, |dz| (n,) off their sextic, are so by more than it may be off.
+    """Whether most contacts of a touch, |dz| (n,) off their sextic, are off by more than noise and MISFIT.
 
-    White noise beside the sextic, or outliers, would not do there: its deviation would not know of them.
+    Neither white noise nor outliers would explain that, and the sextic's deviation would not know of it.
     """
     return 1.4826 * float(np.median(off)) > max(UNEXPLAINED_MISFIT * noise, MISFIT)
 
@@ -128,7 +129,7 @@ def _is_texture(off: Array, noise: float) -> bool:
 def _settle(
     found: RoughFit, place: int, touch: Observations, system: System, size: Sizes, tangent: Array
 ) -> None:
-    """Puts the fit of a touch, in the frame that its first fit shows, into `found`."""
+    """Fits a touch, then again in the frame that the first fit shows, and puts the latter into `found`."""
     (at, weights), half = _projection(), len(nodes()[2])
     first, places = mean_given(touch, system, size), touch.contacts[system.places, :2]
     mean = _terms()[:FREE] @ first[: len(TERMS)]
@@ -141,14 +142,8 @@ def _settle(
     _put(found, place, second)
 
 
-def _refine(found: RoughFit, place: int, residual: Residual) -> None:
-    """One fit in the frame of the sextic, which it stays beside."""
-    residual.mean[: len(TERMS)] -= found.posterior.mean[place]
-    found.residuals[place] = residual
-
-
 def _put(found: RoughFit, place: int, residual: Residual) -> None:
-    """One fit: the polynomial nearest to it with its covariance, and the residual beside that."""
+    """Puts a fit into `found`: the polynomial nearest to it, its covariance, and the residual beside it."""
     (at, weights), terms = _projection(), _terms()
     told = weights @ kernel(at, residual.places, residual.variances)
     mean = np.hstack([terms, told]) @ residual.mean
@@ -164,10 +159,10 @@ def _put(found: RoughFit, place: int, residual: Residual) -> None:
 
 @cache
 def _projection() -> tuple[Array, Array]:
-    """Points (n, 2) and weights (27, n) that take the heights there to the nearest polynomial's coefficients.
+    """Points (n, 2) and weights (27, n) that take heights there to coefficients of the nearest polynomial.
 
-    Up to degree 2 it is the quartic nearest over the disk of QUARTIC_SHARE; the other terms are nearest to
-    what these leave over DISK.
+    Terms up to degree 2 are those of the nearest quartic over the disk of QUARTIC_SHARE. The other terms are
+    nearest to what these leave over DISK.
     """
     x, y, shares = nodes()
     whole, root = np.column_stack([x, y]), np.sqrt(shares)
@@ -182,14 +177,14 @@ def _projection() -> tuple[Array, Array]:
 
 @cache
 def _terms() -> Array:
-    """(27, 27), what the projection makes of the terms."""
+    """What the projection makes of each term, (27, 27)."""
     (x, y), weights = _projection()[0].T, _projection()[1]
     return weights @ monomials(x, y, TERMS)
 
 
 @cache
 def _own(lengths: tuple[float, ...]) -> Array:
-    """(2, 27, 27), covariances of the coefficients of a g of unit variance and each of these lengths."""
+    """Covariances (2, 27, 27) of the coefficients of a residual of unit variance and each of the lengths."""
     assert lengths == tuple(beside.LENGTHS)
     at, weights = _projection()
     return np.array([weights @ values @ weights.T for values in kernels(at, at)])

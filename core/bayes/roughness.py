@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How rough a surface is, by one linear solve: what a sextic of usual waviness leaves of its contacts.
 
-A fit takes twenty times as long and tells no more where this alone forbids to trust it.
+A fit takes twenty times as long, and is not needed if this alone shows that it could not be trusted.
 """
 
 import math
@@ -15,14 +15,15 @@ from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances
 from .joint_fit import MISFIT
 from .linear_system import linear_system, solution
 
-EXPLAINED_TERMS = 15  # of the 27, that three curves show: so many contacts a sextic goes through by itself
-NOISY = 1.5  # times their noise, that contacts are off for no other reason
+# benchmarks.extents judges these.
+EXPLAINED_TERMS = 15  # Three curves show so many of the 27 terms, which as many contacts determine.
+NOISY = 1.5  # Contacts may be off by so many times their noise for no other reason.
 
 
 def roughness(contacts: Array, noise: float) -> float:
-    """The deviation of contacts (n, 3), relative to the reference point, from a sextic, as a share of L.
+    """How far contacts (n, 3), relative to the point, are off a sextic of usual waviness, in units of L.
 
-    In the plane through the point that is nearest to them; less what noise, their deviation, explains of it.
+    The sextic is over the plane through the point that is nearest to them. What `noise` explains is left out.
     """
     local = contacts @ np.linalg.eigh(contacts.T @ contacts)[1][:, ::-1]
     radius = math.sqrt((local[:, :2] ** 2).sum(axis=1).max())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where measured curves meet, when nobody has said where that is."""
+"""The point where measured curves meet, if nobody has said where that is. Beside the paper."""
 
 import math
 from collections.abc import Sequence
@@ -20,20 +20,20 @@ from .curves import (
 )
 from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 
-MOST_APART = 0.1  # Share of a curve's size that it may miss the point by.
-GAP = 0.25  # Share of a curve's size, around the point, in which it may have no contacts.
-NEWTON_STEPS = 50  # of Gauss-Newton; five are the rule
-MOST_STARTS = 3  # curves may come near each other in several places
-MOST_SEARCHED = 1000  # contacts of a curve, and
-QUERIES = 10**6  # distances of a contact to a curve, that a start is looked for among
-CONTACTS_AROUND = 4 * WINDOW  # contacts of a curve that are looked at around a point
+MOST_APART = 0.1  # A curve may miss the point by this share of its size.
+GAP = 0.25  # Around the point, a curve may have no contacts within this share of its size.
+NEWTON_STEPS = 50  # Gauss-Newton takes at most so many steps; five are the rule.
+MOST_STARTS = 3  # So many starts are tried: curves may come near each other in several places.
+MOST_SEARCHED = 1000  # Starts are looked for among so many contacts of each curve,
+QUERIES = 10**6  # and among so many distances of a contact from a curve.
+CONTACTS_AROUND = 4 * WINDOW  # So many contacts of a curve are looked at around a point.
 
 
 def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     """The point (3,) with the least sum of squared distances to two or more curves, and the distances (c,).
 
-    Curves measured one by one do not meet exactly: the distances tell by how much each misses the point.
-    Where curves meet twice, as sections of a body do, it is the better of the two.
+    Curves that were measured one by one do not meet exactly: the distances tell by how much each misses the
+    point. If curves meet twice, as sections of a body do, it is the better of the two points.
 
     Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
     that do not come near each other, or that run in the same direction where they do.
@@ -49,7 +49,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
                 f"curve {number} has {len(contour.points)} contacts, and {LEAST_CONTACTS + 1} are "
                 "needed to tell where it runs: measure more, or give the reference point"
             )
-    origin = found[0].points[0]  # far from the world's origin differences of points are exact, points are not
+    origin = found[0].points[0]  # Far from the world's origin only differences of points are exact.
     contours = [Contour(contour.points - origin) for contour in found]
     refined = [_refined(start, contours) for start in _starts(contours)]
     point, feet, tangents = min(refined, key=lambda fit: float(np.sum(_misses(*fit) ** 2)))
@@ -79,7 +79,7 @@ def _misses(point: Array, feet: Array, tangents: Array) -> Array:
 def _starts(contours: Sequence[Contour]) -> Array:
     """The contacts nearest to all curves in the sense of least squares, best first, apart from each other.
 
-    Where there are many contacts, some of them do: Gauss-Newton goes on from there.
+    If there are many contacts, some of them suffice, because Gauss-Newton goes on from there.
     """
     from scipy.spatial import cKDTree
 
@@ -103,7 +103,7 @@ def _size(contour: Contour) -> float:
 
 
 def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, Array]:
-    """Gauss-Newton from a start: the point, and the feet and tangents (c, 3) of the curves next to it."""
+    """Gauss-Newton from a start: the point, and feet and tangents of the curves next to it, (c, 3) each."""
     reach = min(map(_size, contours))
     for _ in range(NEWTON_STEPS):
         near = [Contour(_near(point, contour.points)) for contour in contours]
@@ -111,7 +111,7 @@ def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, A
         speeds = np.linalg.norm(local[:, 1], axis=1, keepdims=True)
         feet, tangents = point + local[:, 0], local[:, 1] / np.maximum(speeds, 1e-300)
         across = np.eye(3) - tangents[:, :, None] * tangents[:, None]
-        # Lines in one direction have a nearest solution, which _require_crossing then refuses.
+        # Parallel lines have a solution, too, which _require_crossing then refuses.
         step = np.linalg.lstsq(across.sum(axis=0), np.einsum("cij,cj->i", across, local[:, 0]), rcond=1e-9)[0]
         length = float(np.linalg.norm(step))
         if length <= 1e-9 * reach:
@@ -121,7 +121,7 @@ def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, A
 
 
 def _near(point: Array, points: Array) -> Array:
-    """Contacts of a curve that say how it passes the point, and some more, in their order."""
+    """The contacts of a curve that tell how it passes the point, and some more, in their order."""
     if len(points) <= CONTACTS_AROUND:
         return points
     return points[

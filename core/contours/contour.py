@@ -19,18 +19,21 @@ from ..arguments import (
     unit_vector,
 )
 
-# Share of a curve's size: coordinates that are rounded by more say nothing about curvature.
+# Coordinates that are rounded by more than this share of a curve's size say nothing about curvature.
 CURVE_ROUNDING = 0.01
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 UNEXPLAINED = "not explained"
-BRINKS = (NO_CONTACT, CREASE)  # stops where the surface ends
+BRINKS = (NO_CONTACT, CREASE)  # The surface ends at these stops.
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class SamplingPlane:
-    """A plane through the reference point, holding the tangent at `azimuth`, leaning by `tilt` (radians)."""
+    """A plane through the reference point (paper, II): it holds the tangent at `azimuth`, leaning by `tilt`.
+
+    Both angles are in radians.
+    """
 
     azimuth: float
     tilt: float = 0.0
@@ -38,15 +41,15 @@ class SamplingPlane:
     def axes(self, normal: ArrayLike, tangent: ArrayLike | None = None) -> Array:
         """Columns t (the tangent), u (up, in the plane) and t x u (the plane's normal), (3, 3).
 
-        Azimuth 0 is `tangent` projected onto the tangent plane of `normal`; without one world X, or
-        world Y where X is within 26 degrees of the normal. Raises ValueError where `tangent` is
+        Azimuth 0 is `tangent`, (3,), projected onto the tangent plane of `normal`, (3,). Without a tangent it
+        is world X, or world Y if X is within 26 degrees of the normal. Raises ValueError if `tangent` is
         along the normal, or the tilt is not between -90 and 90 degrees.
         """
         n = vector_of(unit_vector("normal", normal))
         return np.array(self.floats(n, tangent_of(n, tangent))).T
 
     def floats(self, n: Vector, e1: Vector) -> tuple[Vector, Vector, Vector]:
-        """`axes` of the unit n and of azimuth 0, across it."""
+        """`axes` for the unit normal n and the unit tangent e1 at azimuth 0, in Python floats."""
         azimuth, tilt = number("azimuth", self.azimuth), number("tilt", self.tilt)
         if abs(tilt) >= math.pi / 2:
             raise ValueError(f"tilt: expected less than 90 degrees, got {math.degrees(tilt):g}")
@@ -59,13 +62,13 @@ class SamplingPlane:
 class Contour:
     """A tracked contour: the contacts along one curve through the reference point.
 
-    points : (n, 3), in any order, the reference point among them or not
-    plane_normal : (3,), normal of the sampling plane, or None if it is unknown or there is none
+    points : (n, 3), in any order, with or without the reference point
+    plane_normal : (3,), normal of the sampling plane, or None if there is none or it is not known
     normals : (n, 3), the surface normal at each contact, of any length, outward or inward; or None
     noise : standard deviation of the contacts, or None if it is not known
     stops : why tracking ended at the first and at the last point, or None
-    normal_std : standard deviation of measured normals, in radians; "bayes" then fits them as slopes.
-      None to leave them out. The paper's methods never use them.
+    normal_std : standard deviation of measured normals, in radians, with which "bayes" fits them as slopes;
+      None leaves them out. The paper's methods never use them
 
     Raises ValueError for another shape, for numbers that are not finite, for numbers of single
     precision too far from the origin, and for measured normals without a direction.
@@ -108,7 +111,7 @@ class Contour:
                 raise ValueError("normals: expected directions where normal_std is given, got (0, 0, 0)")
 
     def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
-        """Some of its contacts, as they are: they are in order."""
+        """The contour of some of its contacts, which are known to be valid."""
         found = object.__new__(Contour)
         normals = None if self.normals is None else self.normals[which]
         vars(found).update(vars(self), points=self.points[which], normals=normals, stops=stops)
@@ -117,7 +120,7 @@ class Contour:
     def moved(self, scale: float, turn: Array, start: Array, end: Array) -> "Contour":
         """The contour after a similarity of the world that takes the point `start` to `end`, (3,).
 
-        One of its points stays one of its points, whatever its coordinates.
+        If `start` is one of its points, `end` is exactly one of the new points, in spite of rounding.
         """
         return replace(
             self,
@@ -129,7 +132,7 @@ class Contour:
 
 
 def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:
-    """The unit vector across the unit n that azimuths are measured from; see SamplingPlane.axes."""
+    """The unit vector across the unit normal n from which azimuths are measured; see SamplingPlane.axes."""
     given = (0.0, 1.0, 0.0) if abs(n[0]) > 0.9 else (1.0, 0.0, 0.0)
     if tangent is not None:
         given = vector_of(unit_vector("tangent", tangent))
@@ -141,26 +144,26 @@ def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:
 
 
 def vector_of(v: Sequence[float] | Array) -> Vector:
-    """The vector in Python floats: in inner loops a numpy call would cost more than what it does."""
+    """The vector in Python floats, because in inner loops a numpy call takes longer than its work."""
     x, y, z = v
     return float(x), float(y), float(z)
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """a . b."""
+    """The dot product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector | Array, b: Vector | Array) -> Vector:
-    """a x b, of vectors or of arrays of which the first axis has three elements; np.cross is slow."""
+    """The cross product of vectors, or of arrays whose first axis has three elements; np.cross is slow."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def scaled(a: Vector, factor: float) -> Vector:
-    """factor a."""
+    """A vector times a factor."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
 def along(a: Vector, direction: Vector, length: float) -> Vector:
-    """a + length direction."""
+    """The point that is `length` times `direction` away from a."""
     return a[0] + length * direction[0], a[1] + length * direction[1], a[2] + length * direction[2]

@@ -12,26 +12,27 @@ from numpy.typing import NDArray
 from ..arguments import SMALLEST, Array
 from .contour import Contour
 
-# Contacts "very close to p" (benchmarks.accuracy); even: a cubic term bends no quadratic over equal sides.
+# So many contacts are "very close to p" (benchmarks.accuracy). The number is even, because a cubic term does
+# not bend a quadratic over equal sides.
 WINDOW = 10
-LEAST_CONTACTS = 3  # on a contour, besides the reference point; the quadratic through it has two unknowns
-RIDGE = 1e-12  # Share of the equations of r0, r1 and r2 that is added, for all s may be one.
-EXACT = 1e-6  # radians, of a measured normal: no less is told apart
+LEAST_CONTACTS = 3  # A contour has more than the quadratic's two unknowns, besides the reference point.
+RIDGE = 1e-12  # This share is added to the equations of r0, r1 and r2, because all s may be the same.
+EXACT = 1e-6  # Measured normals have at least this deviation, in radians.
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
     """The contours of b touches as seen from their reference points, c curves a touch, n contacts a curve.
 
-    What a touch or a curve has less of is filled up.
+    Touches with fewer curves, and curves with fewer contacts, are filled up.
 
     points : (b, c, n, 3), contacts other than the reference point, relative to it, in running order
     present : (b, c, n), which of them are contacts
     along : (b, c, n), their signed distances from the point along the curve's direction, ascending
     tangents : (b, c, 3), unit, pointing the way the contour's points were given; 0 where there is no curve
     curvatures : (b, c, 3), the curvature vectors r''(s) at the point, in 1/length
-    normals : (b, c, n, 3), measured normals over their standard deviation (radians), 0 where there are
-        none; None where none is measured at all
+    normals : (b, c, n, 3), measured normals over their standard deviation in radians, 0 where there are
+        none; None if there are none at all
     """
 
     points: Array
@@ -52,11 +53,8 @@ class Curves:
 def stacked(
     points: Array, touches: Sequence[Sequence[Contour]]
 ) -> tuple[Array, NDArray[np.bool_], Array | None]:
-    """Contacts relative to their reference points (b, 3), which of them there are, and measured normals.
-
-    points, present and normals of Curves, as given.
-    """
-    # At least one place, empty where there is nothing at all.
+    """The points, present and normals of Curves in the order given, for touches at points (b, 3)."""
+    # There is at least one place, which may be empty.
     curves = max([1, *(len(contours) for contours in touches)])
     longest = max([1, *(len(contour.points) for contours in touches for contour in contours)])
     r = np.zeros((len(touches), curves, longest, 3))
@@ -74,15 +72,17 @@ def stacked(
 
 
 def has_measured_normals(contours: Sequence[Contour]) -> bool:
-    """Whether a fit of these contours has slopes in it."""
+    """Whether any of the contours has normals with a deviation, so that a fit uses slopes."""
     return any(contour.normal_std is not None for contour in contours)
 
 
 def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None = None) -> Curves:
     """Fits r(s) = t s + r'' s^2 / 2, through the point, to the nearest contacts of each curve (III-C).
 
-    r : (b, c, n, 3), contacts relative to the point; present : (b, c, n); normals as in Curves. s is
-    the chord to the contact, the arc length up to its cube.
+    r : (b, c, n, 3), contacts relative to the point
+    present : (b, c, n); normals : as in Curves
+
+    s is the chord to the contact, which differs from the arc length only by its cube.
     """
     shape, each = present.shape, np.arange(present[..., 0].size)
     r, present, curve = r.reshape(len(each), -1, 3), present.reshape(len(each), -1), each[:, None]
@@ -100,7 +100,8 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
         along[backward] *= -1.0
     scale = np.where(counts > 0, far[each, farthest], 1.0)[:, None]
     tangents, curvatures = _parabola(along[curve, near] / scale, r[curve, near] / scale[..., None])
-    speed = np.maximum(np.sqrt(np.einsum("ci,ci->c", tangents, tangents)), 1e-9)[:, None]  # 1 but for noise
+    # The speed is 1 except for noise.
+    speed = np.maximum(np.sqrt(np.einsum("ci,ci->c", tangents, tangents)), 1e-9)[:, None]
     along[~present] = np.inf
     order = along.argsort(axis=1, kind="stable")
     return Curves(
@@ -114,17 +115,17 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
 
 
 def besides_point(r: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Distances (..., n) of contacts (..., n, 3) of curves from the point, and which are not the point."""
+    """Distances (..., n) of contacts (..., n, 3) from the point, and a mask of those that are not at it."""
     distance = np.sqrt(np.einsum("...ni,...ni->...n", r, r))
     least = np.maximum(1e-9 * distance.max(axis=-1, initial=0.0, keepdims=True), SMALLEST)
     return distance, distance > least
 
 
 def local_curves(curves: Curves) -> tuple[Array, Array]:
-    """r = r0 + r1 s + r2 s^2 of the curves of b touches, s along the tangent t; and the deviation of r0.
+    """r = r0 + r1 s + r2 s^2 for the curves of b touches, with s along the tangent, and the deviation of r0.
 
-    (b, c, 3, 3), rows r0, r1 and r2, fitted to the nearest contacts, and (b, c). 0 where there are too
-    few of them to tell.
+    The rows r0, r1 and r2 are fitted to the nearest contacts, (b, c, 3, 3); deviations are (b, c). All are 0
+    for curves with too few contacts to tell.
     """
     shape = curves.present.shape
     present = curves.present.reshape(-1, shape[-1])
@@ -156,7 +157,7 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
 def misses(curves: Curves) -> Array:
     """The distances at which the curves of b touches pass the reference points, and their deviations.
 
-    (b, c, 2): the part of r0 across the tangent. 0 where there are too few contacts to tell.
+    They are (b, c, 2), the length of r0 across the tangent first; 0 for curves with too few contacts to tell.
     """
     local, stds = local_curves(curves)
     foot = local[..., 0, :]
@@ -171,7 +172,7 @@ def misses(curves: Curves) -> Array:
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
     """t and r'' of r = t s + r'' s^2 / 2 by least squares, (c, 3) each, from (c, k) and (c, k, 3).
 
-    Where all s are one the two cannot be told apart: then the shortest solution.
+    If all s are the same, the two cannot be told apart, and it is the shortest solution.
     """
     powers = np.empty((len(s), 2, s.shape[1]))
     powers[:, 0] = s

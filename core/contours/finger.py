@@ -9,10 +9,11 @@ from typing import Protocol
 from ..arguments import LARGEST, shown
 from .contour import CREASE, NO_CONTACT, NOT_MONGE, Vector, cross, dot, scaled
 
-# What a crease is, and what is too steep: benchmarks.refusals counts what they refuse.
-MAX_TURN = math.cos(math.radians(45.0))  # between contacts; a sharper turn is a crease to a finger
-MAX_TILT = math.cos(math.radians(75.0))  # against the normal at the point; beyond, slopes exceed 3.7
-LEAST_IN_PLANE = 1e-3  # Least share of a surface normal in the sampling plane.
+# benchmarks.refusals counts what these refuse.
+MAX_TURN = math.cos(math.radians(45.0))  # A sharper turn between two contacts is a crease to a finger.
+# A normal tilted more against that at the point has slopes above 3.7.
+MAX_TILT = math.cos(math.radians(75.0))
+LEAST_IN_PLANE = 1e-3  # A surface normal has at least this share in the sampling plane.
 
 
 class Surface(Protocol):
@@ -21,21 +22,23 @@ class Surface(Protocol):
     def ray_cast(
         self, origin: Vector, direction: Vector, distance: float
     ) -> tuple[Sequence[float], Sequence[float]] | None:
-        """The first point hit within `distance` along the unit `direction`, and the unit normal there."""
+        """The first point within `distance` along the unit `direction` and the unit normal there, or None."""
 
 
-# A touch in a sampling plane: where, and the part of the surface normal in the plane; both in space.
+# A contact: its place and the surface normal, both in the sampling plane as complex numbers, and both in
+# space.
 _Contact = tuple[complex, complex, Vector, Vector]
-_Cast = Callable[[complex, complex, float], _Contact | None]  # start, direction and distance of a ray
+# It takes start, direction and distance of a ray.
+_Cast = Callable[[complex, complex, float], _Contact | None]
 
 
 def first_contact(
     surface: Surface, p: Vector, n: Vector, e1: Vector, step: float
 ) -> tuple[Vector, Vector, float]:
     """The contact at the reference point, the normal there on the side of `n`, and that side's sign."""
-    reach = 0.1 * step  # shorter than a step: a wall close above the point is not the point's
+    reach = 0.1 * step  # It is shorter than a step, because a wall close above does not belong to the point.
     e2 = cross(n, e1)
-    # On an edge or a vertex of a mesh a ray may slip between the faces: a hair's breadth beside it does not.
+    # On an edge or a vertex of a mesh a ray may slip between the faces. A hair's breadth aside it does not.
     for aside, length in ((e1, 0.0), (e1, 1e-3), (e2, 1e-3), (e1, -1e-3), (e2, -1e-3)):
         contact = section(surface, p, aside, n, 1.0)(complex(length * step, reach), -1j, 2.0 * reach)
         if contact is not None:
@@ -50,12 +53,12 @@ def first_contact(
 def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float) -> _Cast:
     """The rays of the sampling plane through `origin` that holds t and u, both unit, as a complex plane.
 
-    In Python floats: a contact costs its ray casts, not a dozen numpy calls.
+    It uses Python floats, because a dozen numpy calls would take longer than a contact's rays.
     """
     (x0, y0, z0), (tx, ty, tz), (ux, uy, uz), ray_cast = origin, t, u, surface.ray_cast
 
     def cast(start: complex, direction: complex, distance: float) -> _Contact | None:
-        """What the surface answers; direction is unit."""
+        """The contact of a ray along the unit `direction`, or None."""
         a, b, c, d = start.real, start.imag, direction.real, direction.imag
         hit = ray_cast(
             (x0 + a * tx + b * ux, y0 + a * ty + b * uy, z0 + a * tz + b * uz),
@@ -66,7 +69,7 @@ def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float)
             return None
         try:
             (x, y, z), (nx, ny, nz) = hit
-            # NaN fails every comparison, so it is refused too.
+            # NaN fails every comparison, so it is refused, too.
             sound = abs(x) + abs(y) + abs(z) <= LARGEST and abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-2
         except (TypeError, ValueError, OverflowError):
             sound = False
@@ -84,9 +87,9 @@ def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float)
 def contacts(
     cast: _Cast, up: complex, turn: complex, n: Vector, step: float
 ) -> Generator[tuple[Vector, Vector], None, str]:
-    """Contacts with surface normals on one side of the reference point, which is 0; and why they end.
+    """Yields contacts with surface normals on one side of the reference point 0, and returns why they end.
 
-    up : the curve's normal there, `turn` times which is the way ahead
+    up : the curve's normal at the point; `turn` times it is the way ahead
     """
     at = 0j
     if abs(up) < LEAST_IN_PLANE:
@@ -94,17 +97,17 @@ def contacts(
     up /= abs(up)
     while True:
         ahead = turn * up
-        # A finger bumps into a wall; the ray from above would come down behind it.
+        # A finger bumps into a wall, behind which the ray from above would come down.
         if cast(at + step * up, ahead, step) is not None:
             return CREASE
         contact = _next_contact(cast, at, ahead, up, step)
         if contact is None:
-            # A flank is found under the point, and behind it where the edge is sharper than 90 degrees.
+            # A flank is below the point, or behind it if the edge is sharper than 90 degrees.
             flank = cast(at + step * ahead - 0.5 * step * up, -ahead, 2.0 * step)
             return NO_CONTACT if flank is None else CREASE
         at, new_up, point, normal = contact
         length = abs(new_up)
-        # Where the surface lies in the plane there is no curve to follow.
+        # If the surface lies in the plane, there is no curve to follow.
         if length < LEAST_IN_PLANE or (new_up * up.conjugate()).real < MAX_TURN * length:
             return CREASE
         if dot(normal, n) < MAX_TILT:
@@ -116,8 +119,8 @@ def contacts(
 def _next_contact(cast: _Cast, at: complex, ahead: complex, up: complex, step: float) -> _Contact | None:
     """The contact one `step` from `at`, by a ray from above back along the curve's normal.
 
-    A step along the tangent lands farther than a step along the curve, so where that is more than
-    0.1 % the ray is cast once more from where the chord has the right length.
+    A step along the tangent leads farther than a step along the curve. If that is more than 0.1 %, the ray is
+    cast once more from where the chord has the right length.
     """
     forward = step
     for _ in range(2):

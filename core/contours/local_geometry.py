@@ -14,9 +14,9 @@ from .contour import Contour, cross
 from .curves import LEAST_CONTACTS, Curves
 
 # benchmarks.stability leads planes and tilts to where these refuse them.
-LEAST_ANGLE = math.radians(1.0)  # between tangents that count as distinct
-OFF_PLANE = math.sin(math.radians(25.0))  # Sine of the angle of a tangent and the tangent plane.
-UMBILIC = 1e-9  # the difference of curvatures, in unit radius, that is none
+LEAST_ANGLE = math.radians(1.0)  # Tangents count as distinct from this angle on.
+OFF_PLANE = math.sin(math.radians(25.0))  # Tangents are off the tangent plane by at most this angle.
+UMBILIC = 1e-9  # Curvatures that differ by less, in unit radius, count as the same.
 
 
 class DegenerateCurvesError(ValueError):
@@ -35,11 +35,11 @@ class Frame:
     axes: Array
 
     def to_local(self, points: ArrayLike) -> Array:
-        """World points (n, 3) in the frame, (n, 3)."""
+        """World points (n, 3) as local points (n, 3)."""
         return (np.asarray(points, dtype=float) - self.origin) @ self.axes
 
     def to_world(self, points: ArrayLike) -> Array:
-        """Local points (n, 3) in the world, (n, 3)."""
+        """Local points (n, 3) as world points (n, 3)."""
         return self.origin + np.asarray(points, dtype=float) @ self.axes.T
 
 
@@ -52,12 +52,12 @@ def surface_normals(tangents: Array, outward: Array) -> Array:
 def principal_curvatures(
     angles: ArrayLike, curvatures: ArrayLike, known: NDArray[np.bool_] | bool = True
 ) -> tuple[Array, Array, Array]:
-    """kappa1 <= kappa2 and the angle of d1, in (-90, 90] degrees; (...) each.
+    """kappa1 <= kappa2 and the angle of d1 in radians, above -pi/2 and up to pi/2, (...) each.
 
-    They follow from normal curvatures (..., c) at angles (..., c), where these are `known`: formula (2) as
-    kappa_i = H + A cos 2 phi_i + B sin 2 phi_i: linear, exact for three curves and least squares for
-    more. At an umbilic (A and B within rounding of 0, measured against 1 and the curvatures: pass them
-    in unit radius) d1 is at angle 0.
+    They follow from normal curvatures (..., c) at angles (..., c) in radians, as far as these are `known`, by
+    formula (2) in the form kappa_i = H + A cos 2 phi_i + B sin 2 phi_i. It is linear: exact for three curves,
+    and solved by least squares for more. At an umbilic d1 is at angle 0: there A and B are within rounding of
+    0, compared with 1 and the curvatures, so pass these in unit radius.
     """
     phi, kappa = np.asarray(angles, dtype=float), np.asarray(curvatures, dtype=float)
     rows = np.empty((*phi.shape, 3))
@@ -71,10 +71,10 @@ def principal_curvatures(
 
 
 def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array]:
-    """Darboux frames about normals (b, 3), (b, 3, 3); kappa1 and kappa2 in unit radius and the radii L, (b,).
+    """Darboux frames (b, 3, 3) about normals (b, 3); kappa1 and kappa2 in unit radius and the radii L, (b,).
 
-    d1 is within 90 degrees of the first curve's tangent, and that tangent at an umbilic. L is the
-    largest distance of a contact from the point in the tangent plane.
+    d1 is within 90 degrees of the first curve's tangent, and is this tangent at an umbilic. L is the largest
+    distance of a contact from the point in the tangent plane.
     """
     tangents = curves.tangents
     e1 = tangents[:, 0] - np.einsum("bi,bi->b", tangents[:, 0], n)[:, None] * n
@@ -84,8 +84,8 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
     flat = curves.points @ plane[:, None]
     squares = np.einsum("...i,...i->...", flat, flat) * curves.present
     radius = np.sqrt(squares.reshape(len(n), -1).max(axis=1))
-    # Meusnier with its sign: the normal curvature is the normal part of the curvature vector,
-    # kappa' cos(theta) in the paper's words.
+    # By Meusnier the normal curvature is the normal part of the curvature vector, with its sign: the paper's
+    # kappa' cos(theta).
     kappas = radius[:, None] * np.einsum("bci,bi->bc", curves.curvatures, n)
     flat = tangents @ plane
     angles = np.arctan2(flat[..., 1], flat[..., 0])
@@ -99,7 +99,7 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
 def degeneracy(
     contours: Sequence[Contour], present: NDArray[np.bool_], tangents: Array, normal: Array
 ) -> DegenerateCurvesError | None:
-    """Why one touch of Curves carries no frame, and what to move; None where it carries one."""
+    """The error that says why one touch of Curves carries no frame, and what to move; or None."""
     for i, (contour, count) in enumerate(zip(contours, present.sum(axis=1), strict=False), 1):
         if count < LEAST_CONTACTS:
             why = f" (it ended by: {', '.join(contour.stops)})" if contour.stops else ""

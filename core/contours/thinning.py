@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Contours of very many contacts as fewer, each the mean of neighbors along the curve.
 
-The fit takes where a contact lies in the tangent plane for exact. Noise in all directions scatters contacts
-sideways too, off their sampling plane, and many of them would then seem to tell what goes on beside it. The
-mean of k neighbors scatters by a kth in its variance, and tells as much of the heights.
+The fit takes the places of contacts in the tangent plane for exact. Noise in all directions also scatters
+contacts sideways, off their sampling plane, and many of them would then seem to tell the shape beside it. The
+mean of k neighbors has a kth of their variance, and tells as much of the heights.
 """
 
 import math
@@ -17,13 +17,14 @@ from ..arguments import Array
 from .contour import Contour
 from .curves import WINDOW, besides_point
 
-MOST_CONTACTS = 100  # contacts of a contour, of which no fit is worse with noise in all directions
+# With so many contacts a contour no fit is worse, with noise in all directions (tests: test_thinning).
+MOST_CONTACTS = 100
 
 
 def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
-    """The contour of MOST_CONTACTS at most besides the reference point, and of how many each is the mean.
+    """The contour of at most MOST_CONTACTS means besides the point, and the number of contacts in each mean.
 
-    Runs as the contour does; noise and normal_std are those of the means.
+    It runs as the given contour does; noise and normal_std are those of the means.
     """
     if len(contour.points) <= MOST_CONTACTS:
         return contour, 1
@@ -40,7 +41,7 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     counts = np.diff(starts, append=len(order))[:, None]
 
     def means(values: Array) -> Array:
-        """The mean of each group, (m, 3) from (n, 3)."""
+        """The means (m, 3) of the groups among values (n, 3)."""
         return np.add.reduceat(values[order], starts, axis=0) / counts
 
     normals, noise, std = contour.normals, contour.noise, contour.normal_std
@@ -56,8 +57,9 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
 
 
 def _along(r: Array, count: int) -> Array:
-    """Signed places (n,) of contacts (n, 3) along their curve, which runs as they do."""
-    # The tangent at the point, by `count` contacts near it: the longest axis of a steep curve is its normal.
+    """Signed places (n,) of contacts (n, 3) along their curve, in the direction in which they run."""
+    # It takes the tangent of `count` contacts near the point, because a steep curve's longest axis is its
+    # normal.
     order = np.argsort(np.einsum("ni,ni->n", r, r), kind="stable")
     near = r[order[:count]]
     along = r @ np.linalg.eigh(near.T @ near)[1][:, -1]
@@ -66,7 +68,7 @@ def _along(r: Array, count: int) -> Array:
 
 
 def _alike(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) -> Array:
-    """The normals (n, 3) at length 1, or 0, each on the side of the first of its group."""
+    """The normals (n, 3) with length 1, or 0, each on the side of the first in its group."""
     unit = normals / np.maximum(np.abs(normals).max(axis=1, keepdims=True), 1e-300)
     unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-300)
     group = np.empty(len(order), dtype=np.intp)
@@ -76,6 +78,6 @@ def _alike(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) ->
 
 
 def _starts(first: int, last: int, size: int) -> NDArray[np.intp]:
-    """The starts of groups of about that size, of places from first to last."""
+    """The starts of groups of about this size among places from first to last."""
     count = max(1, (last - first) // size) if last > first else 0
     return first + np.arange(count, dtype=np.intp) * (last - first) // max(count, 1)

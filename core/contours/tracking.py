@@ -13,7 +13,7 @@ from ..arguments import LARGEST, Array, finite_array, list_of, number, shown, un
 from .contour import EXTENT, Contour, SamplingPlane, Vector, dot, tangent_of, vector_of
 from .finger import LEAST_IN_PLANE, Surface, contacts, first_contact, section
 
-MOST_IN_HALF = 10_000  # on half a contour
+MOST_IN_HALF = 10_000  # Half a contour has at most so many contacts.
 
 
 def track(
@@ -28,15 +28,15 @@ def track(
     rng: np.random.Generator | int | None = None,
     tangent: ArrayLike | None = None,
 ) -> list[Contour]:
-    """Slides a finger over `surface` both ways from `point`, once in each plane.
+    """Slides a finger over `surface` both ways from `point`, once in each plane (paper, III-C and V).
 
     point, outward : (3,), the reference point and the outward normal; a sheet can be touched from either side
-    planes : azimuths measured from `tangent`, see SamplingPlane.axes
+    planes : azimuths are measured from `tangent`, see SamplingPlane.axes
     extent, step : lengths along the curve, of each half and between contacts
-    noise : standard deviation of the sensor, in the plane along the curve's normal; drawn from `rng`
+    noise : standard deviation of the sensor, in the plane and along the curve's normal; drawn from `rng`
 
-    Returns one Contour per plane, from azimuth + 180 degrees to azimuth, which contains the exact point.
-    Raises ValueError for bad numbers, and where there is no surface at the point.
+    Returns one Contour for each plane, from azimuth + 180 degrees to azimuth, which contains the exact point.
+    Raises ValueError for bad numbers, and if there is no surface at the point.
     """
     step = number("step", step, above=0.0)
     _count(number("extent", extent, above=0.0), step)
@@ -56,7 +56,7 @@ def following(
     rng: np.random.Generator | int | None = None,
     tangent: ArrayLike | None = None,
 ) -> Callable[[float], list[Contour]]:
-    """`track` as a function of the extent that, asked for a longer one, goes on from where it was."""
+    """`track` as a function of the extent, which goes on from where it was when a longer one is asked for."""
     p = finite_array("point", point, (3,), LARGEST)
     n = vector_of(unit_vector("outward", outward))
     planes = list_of("planes", planes, SamplingPlane)
@@ -67,12 +67,12 @@ def following(
     for plane in planes:
         t, u, across = plane.floats(n, e1)
         cast, up_in_plane = section(surface, start, t, u, side), complex(dot(up, t), dot(up, u))
-        # Turned by a quarter, clockwise, the curve's normal is its tangent.
+        # The curve's normal, turned clockwise by a quarter, is its tangent.
         halves = [_Half(contacts(cast, up_in_plane, turn, n, step)) for turn in (1j, -1j)]
         curves.append(_Curve(across, halves, p[None], np.array([up])))
 
     def contours(extent: float) -> list[Contour]:
-        """The contours to this extent, a length; raises ValueError where it is not one of many steps."""
+        """The contours to this extent, a length. Raises ValueError if it is not a length of several steps."""
         count = _count(extent, step)
         return [_followed(curve, count, noise, generator) for curve in curves]
 
@@ -80,17 +80,17 @@ def following(
 
 
 def _count(extent: float, step: float) -> int:
-    """The contacts of half a contour."""
+    """The number of contacts of half a contour."""
     if extent < step:
         raise ValueError(f"step: expected no more than the extent {extent:g}, got {step:g}")
     if extent / step > MOST_IN_HALF:
         raise ValueError(f"step: expected at least a {MOST_IN_HALF}th of the extent {extent:g}, got {step:g}")
-    return math.floor(extent / step * (1.0 + 1e-6))  # both may come out of float32
+    return math.floor(extent / step * (1.0 + 1e-6))  # Both may have been float32.
 
 
 @dataclass(eq=False)
 class _Half:
-    """One side of a contour: contacts with their normals, how many were felt, and why there are no more."""
+    """One side of a contour: contacts with normals, the number that was felt, and why there are no more."""
 
     contacts: Generator[tuple[Vector, Vector], None, str]
     count: int = 0
@@ -99,7 +99,7 @@ class _Half:
 
 @dataclass(eq=False)
 class _Curve:
-    """A contour as far as it was followed, in the plane across a normal; points and normals (n, 3)."""
+    """A contour as far as it was followed, with the normal of its plane; points and normals are (n, 3)."""
 
     across: Vector
     halves: list[_Half]
@@ -108,12 +108,13 @@ class _Curve:
 
 
 def _followed(curve: _Curve, count: int, noise: float, generator: np.random.Generator) -> Contour:
-    """The contour as far as so many contacts on either side; contacts keep the noise they came with."""
+    """The contour of `count` contacts on either side; contacts keep the noise that they have."""
     back, ahead = (_more(half, count) for half in curve.halves)
     if back or ahead:
         points, normals = np.array([*back[::-1], *ahead]).transpose(1, 0, 2)
         if noise:
-            offsets = np.delete(generator.normal(0.0, noise, len(points) + 1), len(back))  # not of the point
+            # The point has none.
+            offsets = np.delete(generator.normal(0.0, noise, len(points) + 1), len(back))
             points = points + offsets[:, None] * _in_plane(normals, curve.across)
         behind = len(back)
         curve.points = np.concatenate([points[:behind], curve.points, points[behind:]])
@@ -123,7 +124,7 @@ def _followed(curve: _Curve, count: int, noise: float, generator: np.random.Gene
 
 
 def _more(half: _Half, count: int) -> list[tuple[Vector, Vector]]:
-    """Contacts that are missing to so many, with their normals."""
+    """Feels the contacts that are missing to `count`, with their normals."""
     found: list[tuple[Vector, Vector]] = []
     while half.stop == EXTENT and half.count < count:
         try:
@@ -135,7 +136,7 @@ def _more(half: _Half, count: int) -> list[tuple[Vector, Vector]]:
 
 
 def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
-    """Raises ValueError for what is no seed."""
+    """The generator for a seed, or the given one. Raises ValueError if `rng` is neither."""
     try:
         return np.random.default_rng(rng)
     except (TypeError, ValueError):
@@ -145,6 +146,6 @@ def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
 
 
 def _in_plane(normals: Array, across: Vector) -> Array:
-    """The curve's unit normals, by those of the surface; shorter where these have next to none of it."""
+    """The curve's unit normals from those of the surface; shorter if these hardly lie in the plane."""
     in_plane = normals - np.outer(normals @ across, across)
     return in_plane / np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), LEAST_IN_PLANE)

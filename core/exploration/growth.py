@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far half curves can be followed from the reference point, as long as fits explain their contacts.
 
-What fits is asked by `yield`: of contours, answered by their Reconstruction or the error why there is none.
+The generators here yield contours and are sent the Reconstruction of these, or the error why there is none.
 So touches of one surface can grow side by side, and their fits be done in stacks.
 """
 
@@ -21,31 +21,32 @@ from ..contours.contour import EXTENT, UNEXPLAINED, Contour
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import DOUBTFUL_STD
+from .enough import stride_of
 
-# benchmarks.amount judges the numbers of contacts, benchmarks.extents how far curves grow.
-# Numbers of contacts of the longest half curve: the first that is enough is taken.
-CONTACT_COUNTS = (12, 24, 48)
-SHORTEST = 4  # contacts of the shortest half curve
-FELT = 96  # steps of a half curve as long as may be
-SEEDS = (24, 12, 6, 3)  # Steps that a half curve may begin with.
+# benchmarks.extents judges how far curves grow.
+FELT = 96  # A half curve as long as it may be has so many steps.
+SEEDS = (24, 12, 6, 3)  # A half curve begins with one of these numbers of steps.
 GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
-STRETCH = 1.5  # A half curve grows by this factor at once, by its square where it is in next to no doubt,
-EASY = 0.1  # of what ends growth.
-NEARLY_ENDED = 0.75  # of what ends growth: where twice as long is in doubt, nothing between is tried
-HOPELESS = 3.0  # times it: with half as many contacts it is too large still
-TOO_ROUGH = 0.0085  # Roughness of contacts whose fit ends growth, in all but one of a hundred
-EXPLAINED = 3.0  # times its noise, that a contact is off: root mean square of a half curve
+# Doubt is measured such that growth ends where it exceeds 1.
+STRETCH = 1.5  # A half curve grows by this factor at once, and by its square while its doubt is at most EASY.
+EASY = 0.1
+NEARLY_ENDED = 0.75  # Where curves twice as long are in doubt, only those of at most this spread grow.
+HOPELESS = 3.0  # Where doubt exceeds this, curves half as long are not tried: they are too long as well.
+CLOSE = 1.15  # A sure touch may be shorter than one in doubt by this factor (benchmarks.real).
+TOO_ROUGH = 0.0085  # Contacts of this roughness have a fit that ends growth, in 99 of 100 cases.
+EXPLAINED = 3.0  # The root mean square of what is left of a half curve may be so many times its noise.
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
 Fits = Generator[list[Contour], Reconstruction | DegenerateCurvesError, "Grown"]
-Feel = Callable[[float], "Felt"]  # half curves to a length, which becomes longer each time
+Feel = Callable[[float], "Felt"]  # It follows half curves to a length, which is longer at each call.
 
 
 @dataclass(frozen=True, eq=False)
 class Felt:
-    """Contours as they were tracked with a step between contacts; `partial`: not as far as may be.
+    """Contours as they were tracked with this step between contacts.
 
-    largest_std : a length, that the mean deviation of the height may be at most; None for a share of L
+    largest_std : a length, the largest mean deviation of the height; None for a share of L
+    partial : whether half curves could be tracked farther
     """
 
     contours: list[Contour]
@@ -56,12 +57,12 @@ class Felt:
 
     @cached_property
     def places(self) -> list[int]:
-        """The place of the point in each contour."""
+        """The index of the reference point in each contour."""
         return [int(np.argmax((contour.points == self.point).all(axis=1))) for contour in self.contours]
 
     @cached_property
     def whole(self) -> Counts:
-        """The contacts there are."""
+        """The numbers of all contacts that were felt, (c, 2)."""
         each = zip(self.contours, self.places, strict=True)
         return np.array([(at, len(contour.points) - 1 - at) for contour, at in each])
 
@@ -71,7 +72,7 @@ class Felt:
         return np.array([[self.partial and s == EXTENT for s in c.stops or ()] for c in self.contours])
 
     def shortened(self, counts: Counts, stride: int = 1) -> list[Contour]:
-        """Every so many of these contacts, and the point."""
+        """The contours of so many contacts to either side, and the point; only each `stride`-th is kept."""
         found = []
         ends = (counts < self.whole) | self.open
         for contour, at, n, end in zip(self.contours, self.places, counts.tolist(), ends, strict=True):
@@ -82,21 +83,21 @@ class Felt:
         return found
 
     def roughness(self, counts: Counts) -> float:
-        """How far so many contacts are off any sextic: above 1 their fit would be in doubt."""
+        """How far so many contacts are off the nearest sextic: above 1 their fit would be in doubt."""
         contours = self.shortened(counts, stride_of(counts))
         points = np.vstack([contour.points for contour in contours])
         noise = max(contour.noise or 0.0 for contour in contours)
         return roughness(points - self.point, noise) / TOO_ROUGH
 
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
-        """How far so many contacts are off a fit, the root mean square of each half curve, (c, 2).
+        """The root mean square of what a fit leaves of so many contacts of each half curve, (c, 2).
 
-        Above 1 is too much for their noise.
+        It is in units of the largest that their noise explains.
         """
         each = list(zip(self.contours, self.places, counts.tolist(), strict=True))
         points = np.vstack([contour.points[at - n[0] : at + n[1] + 1] for contour, at, n in each])
         x, y, z = r.frame.to_local(points).T
-        # The point itself, which stands between the sides of each, is none of either.
+        # The reference point stands between the two sides of each contour and belongs to neither.
         sizes = np.array([(a, 1, b) for _, _, (a, b) in each])
         starts = np.cumsum(sizes) - sizes.ravel()
         squares = np.append((z - r.height(x, y)) ** 2, 0.0)
@@ -106,9 +107,10 @@ class Felt:
 
 
 class Grown(NamedTuple):
-    """Half curves of so many contacts, felt and, every `stride` of them, fitted; and what is in doubt of it.
+    """Half curves of so many contacts, of which each `stride`-th is fitted, and how doubtful their fit is.
 
-    misfits, spread : of the contacts, (c, 2), and of the mean deviation: above 1 is too much
+    misfits : of each half curve, (c, 2), as `Felt.misfits` has them; above 1 is too much
+    spread : the mean deviation of the height as a share of the largest that is wanted; above 1 is too much
     """
 
     felt: Felt
@@ -120,25 +122,25 @@ class Grown(NamedTuple):
 
     @property
     def doubt(self) -> float:
-        """The largest doubt; there is none up to 1."""
+        """The largest of misfits and spread; the fit is in no doubt up to 1."""
         return max(float(self.misfits.max()), self.spread)
 
     @property
     def length(self) -> float:
-        """That of the longest half curve."""
+        """The length of the longest half curve."""
         return float(self.counts.max()) * self.felt.step
 
     @property
     def sure(self) -> bool:
-        """Whether its status is "ok"."""
+        """Whether the status of the fit is "ok"."""
         return self.result.status == "ok"
 
 
 def grown(feel: Feel, farthest: float, step: float) -> Fits:
-    """The longest half curves that fits explain; raises DegenerateCurvesError where none carries a fit."""
+    """The longest half curves that fits explain. Raises DegenerateCurvesError if none carries a fit."""
     known: list[Grown] = []
     found = yield from _seed(feel, step, known)
-    # Where a shorter one is in more doubt for its noise: that is the smaller the longer the curves are.
+    # A shorter one was tried after it and is in more doubt. Noise causes that: longer curves bear it better.
     if found.result.noise > MISFIT and found is not known[-1]:
         return (yield from _longer(feel, farthest, found, np.inf, np.inf))
     if found.doubt > 1.0:
@@ -149,7 +151,10 @@ def grown(feel: Feel, farthest: float, step: float) -> Fits:
 
 
 def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: float) -> Fits:
-    """Half curves that grow from those found, to a mean deviation of `most` and a length below `doubtful`."""
+    """The longest half curves that grow from `found`, while its spread is at most `most`.
+
+    They stay shorter than `doubtful`, a length at which curves are known to be in doubt.
+    """
     accepted, felt, growing, quick = [found], found.felt, np.full(found.counts.shape, True), True
     while (growing := growing & ((found.counts < felt.whole) | felt.open)).any() and found.spread <= most:
         quick = quick and found.doubt <= EASY
@@ -157,9 +162,12 @@ def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: fl
         longer = np.where(growing, stretched, found.counts).astype(np.intp)
         length = float(longer.max()) * felt.step
         if length >= doubtful:
-            break
+            if not quick:
+                break
+            quick = False
+            continue
         if (felt.open & (longer > felt.whole)).any():
-            further = min(length + felt.step, farthest)  # by one more, so that where they end shows
+            further = min(length + felt.step, farthest)  # One step more shows whether they end there.
             felt = feel(further)
         try:
             trial = yield from tried(felt, np.minimum(longer, felt.whole))
@@ -167,23 +175,35 @@ def _longer(feel: Feel, farthest: float, found: Grown, most: float, doubtful: fl
             break
         if quick and trial.doubt > 1.0:
             quick = False
-        elif trial.misfits.max() > 1.0:  # the half curve that is explained worst ends here
+        elif trial.misfits.max() > 1.0:  # The half curve that is explained worst ends here.
             growing.flat[np.argmax(np.where(growing, trial.misfits, -1.0))] = False
         elif trial.spread > max(1.0, found.spread):
             break
         else:
             accepted.append(found := trial)
-    # What is known for sure is not given away for more.
-    return next((trial for trial in reversed(accepted) if trial.sure), found)
+    # A sure touch is better than a larger one in doubt.
+    sure = next((trial for trial in reversed(accepted) if trial.sure), found)
+    return sure if felt.largest_std else (yield from _longest_sure(sure, found))
+
+
+def _longest_sure(sure: Grown, longer: Grown) -> Fits:
+    """The longest sure trial, within CLOSE, between one that is sure and a longer one that is not."""
+    while longer.length > CLOSE * sure.length:
+        counts = np.sqrt(sure.counts * longer.counts).astype(np.intp)
+        if (counts == sure.counts).all():
+            break
+        trial = yield from tried(longer.felt, counts)
+        sure, longer = (trial, longer) if trial.sure and trial.doubt <= 1.0 else (sure, trial)
+    return sure
 
 
 def _seed(feel: Feel, step: float, known: list[Grown]) -> Fits:
-    """The longest of SEEDS that is in no doubt, or the one in the least; what is tried becomes `known`."""
+    """The longest of SEEDS that is in no doubt, or else the one in the least; all trials go into `known`."""
     error, seeds, rough = None, list(SEEDS), []
     felt = feel(SEEDS[0] * step)
     while seeds:
         counts = np.minimum(seeds.pop(0), felt.whole)
-        doubt = felt.roughness(counts) if seeds else 0.0  # the shortest are fitted however rough they are
+        doubt = felt.roughness(counts) if seeds else 0.0  # The shortest is fitted however rough it is.
         if doubt <= 1.0:
             try:
                 trial = yield from tried(felt, counts)
@@ -198,35 +218,23 @@ def _seed(feel: Feel, step: float, known: list[Grown]) -> Fits:
             rough.append(counts)
         if doubt > HOPELESS and len(seeds) > 1:
             seeds.pop(0)
-    if not known and rough:  # where a shorter one carries no fit
+    if not known and rough:  # The longer ones were too rough, and the shorter ones carry no fit.
         known.append((yield from tried(felt, rough[-1])))
     if not known and error is not None:
         raise error
     best = min(known, key=lambda trial: (trial.doubt, trial.length))
     if best.doubt <= 1.0 or felt.largest_std is not None:
         return best
-    # Growth does not go on from any: the longest that is sure is as good as a short one in less doubt.
+    # Growth goes on from none of them, so the longest that is sure is better than a short one in less doubt.
     enough = [trial for trial in known if trial.sure and trial.misfits.max() <= 1.0]
     return max((best, *enough), key=lambda trial: trial.length)
 
 
 def tried(felt: Felt, counts: Counts) -> Fits:
-    """The fit of so many contacts, of which as few are fitted as most often are enough."""
+    """The fit of so many contacts. It takes as few of them as are enough in most cases."""
     stride = stride_of(counts)
     r = yield felt.shortened(counts, stride)
     if isinstance(r, DegenerateCurvesError):
         raise r
     spread = r.mean_height_std / (felt.largest_std or GROWN_STD * r.radius)
     return Grown(felt, counts, stride, felt.misfits(counts, r), spread, r)
-
-
-def stride_of(counts: Counts) -> int:
-    """One contact of so many is fitted."""
-    return max(1, int(spacing(counts, CONTACT_COUNTS[0])))
-
-
-def spacing(reaches: Array | Counts, count: int) -> float:
-    """A step that gives the longest of half curves (c, 2) some `count` contacts, the shortest SHORTEST."""
-    longest = float(reaches.max())
-    shortest = float(np.where(reaches > 0, reaches, longest).min())
-    return min(longest / count, max(shortest / SHORTEST, longest / CONTACT_COUNTS[-1]))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One touch that chooses what is not given, and asks by `yield` for its fits, as in growth.py."""
+"""One touch that chooses what is not given. Its generators yield contours to be fitted, as in growth.py."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
@@ -13,29 +13,20 @@ from ..contours.contour import Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
-from .enough import is_enough
-from .growth import (
-    CONTACT_COUNTS,
-    FELT,
-    SHORTEST,
-    STRETCH,
-    Counts,
-    Feel,
-    Felt,
-    Grown,
-    grown,
-    spacing,
-)
+from .enough import CONTACT_COUNTS, SHORTEST, is_enough, spacing
+from .growth import FELT, STRETCH, Counts, Feel, Felt, Grown, grown
 from .taps import Tapped, beside
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
-SHORTER = 1.15  # A half curve beside what contradicts a fit is shortened by this factor at once.
+SHORTER = 1.15  # Half curves beside a contradiction are shortened so much (benchmarks.real --only taps).
 
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
-    """The contours and the reconstruction, the length of the longest half curve, and the step.
+    """A touch: what was felt, and the reconstruction of it.
 
+    extent : length of the longest half curve
+    step : distance along a curve between contacts
     planes : the given planes and those that were added
     stds : the mean deviation of the height with the planes given, and after each that was added
     """
@@ -49,7 +40,7 @@ class Exploration:
 
 
 class Ask(NamedTuple):
-    """Contours to be fitted: as it is asked for, or by the default method, by which curves grow."""
+    """Contours to be fitted: with the options that the caller asked for or, while `growing`, the defaults."""
 
     contours: list[Contour]
     growing: bool = False
@@ -57,18 +48,22 @@ class Ask(NamedTuple):
 
 Answer = Reconstruction | DegenerateCurvesError
 Steps = Generator[Ask, Answer, Exploration]
-Contacts = tuple[list[Contour], float, Reconstruction | None]  # with their step, and their fit where known
+Contacts = tuple[list[Contour], float, Reconstruction | None]  # contours, their step, their fit if known
 
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """A place and how to feel there, a function of planes and step that gives one of extents; what is wanted.
+    """What a touch begins with, and how the finger feels there.
 
-    Lengths are None where they are to be chosen, the tolerance where no planes are to be added.
-    reference : columns e1, n and e1 x n, which azimuths are measured by
-    largest_std : a length, that curves may grow to
-    tap : taps between the curves of a fit, see taps.py
-    is_grown : whether what makes curves grow is the fit that is asked for
+    follow : takes planes and a step, returns what follows their contours to a given extent
+    point : (3,)
+    reference : columns e1, n and e1 x n, from which azimuths are measured
+    extent, step : lengths; None where they are to be chosen
+    farthest : a length that no half curve exceeds
+    tolerance : mean deviation of the height to reach by adding planes; None adds no planes
+    largest_std : mean deviation of the height up to which curves grow; None for a share of the radius
+    tap : taps the surface between the curves of a fit, see taps.py
+    is_grown : whether the caller asks for the same fit that makes the curves grow
     """
 
     follow: Callable[..., Callable[[float], list[Contour]]]
@@ -86,11 +81,11 @@ class Touch:
 
     @property
     def is_tapped(self) -> bool:
-        """Whether the finger taps between the curves: not where they are as long as asked for."""
+        """Whether the finger taps between the curves: only if shares of the radius choose their length."""
         return self.extent is None and self.largest_std is None
 
     def steps(self) -> Steps:
-        """The touch, with planes added while they help: they are for a better patch, not for a larger one."""
+        """The touch, with planes added while they help. They make a patch more certain, not larger."""
         found = yield from (self._grown() if self.extent is None else self._of_extent(self.extent))
         stds = [found.result.mean_height_std]
         while (
@@ -101,7 +96,7 @@ class Touch:
                 break
             try:
                 found = yield from self._with_plane(found, plane)
-            except ValueError:  # nothing can be felt along that one: what was felt so far stays
+            except ValueError:  # Nothing can be felt along that plane. What was felt so far stays.
                 break
             stds.append(found.result.mean_height_std)
         if self.is_tapped and found.result.taps is None:
@@ -112,13 +107,13 @@ class Touch:
         steps = [extent / count for count in CONTACT_COUNTS] if self.step is None else [self.step]
 
         def at(step: float) -> Contacts:
-            """Contacts so far apart."""
+            """The contacts this step apart."""
             return self.follow(self.planes, step=step)(extent), step, None
 
         return (yield from self._enough(at, extent, steps))
 
     def _grown(self) -> Steps:
-        """The touch that is as large as it can be trusted."""
+        """The touch as large as it can be trusted."""
         between = max(self.step or 0.0, self.farthest / FELT)
         fits = grown(self._feeling(between), self.farthest, between)
         contours = next(fits)
@@ -132,13 +127,13 @@ class Touch:
         counts = largest.counts
         found = yield from self._of_reaches(largest, counts)
         if largest.sure and found.result.status != "ok" and self.is_grown:
-            # These contacts are others than those felt.
+            # The step was chosen anew, so these are other contacts than those that were explained.
             counts = np.floor(counts / STRETCH).astype(np.intp)
             found = yield from self._of_reaches(largest, counts)
         return (yield from self._agreeing(largest, counts, found)) if self.is_tapped else found
 
     def _agreeing(self, largest: Grown, counts: Counts, found: Exploration) -> Steps:
-        """The touch with curves so much shorter that no tap between them contradicts it; or as it is."""
+        """The touch with curves so short that no tap contradicts it, or `found` if there is none."""
         r, (found, where) = found.result, self._tapped(found)
         if not (len(where) and self.is_grown and r.status == "ok"):
             return found
@@ -155,35 +150,35 @@ class Touch:
         return shorter if shorter.result.status == "ok" else found
 
     def _tapped(self, found: Exploration) -> tuple[Exploration, Array]:
-        """The touch with what taps say of it, and the places where they contradict it, (k, 2)."""
+        """The touch together with its taps, and the places (k, 2) where they contradict it."""
         r = found.result
         taps, where = self.tap(r)
         return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std)), where
 
     def _feeling(self, step: float) -> Feel:
-        """What is felt along the planes; it goes on from where it was."""
+        """The function that follows half curves along the planes, each time from where they ended before."""
         feel = self.follow(self.planes, step=step)
 
         def felt(length: float) -> Felt:
-            """Half curves of a length."""
+            """The half curves to this length."""
             contours = feel(min(length, self.farthest))
             return Felt(contours, self.point, step, self.largest_std, partial=length < self.farthest)
 
         return felt
 
     def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
-        """The touch with half curves of so many of the contacts that were felt; with these where they do."""
+        """The touch with half curves as long as so many felt contacts, consisting of these if possible."""
         felt, reaches = largest.felt, largest.felt.step * counts.astype(np.float64)
         length = float(reaches.max())
 
         def at(step: float) -> Contacts:
-            """Contacts so far apart, or somewhat nearer."""
+            """The contacts this step apart, or somewhat nearer to each other."""
             stride = int(step / felt.step * (1.0 + 1e-6))
             if stride:
                 same = self.is_grown and counts is largest.counts and stride == largest.stride
                 known = largest.result if same else None
                 return felt.shortened(counts, stride), stride * felt.step, known
-            # A step longer than that, so that where they end shows.
+            # One step more shows whether a half curve ends there.
             longer = self.follow(self.planes, step=step)(min(length + step, self.farthest))
             again = Felt(longer, self.point, step, self.largest_std)
             fewer = np.minimum((reaches / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
@@ -193,7 +188,7 @@ class Touch:
         return (yield from self._enough(at, length, steps))
 
     def _enough(self, at: Callable[[float], Contacts], extent: float, steps: list[float]) -> Steps:
-        """The touch with the first of these steps that brings enough contacts, or with the last."""
+        """The touch with the first of these steps that brings enough contacts, or else with the last."""
         for wanted in dict.fromkeys(steps):
             contours, step, known = at(wanted)
             r = known or (yield Ask(contours))
@@ -206,10 +201,10 @@ class Touch:
         return Exploration(contours, r, extent, step, self.planes)
 
     def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
-        """The touch with one plane more, as far as the fit explains its contacts.
+        """The touch with one plane more, along which curves are as long as the fit explains their contacts.
 
-        Raises ValueError where the plane shows nothing.
-        Felt twice as densely as fitted: what lies between tells whether it is explained.
+        They are felt twice as densely as fitted: the contacts between tell whether the fit explains them.
+        Raises ValueError if nothing can be felt along the plane.
         """
         half = 0.5 * found.step
         contours = self.follow((plane,), step=half)(found.extent)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Touches that choose their size side by side, in steps: the fits that they ask for come in stacks."""
+"""Many touches side by side that choose their size, in steps; the fits that they ask for come in stacks."""
 
 import math
 from collections.abc import Callable, Generator, Sequence
@@ -24,9 +24,9 @@ from .one_touch import Answer, Ask, Exploration, Steps, Touch
 from .taps import tapped
 
 MOST_EVEN = 24  # At most so many planes are laid out evenly.
-GLANCE_CONTACTS = 8  # Contacts of a half curve that only tell whether it ends.
+GLANCE_CONTACTS = 8  # A half curve has so many contacts where it is only asked whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
-BISECTIONS = 6  # They leave a factor of two no more than a 64th.
+BISECTIONS = 6  # They narrow a factor of two to a 64th of it.
 
 Found = Generator[None, None, list[Exploration | ValueError]]
 
@@ -41,7 +41,7 @@ def exploring(
     noise: float,
     rng: np.random.Generator,
 ) -> Found:
-    """What `explore_many` gives by its defaults, in steps: yields a few times for each touch."""
+    """What `explore_many` gives with its defaults, in steps: yields a few times for each touch."""
     wanted: dict[str, Any] = {
         "planes": planes_of(3),
         "extent": None,
@@ -67,7 +67,7 @@ def touching(
     tangent: ArrayLike | None,
     fit: Options,
 ) -> Found:
-    """Touches at (m, 3), side by side; `wanted` is what Touch takes, but for where."""
+    """Touches at points (m, 3), side by side; `wanted` is what Touch takes besides the place."""
     p = finite_array("points", points, (None, 3), LARGEST)
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
@@ -95,7 +95,7 @@ def result_of(steps: Generator[Any, Any, Any]) -> Any:
 
 
 def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
-    """So many planes, evenly, or those that are given."""
+    """So many evenly spread planes, or the planes that are given."""
     if not isinstance(planes, int | np.integer):
         return tuple(list_of("planes", planes, SamplingPlane))
     if not 3 <= planes <= MOST_EVEN:
@@ -104,14 +104,14 @@ def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...
 
 
 def _farthest(feel: Callable[..., list[Contour]]) -> float:
-    """A length, within a hundredth, at which all half curves end before it.
+    """The shortest length, to a hundredth, before which all half curves end.
 
-    Raises what `feel` raises where nothing can be felt at any length.
+    Raises what `feel` raises if nothing can be felt at any length.
     """
     felt: list[float] = []
 
     def ended(length: float) -> bool:
-        """Whether all do, felt coarsely; where nothing can be felt the length is beyond all."""
+        """Whether all half curves, felt coarsely, end before that, or nothing can be felt at this length."""
         try:
             contours = feel(extent=length, step=length / GLANCE_CONTACTS)
         except ValueError:
@@ -135,13 +135,13 @@ def _farthest(feel: Callable[..., list[Contour]]) -> float:
 
 
 def given(name: str, length: float | str) -> float | None:
-    """None for "auto"."""
+    """The length checked, or None for "auto"."""
     automatic = isinstance(length, str) and length == "auto"
     return None if automatic else number(name, length, above=0.0)  # type: ignore[arg-type]
 
 
 def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Options) -> Found:
-    """What each of b touches comes to, at (b, 3) and (b, 3); the fits that they ask for in stacks.
+    """The results of b touches at points (b, 3) with outward directions (b, 3); fits are done in stacks.
 
     Yields after each contour and each stack.
     """
@@ -170,7 +170,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Op
 
 
 def _with_stds(results: list[Answer]) -> list[Answer]:
-    """The results with the mean_height_std of many computed at once."""
+    """The same results, whose mean_height_std is computed for many at once."""
     if len(results) == 1:
         return results
     known = iter(with_height_stds([r for r in results if isinstance(r, Reconstruction)]))

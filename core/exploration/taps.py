@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Taps of the finger beside its curves: whether the surface is where a fit has it, at places between them."""
+"""Taps of the finger between its curves: whether the surface is where a fit has it."""
 
 import math
 from typing import NamedTuple
@@ -15,21 +15,22 @@ from ..patch.domain import GAUSS_ALONG, SAME_END, Domain
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, Taps
 
-# benchmarks.real says what they notice.
-NEAR_RIM, WITHIN = 0.98, 0.6  # of the way to the boundary: four taps between the ends of two curves, and two
-TOO_FAR_OFF = 10.0  # deviations that no tap may be off
-BESIDE = 0.01  # of the radius: where the side is felt, at the point
+# benchmarks.real --only taps chooses these. Between the ends of two curves there are four taps at NEAR_RIM of
+# the way to the boundary, and two at WITHIN.
+NEAR_RIM, WITHIN = 0.98, 0.6
+TOO_FAR_OFF = 10.0  # A tap that is off by more deviations contradicts the fit by itself.
+BESIDE = 0.01  # The side of the surface is felt from so far above the point, as a share of the radius.
 
 
 class Tapped(NamedTuple):
-    """What taps between the curves have found, and where those are that contradict the fit, (k, 2)."""
+    """What taps between the curves have found, and the places (k, 2) of those that contradict the fit."""
 
     taps: Taps
     contradicting: Array
 
 
 def places(domain: Domain) -> Array:
-    """Where to tap, (n, 2): near the rim and farther within, at the Gauss nodes of each piece of it."""
+    """Local places (n, 2) to tap: near the rim and farther inside, toward the Gauss nodes of the domain."""
     rim = domain.nodes[0][-GAUSS_ALONG * len(domain.ends) :] / domain.node_places[-1]
     inner = rim.reshape(-1, GAUSS_ALONG, 2)[:, 1:-1].reshape(-1, 2)
     return np.concatenate([NEAR_RIM * rim, WITHIN * inner])
@@ -38,7 +39,7 @@ def places(domain: Domain) -> Array:
 def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     """Taps along the fit's normal, from as high above it as its deviation and the noise explain.
 
-    No noise is added: it would not change what they say.
+    The taps have no noise: it would not change what they say.
     """
     where = places(r.domain)
     noise = max((contour.noise or 0.0 for contour in r.contours), default=0.0)
@@ -60,7 +61,7 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
 
 
 def _off(surface: Surface, r: Reconstruction, foot: Vector) -> float:
-    """How far below or above a place a surface is whose outside is up; NaN where there is none within L."""
+    """How far above or below a place the surface is whose outside is up; NaN if there is none within L."""
     d1, _, up = (vector_of(axis) for axis in r.frame.axes.T)
     at_point = section(surface, vector_of(r.frame.origin), d1, up, 1.0)
     point = at_point(complex(0.0, BESIDE * r.radius), -1j, 2.0 * BESIDE * r.radius)
@@ -74,9 +75,9 @@ def _off(surface: Surface, r: Reconstruction, foot: Vector) -> float:
 
 
 def beside(r: Reconstruction, where: Array) -> NDArray[np.intp]:
-    """The longer of the two half curves beside each of the places (k, 2): indices into raveled Counts."""
+    """The longer of the two half curves beside each local place (k, 2), as indices into raveled Counts."""
     x, y, _ = r.frame.to_local(np.vstack([contour.points[[0, -1]] for contour in r.contours])).T
     turns = np.arctan2(where[:, 1], where[:, 0])[:, None] - np.arctan2(y, x)
-    turns[:, np.hypot(x, y) <= SAME_END * r.radius] = np.nan  # a curve to one side only
+    turns[:, np.hypot(x, y) <= SAME_END * r.radius] = np.nan  # The curve goes to one side only.
     both = np.array([np.nanargmin(sign * turns % math.tau, axis=1) for sign in (1.0, -1.0)])
     return np.unique(np.choose(np.argmax(np.hypot(x, y)[both], axis=0), both))

@@ -17,7 +17,7 @@ from ..contours.contour import SamplingPlane
 from ..contours.finger import Surface
 from ..reconstruction.from_contours import options_of
 from .one_touch import Exploration
-from .side_by_side import given, planes_of, result_of, touching
+from .side_by_side import Found, given, planes_of, result_of, touching
 
 
 def explore(
@@ -121,6 +121,51 @@ def explore_many(
 
     A touch that is not possible is returned as its error. Raises ValueError for bad arguments.
     """
+    found: list[Exploration | ValueError] = result_of(
+        exploring_many(
+            surface,
+            points,
+            outward,
+            planes,
+            farthest=farthest,
+            largest_std=largest_std,
+            tolerance=tolerance,
+            most_planes=most_planes,
+            extent=extent,
+            step=step,
+            noise=noise,
+            rng=rng,
+            tangent=tangent,
+            method=method,
+            degree=degree,
+            weight=weight,
+            solver=solver,
+        )
+    )
+    return found
+
+
+def exploring_many(
+    surface: Surface,
+    points: ArrayLike,
+    outward: ArrayLike,
+    planes: int | Sequence[SamplingPlane] = 3,
+    *,
+    farthest: float | None = None,
+    largest_std: float | None = None,
+    tolerance: float | None = None,
+    most_planes: int = 6,
+    extent: float | str = "auto",
+    step: float | str = "auto",
+    noise: float = 0.0,
+    rng: np.random.Generator | int | None = None,
+    tangent: ArrayLike | None = None,
+    method: str = "bayes",
+    degree: int | str = "auto",
+    weight: float | None = None,
+    solver: str = "fast",
+) -> Found:
+    """What `explore_many` gives, in steps: yields after each contour and each stack of fits."""
     length = given("extent", extent)
     wanted: dict[str, Any] = {
         "planes": planes_of(planes),
@@ -133,7 +178,4 @@ def explore_many(
         "is_grown": method == "bayes",
     }
     fit = options_of(method, degree, None, weight, solver)
-    found: list[Exploration | ValueError] = result_of(
-        touching(surface, points, outward, wanted, noise, rng, tangent, fit)
-    )
-    return found
+    return (yield from touching(surface, points, outward, wanted, noise, rng, tangent, fit))

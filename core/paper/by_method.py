@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The coefficients of (1) by one of the paper's methods (section IV), in unit radius."""
+"""The coefficients of (1) by one of the paper's methods (IV), in unit radius."""
 
 import numpy as np
 
@@ -16,9 +16,9 @@ SOLVERS = ("fast", "descent")
 def coefficients(
     curves: Curves, k1: float, k2: float, degree: int, domain: Domain, method: str, weight: float, solver: str
 ) -> tuple[Array, bool]:
-    """a of (1) with these curvatures for the curves of one touch, and whether the solver converged.
+    """The coefficients (m,) of (1) for the curves of one touch and these curvatures; whether it converged.
 
-    weight : lambda L^2; the others as in `reconstruct`
+    weight : lambda L^2; degree, method and solver are those of `reconstruct`
     """
     data = least_squares.problem(k1, k2, degree, curves.points[curves.present])
     if method == "least-squares":
@@ -28,12 +28,12 @@ def coefficients(
     objective = tagc.Objective(data, domain, weight)
     if solver == "descent":
         return tagc.descent_minimum(objective, least_squares.tagc_start(data, _half_curves(curves)))
-    # On convex surfaces (9) has many minima: from the quadric they are lower than from the paper's start.
+    # On convex surfaces (9) has many minima, and starting from the quadric leads to lower ones.
     return tagc.newton_minimum(objective, np.zeros(data.basis.shape[1]))
 
 
 def _half_curves(curves: Curves) -> list[Array]:
-    """The contacts (n_i, 3) on either side of the point, outward, by azimuth."""
+    """The contacts (n_i, 3) of each half curve, from the point outward; half curves are sorted by azimuth."""
     halves = []
     each = zip(curves.points, curves.present, curves.along, curves.tangents, strict=True)
     for points, present, along, tangent in each:

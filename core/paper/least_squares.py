@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The coefficients of (1) from the contacts: least squares and quadratic variation, and the start of TAGC.
+"""The coefficients of (1) from the contacts (IV): least squares, quadratic variation, and the start of TAGC.
 
-Everything here is in unit radius, in the Darboux frame, kappa1 and kappa2 known. lambda is then a
+Everything here is in unit radius and in the Darboux frame, and kappa1 and kappa2 are known. So lambda is a
 pure number, the weight of the mean square error f against a curvature integral over the domain.
 """
 
@@ -18,7 +18,7 @@ from ..patch.monge import MongePatch, derived_monomials, exponents, monomials
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """(1) over n contacts: basis (n, m) @ coefficients (m,) ~ remainder (n,) above the quadric."""
+    """Equation (1) at n contacts: basis (n, m) @ coefficients (m,) ~ remainder (n,) above the quadric."""
 
     quadric: MongePatch
     degree: int
@@ -27,25 +27,25 @@ class Problem:
 
 
 def problem(k1: float, k2: float, degree: int, points: Array) -> Problem:
-    """What (5) asks of the terms of degree 3 to `degree` at local contacts (n, 3)."""
+    """The problem (5) for the terms of degree 3 to `degree` at local contacts (n, 3)."""
     quadric = MongePatch(k1, k2, np.empty(0))
     x, y, z = points.T
     return Problem(quadric, degree, monomials(x, y, exponents(3, degree)), z - quadric.height(x, y))
 
 
 def condition_number(basis: Array) -> float:
-    """Largest over smallest singular value; 1e16 where there is no full rank."""
+    """The largest over the smallest singular value of a basis, or 1e16 if it does not have full rank."""
     singular = np.linalg.svd(basis, compute_uv=False)
     return float(singular[0] / max(singular[-1], 1e-16 * singular[0])) if singular.size else 1.0
 
 
 def least_squares(data: Problem) -> Array:
-    """Equation (5): min f(a), without cut-off but for rounding."""
+    """The minimum of f(a), equation (5); only what rounding leaves is cut off."""
     return np.linalg.lstsq(data.basis, data.remainder, rcond=None)[0]
 
 
 def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
-    """min of the integral of z_xx^2 + 2 z_xy^2 + z_yy^2 plus lambda f(a) (section V), a linear solve."""
+    """The minimum of the integral of z_xx^2 + 2 z_xy^2 + z_yy^2 plus lambda f(a) (V), a linear solve."""
     bends, known, h = on_grid(data, domain, [(2, 0), (1, 1), (0, 2)])
     factors = h * np.sqrt([1.0, 2.0, 1.0])
     share = np.sqrt(weight / len(data.basis))
@@ -55,7 +55,7 @@ def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
 
 
 def on_grid(data: Problem, domain: Domain, orders: list[tuple[int, int]]) -> tuple[Array, Array, float]:
-    """k derivatives of (1) on the m points of (8): of the terms, (k, terms, m), of the quadric, (k, m); h."""
+    """k derivatives of the terms, (k, terms, m), and the quadric, (k, m), on the m points of (8); and h."""
     points, h = domain.grid(GRID)
     terms = derived_monomials(points[:, 0], points[:, 1], exponents(2, data.degree), orders)
     known = 0.5 * (data.quadric.k1 * terms[:, 0] + data.quadric.k2 * terms[:, 2])
@@ -63,11 +63,12 @@ def on_grid(data: Problem, domain: Domain, orders: list[tuple[int, int]]) -> tup
 
 
 def tagc_start(data: Problem, half_curves: Sequence[Array]) -> Array:
-    """a(0): (5) over the contacts and artificial points between them (IV-B).
+    """The start a(0): (5) over the contacts and artificial points between them (IV-B).
 
-    half_curves : (n_i, 3) each, outward from the reference point, by azimuth. The paper leaves the
-    artificial points open; here k-th contact and k-th contact of neighboring half curves are joined
-    and the line is cut at 1/4, 1/2 and 3/4.
+    half_curves : (n_i, 3) each, outward from the reference point, sorted by azimuth
+
+    The paper leaves the artificial points open. Here a line joins the k-th contacts of neighboring half
+    curves, and is cut at 1/4, 1/2 and 3/4.
     """
     between = []
     for one, other in zip(half_curves, [*half_curves[1:], half_curves[0]], strict=True):

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Total absolute Gaussian curvature against the contacts: the objective (9) and two ways down it (IV-B).
+"""Total absolute Gaussian curvature against the contacts: the objective (9) and two minimizations (IV-B).
 
-lambda stays as it is given: the paper updates it from step to step, but does not say how, and its text takes
-the gradient of f + lambda g where (9) is g + lambda f.
+lambda stays as it is given. The paper updates it from step to step, but does not say how, and its text takes
+the gradient of f + lambda g although (9) is g + lambda f.
 """
 
 from typing import NamedTuple
@@ -14,16 +14,16 @@ from ..arguments import Array
 from ..patch.domain import Domain
 from .least_squares import Problem, on_grid
 
-# |D| is rounded by shares of its mean at the start; at the last the minimum is right to a millionth.
-# benchmarks.speed compares it, and what it costs, with that of L-BFGS-B.
+# |D| is rounded by these shares of its mean at the start, one after the other. With the last one the minimum
+# is right to a millionth: benchmarks.speed compares it and its time with those of L-BFGS-B.
 ROUNDINGS = np.geomspace(1.0, 1e-5, 14)
-SETTLED_OBJECTIVE = 1e-3  # Share of the objective that a step wins: it is time to round less.
+SETTLED_OBJECTIVE = 1e-3  # When a step wins less than this share of the objective, the next rounding begins.
 CONVERGED = 1e-8
-NEWTON_CAP, DESCENT_CAP = 200, 20_000  # steps
+NEWTON_CAP, DESCENT_CAP = 200, 20_000  # There are at most so many steps.
 
 
 class _Fields(NamedTuple):
-    """The surface on the m points of the grid at some coefficients; and what it misses the contacts by."""
+    """The surface of some coefficients on the m points of the grid, and how far it is off the contacts."""
 
     slopes: Array  # z_x, z_y (2, m)
     bends: Array  # z_xx, z_xy, z_yy (3, m)
@@ -36,9 +36,8 @@ class _Fields(NamedTuple):
 class Objective:
     """g(a) + lambda f(a) of (9), in unit radius, on the grid of (8).
 
-    Where W = 1 + z_x^2 + z_y^2 and D = z_xx z_yy - z_xy^2 the integrand |K| sqrt(W) is |D| W^(-3/2).
-    |D| has a kink where the surface turns from elliptic to hyperbolic; a rounding r > 0 makes it
-    sqrt(D^2 + r^2).
+    With W = 1 + z_x^2 + z_y^2 and D = z_xx z_yy - z_xy^2 the integrand |K| sqrt(W) is |D| W^(-3/2). |D| has a
+    kink where the surface turns from elliptic to hyperbolic; a rounding r > 0 replaces it by sqrt(D^2 + r^2).
     """
 
     def __init__(self, data: Problem, domain: Domain, weight: float) -> None:
@@ -49,11 +48,11 @@ class Objective:
         self._scale = weight / len(data.basis)
         self._data_hessian = 2.0 * self._scale * data.basis.T @ data.basis
         xx, xy, yy = basis[2:]
-        # The bending energy stands in for |D|, where it is to tell how long a step is.
+        # Lengths of steps are measured with the bending energy in place of |D|.
         self.metric = self._data_hessian + self._area * (xx @ xx.T + 2.0 * xy @ xy.T + yy @ yy.T)
 
     def fields(self, a: Array) -> _Fields:
-        """What all else is computed from."""
+        """The surface at coefficients (terms,), from which all else is computed."""
         z = (a @ self._flat).reshape(5, -1) + self._known
         (zx, zy), (zxx, zxy, zyy) = z[:2], z[2:]
         w = 1.0 + zx * zx + zy * zy
@@ -61,15 +60,15 @@ class Objective:
         return _Fields(z[:2], z[2:], w, 1.0 / (w * np.sqrt(w)), zxx * zyy - zxy * zxy, miss)
 
     def total_absolute_curvature(self, at: _Fields, rounding: float = 0.0) -> float:
-        """g of (8)."""
+        """The integral g of (8)."""
         return self._area * float(_rounded(at.det, rounding) @ at.shrink)
 
     def value(self, at: _Fields, rounding: float = 0.0) -> float:
-        """g + lambda f."""
+        """The objective g + lambda f of (9)."""
         return self.total_absolute_curvature(at, rounding) + self._scale * float(at.miss @ at.miss)
 
     def gradient(self, at: _Fields, rounding: float = 0.0) -> Array:
-        """(terms,); where nothing is rounded, with the signs delta_j of K held as they are (IV-B)."""
+        """The gradient (terms,); without rounding, the signs delta_j of K count as constant (IV-B)."""
         (zx, zy), (zxx, zxy, zyy) = at.slopes, at.bends
         size = _rounded(at.det, rounding)
         delta = (at.det / size if rounding else np.where(at.det >= 0.0, 1.0, -1.0)) * at.shrink
@@ -78,7 +77,7 @@ class Objective:
         return self._area * (self._flat @ by_field) + 2.0 * self._scale * (at.miss @ self._data.basis)
 
     def hessian(self, at: _Fields, rounding: float) -> Array:
-        """(terms, terms), W held as it is: slopes are small where D matters."""
+        """The Hessian (terms, terms), in which W counts as constant: slopes are small where D matters."""
         zxx, zxy, zyy = at.bends
         xx, xy, yy = self._basis[2:]
         size = _rounded(at.det, rounding)
@@ -94,12 +93,12 @@ def _rounded(det: Array, rounding: float) -> Array:
 
 
 def newton_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
-    """Newton's method from `start`, |D| rounded less and less; the coefficients, and whether it converged."""
+    """Newton's method from `start` with |D| rounded less and less: the coefficients; whether it converged."""
     a, at, steps = start, objective.fields(start), 0
     if not len(a):
         return a, True
     scale = max(float(np.mean(np.abs(at.det))), 1e-9)
-    # Beside a weight beyond all measure rounding may leave the metric indefinite.
+    # If the weight is huge, rounding may leave the metric indefinite.
     least = 1e-13 * np.trace(objective.metric) * np.eye(len(a))
     unit = np.linalg.inv(np.linalg.cholesky(objective.metric + least)).T
     for share in ROUNDINGS:
@@ -117,11 +116,11 @@ def newton_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
 def _newton_step(
     objective: Objective, unit: Array, a: Array, at: _Fields, value: float, rounding: float, damping: float
 ) -> tuple[Array, _Fields, float, float]:
-    """A step down: from coefficients, their fields and value to others; and the damping of the next step.
+    """A step down: the new coefficients, their fields and value, and the damping of the next step.
 
-    unit : (terms, terms), columns of length 1 across each other in the metric
+    unit : (terms, terms), columns that are orthonormal in the metric
 
-    The Hessian may be indefinite: the moduli of its eigenvalues against the metric count.
+    The Hessian may be indefinite, so the moduli of its eigenvalues relative to the metric count.
     """
     bends, axes = np.linalg.eigh(unit.T @ objective.hessian(at, rounding) @ unit)
     axes = unit @ axes
@@ -141,11 +140,11 @@ def _newton_step(
 
 
 def descent_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
-    """The paper's steepest descent from `start`; the coefficients, and whether it converged before the cap.
+    """The paper's steepest descent from `start`: the coefficients, and whether it converged before the cap.
 
-    Each step is halved until it descends at all, and the next one tries twice as far: a demand for
-    more descent would end it on the kinks of |K|. Converged where 100 steps have not lowered the
-    objective by a millionth.
+    Each step is halved until it descends at all, and the next one begins twice as long: a demand for more
+    descent would end it on the kinks of |K|. It has converged when 100 steps have not lowered the objective
+    by a millionth.
     """
     a, at = start, objective.fields(start)
     value, gradient = objective.value(at), objective.gradient(at)

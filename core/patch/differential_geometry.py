@@ -11,7 +11,7 @@ from ..arguments import Array
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """Height and partial derivatives of a surface z(x, y), all of one shape (...), and its curvatures."""
+    """The height and partial derivatives of a surface z(x, y), all of one shape (...), and its curvatures."""
 
     z: Array
     x: Array
@@ -22,7 +22,7 @@ class Derivatives:
 
     @property
     def normal(self) -> Array:
-        """Unit normal on the side of +z, shape (..., 3)."""
+        """The unit normal on the side of +z, (..., 3)."""
         n = np.stack([-self.x, -self.y, np.ones_like(self.x)], axis=-1)
         return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
@@ -33,7 +33,7 @@ class Derivatives:
 
     @property
     def second_form(self) -> tuple[Array, Array, Array]:
-        """L, M, N of the second fundamental form, negative where the surface falls away below the normal."""
+        """L, M, N of the second fundamental form, which is negative where the surface falls away from +z."""
         w = np.sqrt(1.0 + self.x**2 + self.y**2)
         return self.xx / w, self.xy / w, self.yy / w
 
@@ -46,14 +46,14 @@ class Derivatives:
     def mean_curvature(self) -> Array:
         """H = (EN - 2FM + GL) / 2(EG - F^2), in 1/length."""
         (e, f, g), (ll, mm, nn) = self.first_form, self.second_form
-        # EG - F^2 is E + G - 1, which does not cancel where it is steep.
+        # EG - F^2 equals E + G - 1, which does not cancel on steep surfaces.
         return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e + g - 1.0))
 
     @property
     def principal_curvatures(self) -> tuple[Array, Array]:
         """kappa1 <= kappa2, in 1/length."""
         mean = self.mean_curvature
-        # H^2 - K is a square, (kappa1 - kappa2)^2 / 4; at umbilics rounding takes it below 0.
+        # H^2 - K is (kappa1 - kappa2)^2 / 4, which rounding may take below 0 at umbilics.
         half = np.sqrt(np.maximum(mean**2 - self.gaussian_curvature, 0.0))
         return mean - half, mean + half
 
@@ -61,7 +61,7 @@ class Derivatives:
     def shape_index(self) -> Array:
         """-2 / pi atan((kappa1 + kappa2) / (kappa2 - kappa1)): 1 on a convex cap, 0 on a saddle, -1 in a cup.
 
-        A planar point has none (Koenderink and van Doorn, 1992); it is given the 0 of the middle.
+        A planar point has none (Koenderink and van Doorn, 1992), and gets 0, the middle of the range.
         """
         k1, k2 = self.principal_curvatures
         return np.arctan2(k1 + k2, k2 - k1) * (-2.0 / np.pi)

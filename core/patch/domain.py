@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A).
 
-Where the surface itself ends the spline would bulge over what is not there: beside such ends it is straight.
+Where the surface itself ends, the spline would bulge over what is not there. So it is straight beside such
+ends.
 """
 
 import math
@@ -14,45 +15,46 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
 
-GRID = 600  # Points of the grid (8) over a domain.
-BOUNDARY_SAMPLES = 1024  # Samples of the boundary, whose radius is then good to 1e-5.
-HULL_PLACES = 32  # places on the hull of contacts that bound a domain
-INSIDE_HULL = 0.05  # of the radius, that the origin is inside such a hull at least
-QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])  # turns rows counterclockwise
-SAME_END = 1e-3  # of the radius: ends that are nearer to each other, or to the origin, are one, or none
-BRINK = 0.01  # of the radius: where the surface ends at the origin, the domain ends as near
-GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Gauss points of a mean over the domain: from end to end, and outward
+GRID = 600  # The grid (8) over a domain has about so many points.
+BOUNDARY_SAMPLES = 1024  # With so many samples of the boundary its radius is right to 1e-5.
+HULL_PLACES = 32  # So many places on the hull of contacts bound a domain.
+INSIDE_HULL = 0.05  # The origin is inside such a hull by at least this share of the radius.
+QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])  # It turns rows counterclockwise.
+# Ends this near to each other, as a share of the radius, count once; near the origin, not at all.
+SAME_END = 1e-3
+BRINK = 0.01  # Where the surface ends at the origin, the domain ends this share of the radius away.
+GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Means over the domain take so many Gauss points between ends, and outward.
 
 
 @dataclass(frozen=True, eq=False)
 class Domain:
-    """The part of the tangent plane a patch is meant for; star-shaped about the origin.
+    """The part of the tangent plane over which a patch is valid (paper, IV-A); star-shaped about the origin.
 
-    ends : (m, 2), m >= 3, the projected ends of the contours, by azimuth
-    brinks : (m,), whether the surface ends there, at a crease or its border; None for nowhere
+    ends : (m, 2), m >= 3, the projected ends of the contours, sorted by azimuth
+    brinks : (m,), whether the surface ends there, at a crease or at its border; None if it ends nowhere
     """
 
     ends: Array
     brinks: NDArray[np.bool_] | None = None
 
     def scaled(self, factor: float) -> "Domain":
-        """The domain with every length multiplied by factor."""
+        """The domain with every length multiplied by `factor`."""
         return Domain(factor * self.ends, self.brinks)
 
     @property
     def _straight(self) -> NDArray[np.bool_] | None:
-        """Which pieces of the boundary, each from one end to the next, are straight, (m,); None for none."""
+        """A mask (m,) of the pieces of the boundary, from one end to the next, that are straight, or None."""
         return None if self.brinks is None else self.brinks | np.roll(self.brinks, -1)
 
     @cached_property
     def _boundary(self) -> tuple[Array, Array]:
-        """Lengths of the chords (m,), and the closed cubic spline over them: (4, m, 2), powers of the length.
+        """The lengths (m,) of the chords, and the closed cubic spline over them by powers, (4, m, 2).
 
         Its slopes at the ends follow from the continuity of its second derivative. Beside straight pieces,
-        which are chords, it sets out across the ray to the end, as a circle does.
+        which are chords, it begins across the ray to the end, as a circle would.
         """
         rows = np.arange(len(self.ends))
-        last, following = rows - 1, rows + 1 - len(rows)  # of them, in a circle
+        last, following = rows - 1, rows + 1 - len(rows)  # The rows before and after, in a circle.
         chords = self.ends[following] - self.ends
         lengths = np.sqrt(np.einsum("mi,mi->m", chords, chords))
         over, before = lengths[:, None], lengths[last]
@@ -76,9 +78,9 @@ class Domain:
 
     @cached_property
     def _polar(self) -> tuple[Array, Array]:
-        """Azimuths, ascending, and radii of the boundary."""
+        """Ascending azimuths and the radii of the boundary there."""
         chords, (start, slope, bend, third) = self._boundary
-        each = math.ceil(BOUNDARY_SAMPLES / len(self.ends))  # Samples of one piece: as symmetric as the ends.
+        each = math.ceil(BOUNDARY_SAMPLES / len(self.ends))  # Equal numbers keep the ends' symmetry.
         t = (chords[:, None] / each * np.arange(each))[..., None]
         start, slope, bend, third = (part[:, None] for part in (start, slope, bend, third))
         x, y = (start + t * (slope + t * (bend + t * third))).reshape(-1, 2).T
@@ -89,10 +91,10 @@ class Domain:
         return azimuths[order], radii[order]
 
     def _without_turning_back(self) -> tuple[Array, Array]:
-        """A monotone spline of the radius: beside an end near the origin the closed one may turn back."""
+        """A monotone spline of the radius, because next to a short end the closed spline may turn back."""
         from scipy.interpolate import PchipInterpolator
 
-        # Two ends in one direction count once, the farther.
+        # Of two ends in one direction the farther one counts.
         turns, place = np.unique(
             np.round(np.arctan2(self.ends[:, 1], self.ends[:, 0]) / (2.0 * np.pi), 9) % 1.0,
             return_inverse=True,
@@ -106,9 +108,9 @@ class Domain:
 
     @cached_property
     def nodes(self) -> tuple[Array, Array]:
-        """Points (n, 2) inside and weights (n,) of sum 1 for the mean of a function: Gauss, n = 12 m.
+        """Gauss points (n, 2) and weights (n,) of sum 1 for the mean of a function over the domain, n = 12 m.
 
-        In circles parallel to the boundary.
+        They lie on curves parallel to the boundary.
         """
         piece, share, along, out, outward = _gauss(len(self.ends))
         lengths, pieces = self._boundary
@@ -121,12 +123,12 @@ class Domain:
 
     @property
     def node_places(self) -> Array:
-        """How far out the nodes are, as shares of the radius there, (n,)."""
+        """How far out the nodes are, as shares (n,) of the boundary's radius there."""
         piece, _, _, out, _ = _gauss(len(self.ends))
         return np.repeat(out.ravel(), len(piece))
 
     def _radius(self, azimuth: Array) -> Array:
-        """How far out the boundary is, by the chords of its samples: straight pieces are exact."""
+        """The boundary's radius at azimuths, on chords between samples: straight pieces are exact."""
         azimuths, radii = self._polar
         turns, turn = azimuths - azimuths[0], (azimuth - azimuths[0]) % (2.0 * np.pi)
         before = np.searchsorted(turns, turn, side="right") - 1
@@ -141,7 +143,7 @@ class Domain:
         return np.hypot(x, y) <= self._radius(np.arctan2(y, x)) * (1.0 + 1e-5)
 
     def places(self, points: Array) -> Array:
-        """Points (n, 2) as points of the unit disk, at their azimuth and their share of the radius there."""
+        """Points (n, 2) as places (n, 2) on the unit disk: by their azimuths and shares of the radius."""
         return points / self._radius(np.arctan2(points[:, 1], points[:, 0]))[:, None]
 
     def points_at(self, places: Array) -> Array:
@@ -161,7 +163,7 @@ class Domain:
         return float(np.sum(r * np.roll(r, -1) * np.sin(turn)) / 2.0)
 
     def grid(self, count: int) -> tuple[Array, float]:
-        """The grid of (8): about `count` points (m, 2) inside with uniform spacing h, and h."""
+        """The grid of (8): about `count` points (m, 2) inside with a uniform spacing h, and h."""
         h = float(np.sqrt(self.area / count))
         reach = self.boundary(BOUNDARY_SAMPLES)
         low, high = np.floor(reach.min(axis=0) / h), np.ceil(reach.max(axis=0) / h)
@@ -173,7 +175,7 @@ class Domain:
 
 @lru_cache(maxsize=16)
 def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
-    """The rule of Domain.nodes: piece, place on it and weight of each ray; places and weights along a ray."""
+    """The rule of Domain.nodes: pieces, places and weights of the rays; places and weights along a ray."""
     along, along_weights = np.polynomial.legendre.leggauss(GAUSS_ALONG)  # type: ignore[no-untyped-call]
     square, outward = np.polynomial.legendre.leggauss(GAUSS_ACROSS)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
     return (
@@ -188,8 +190,8 @@ def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
 def closed_spline_domain(ends: ArrayLike, radius: float, brinks: ArrayLike | None = None) -> Domain:
     """The domain through projected curve ends (m, 2), in any order; `brinks` as in Domain.
 
-    Ends within SAME_END of the origin (a curve that runs to one side only) or of another end do not count.
-    Raises ValueError where fewer than three are left.
+    Ends within SAME_END of the origin, as of a curve that goes to one side only, or of another end do not
+    count. Raises ValueError if fewer than three are left.
     """
     x, y = np.asarray(ends, dtype=float).T
     is_brink = np.zeros(len(x), dtype=bool) if brinks is None else np.asarray(brinks, dtype=bool)
@@ -205,10 +207,11 @@ def closed_spline_domain(ends: ArrayLike, radius: float, brinks: ArrayLike | Non
 
 
 def hull_domain(points: ArrayLike, radius: float) -> Domain:
-    """The domain through places on the hull of points (n, 2). Raises ValueError for an origin beside it."""
+    """The domain through places on the hull of points (n, 2). Raises ValueError if the origin is outside."""
     from scipy.spatial import ConvexHull
 
-    hull = ConvexHull(np.asarray(points, dtype=float)).equations  # outward normals, and less their distances
+    # These are outward normals and negative distances.
+    hull = ConvexHull(np.asarray(points, dtype=float)).equations
     turns = 2.0 * np.pi * np.arange(HULL_PLACES) / HULL_PLACES
     rays = np.array([np.cos(turns), np.sin(turns)])
     ahead = hull[:, :2] @ rays

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The geometry of a patch: a surface over a part of the tangent plane, and where that is in the world."""
+"""The geometry of a patch: a surface over a part of the tangent plane, and its place in the world."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,17 +18,17 @@ from .triangulation import patch_mesh
 
 EVEN = 1e-4  # A similarity in single precision may be off by so much.
 
-NEAR_POINT = 0.6  # of a residual's deviation, that is left at the point (benchmarks.real)
+NEAR_POINT = 0.6  # This share of a residual's deviation is left at the point (benchmarks.real).
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry(HeightField):
-    """The surface of a patch, in its frame, lengths in the caller's unit; a similarity moves it.
+    """The surface of a patch in its frame, with lengths in the caller's unit.
 
     frame : the Darboux frame at the reference point
     radius : L, the largest distance of a contact from the point in the tangent plane
     polynomial : equation (1)
-    domain : the part of the tangent plane that the surface is meant for
+    domain : the part of the tangent plane over which the surface is valid
     residual : difference of the surface from the polynomial, in unit radius, or None
     """
 
@@ -52,7 +52,7 @@ class Geometry(HeightField):
         })  # fmt: skip
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """z(x, y), local."""
+        """The height z at local (x, y)."""
         if self.residual is None:
             return self.polynomial.height(x, y)
         z = self._whole.height(*self.in_unit_radius(x, y))
@@ -68,15 +68,15 @@ class Geometry(HeightField):
         return replace(self.residual, mean=mean)
 
     def in_unit_radius(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """x and y, (n,) each, in units of L."""
+        """Local x and y, raveled to (n,) each, in units of L."""
         x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         return x_array.ravel() / self.radius, y_array.ravel() / self.radius
 
     def widening(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """What the residual's deviations are multiplied with at local (x, y), (n,).
+        """The factor (n,) of the residual's deviations at local (x, y).
 
-        Where curves run together a real surface is smoother than its covariance has it, and rougher at the
-        rim. The mean over the domain is 1.
+        Near the point, where curves meet, real surfaces are smoother than their covariance says, and near the
+        rim they are rougher. The mean over the domain is 1.
         """
         points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
         if self.residual is None:
@@ -85,7 +85,7 @@ class Geometry(HeightField):
 
     @property
     def node_widening(self) -> Array:
-        """That at the nodes of the domain, (n,)."""
+        """The `widening` at the nodes of the domain, (n,)."""
         outward = self.domain.node_places
         return np.ones(len(outward)) if self.residual is None else _widened(outward)
 
@@ -101,7 +101,7 @@ class Geometry(HeightField):
         return patch_mesh(self, self.domain, tolerance)
 
     def moved(self, matrix: ArrayLike) -> "Geometry":
-        """This geometry after a similarity of the world, (4, 4); see `similarity` for what it raises."""
+        """This geometry after a similarity (4, 4) of the world; raises what `similarity` raises."""
         scale, turn, shift = similarity(matrix)
         return Geometry(
             Frame(scale * turn @ self.frame.origin + shift, turn @ self.frame.axes),
@@ -113,14 +113,14 @@ class Geometry(HeightField):
 
 
 def _widened(outward: Array) -> Array:
-    """The factors of the deviation, by how far out places are as shares of the domain's radius."""
+    """The factors of the deviation for places at these shares of the domain's radius."""
     return NEAR_POINT + 1.5 * (1.0 - NEAR_POINT) * outward
 
 
 def similarity(matrix: ArrayLike) -> tuple[float, Array, Array]:
     """The scale, rotation R (3, 3) and shift (3,) of a matrix (4, 4) that takes p to scale R p + shift.
 
-    Raises ValueError where it stretches, shears or mirrors, or scales to nothing.
+    Raises ValueError if it stretches, shears or mirrors, or scales by 0.
     """
     m = finite_array("matrix", matrix, (4, 4))
     scale = float(np.cbrt(np.linalg.det(m[:3, :3])))
@@ -144,7 +144,7 @@ def distances(surface: HeightField, points: ArrayLike) -> Array:
 
 
 def total_absolute_curvature(surface: HeightField, domain: Domain) -> float:
-    """(8), the integral of |K| over the patch."""
+    """The integral of |K| over the patch (8)."""
     points, h = domain.grid(GRID)
     d = surface.derivatives(*points.T)
     w = 1.0 + d.x**2 + d.y**2
@@ -152,11 +152,11 @@ def total_absolute_curvature(surface: HeightField, domain: Domain) -> float:
 
 
 def overlapped(geometry: Geometry, vertices: ArrayLike, normals: ArrayLike) -> NDArray[np.intp]:
-    """Which of the world vertices (n, 3) lie over the domain: indices (m,).
+    """The indices (m,) of those world vertices (n, 3) that lie over the domain; normals are (n, 3).
 
-    A closed object has another side above the same domain: a vertex counts only where its normal
-    faces the patch's and it is within the radius of the tangent plane. Whether another layer of the
-    object hides it from a finger, `reachable` tells.
+    A closed object has another side over the same domain. So a vertex counts only if its normal points to the
+    side of the patch's normal, and it is within the radius of the tangent plane. `reachable` tells whether
+    another layer of the object hides it from a finger.
     """
     local, radius = geometry.frame.to_local(vertices), geometry.radius
     near = np.flatnonzero((np.abs(local) <= 2.0 * radius).all(axis=1) & (np.abs(local[:, 2]) <= radius))

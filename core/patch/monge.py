@@ -15,7 +15,7 @@ from .differential_geometry import Derivatives
 
 @cache
 def exponents(lowest: int, highest: int) -> NDArray[np.intp]:
-    """(i, j) of the terms x^i y^j of these degrees, (m, 2), in the order of (1): 30 21 12 03 40 31 22 ..."""
+    """The powers (m, 2) of the terms x^i y^j of these degrees in the order of (1): 30 21 12 03 40 31 ..."""
     terms = [(i, d - i) for d in range(lowest, highest + 1) for i in range(d, -1, -1)]
     array = np.array(terms, dtype=np.intp).reshape(-1, 2)
     array.flags.writeable = False
@@ -28,14 +28,14 @@ QUADRIC, QUARTIC = exponents(0, 2), exponents(0, 4)
 
 
 def monomials(x: Array, y: Array, terms: NDArray[np.intp]) -> Array:
-    """The terms (m, 2) at n points, (n, m)."""
-    if terms is exponents(1, 6):  # as most often: degree by degree
+    """The values (n, m) of the terms (m, 2) at n points."""
+    if terms is exponents(1, 6):  # This is the most frequent case, done degree by degree.
         return _monomials_to(x, y, 6).T
     return derived_monomials(x, y, terms, [(0, 0)])[0].T
 
 
 def _monomials_to(x: Array, y: Array, degree: int) -> Array:
-    """The terms of `exponents(1, degree)` at n points, (m, n): each degree from the one before."""
+    """The values (m, n) of the terms of `exponents(1, degree)` at n points, each degree from the last one."""
     values = np.empty((degree * (degree + 3) // 2, len(x)))
     values[0], values[1], start = x, y, 0
     for d in range(2, degree + 1):
@@ -49,7 +49,7 @@ def _monomials_to(x: Array, y: Array, degree: int) -> Array:
 def derived_monomials(
     x: Array, y: Array, terms: NDArray[np.intp], orders: Sequence[tuple[int, int]]
 ) -> Array:
-    """The terms (m, 2) at n points, (k, m, n), differentiated as each of k orders (dx, dy) says."""
+    """The values (k, m, n) of k derivatives (dx, dy) of the terms (m, 2) at n points."""
     i, j = terms.T
     x_powers, y_powers = np.ones((2, int(terms.max(initial=0)) + 1, len(x)))
     for k in range(1, len(x_powers)):
@@ -57,7 +57,7 @@ def derived_monomials(
         np.multiply(y_powers[k - 1], y, out=y_powers[k])
     derived = np.empty((len(orders), len(terms), len(x)))
     for values, (dx, dy) in zip(derived, orders, strict=True):
-        # Where a derivative has killed a term its factor is 0, whatever power stands beside it.
+        # If a derivative of a term is 0, its factor is 0, whatever power is multiplied with it.
         np.multiply(x_powers[np.maximum(i - dx, 0)], y_powers[np.maximum(j - dy, 0)], out=values)
         for exponent, times in ((i, dx), (j, dy)):
             for k in range(times):
@@ -66,9 +66,9 @@ def derived_monomials(
 
 
 class HeightField:
-    """A surface z(x, y); all follows from its derivatives.
+    """A surface z(x, y), which subclasses define by its derivatives.
 
-    All methods take x and y of one shape (or that broadcast) and answer in that shape.
+    All methods take x and y of one shape, or of shapes that broadcast, and return that shape.
     """
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
@@ -80,7 +80,7 @@ class HeightField:
         return self.derivatives(x, y).z
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Unit normal on the side of +z, shape (..., 3)."""
+        """The unit normal on the side of +z at (x, y), (..., 3)."""
         return self.derivatives(x, y).normal
 
     def gaussian_curvature(self, x: ArrayLike, y: ArrayLike) -> Array:
@@ -96,7 +96,7 @@ class HeightField:
         return self.derivatives(x, y).principal_curvatures
 
     def shape_index(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """1 on a convex cap, 0 on a saddle or plane, -1 in a cup, at (x, y)."""
+        """The shape index at (x, y): 1 on a convex cap, 0 on a saddle or plane, -1 in a cup."""
         return self.derivatives(x, y).shape_index
 
     def curvedness(self, x: ArrayLike, y: ArrayLike) -> Array:
@@ -106,8 +106,8 @@ class HeightField:
     def closest_point(self, points: ArrayLike) -> Array:
         """The foot on the surface of each local point, (n, 3) -> (n, 3).
 
-        Newton's method on the squared distance, all points at once, from the vertical projection;
-        a step that does not shorten the distance is halved.
+        Newton's method minimizes the squared distance for all points at once, from the vertical projection
+        on. A step that does not shorten the distance is halved.
         """
         q = np.asarray(points, dtype=float)
         foot, damping = q[:, :2].copy(), np.ones(len(q))
@@ -163,7 +163,7 @@ class MongePatch(HeightField):
         return self._evaluate(x, y, [(0, 0)])[0]
 
     def _evaluate(self, x: ArrayLike, y: ArrayLike, orders: list[tuple[int, int]]) -> Array:
-        """The derivatives of `orders` (dx, dy), (m, ...): tables of a_ij, times x^i, times y^j."""
+        """The derivatives (m, ...) of m orders (dx, dy), by tables of a_ij, times x^i, times y^j."""
         x_array, y_array = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         if x_array.shape != y_array.shape:
             x_array, y_array = np.broadcast_arrays(x_array, y_array)
@@ -182,12 +182,12 @@ class MongePatch(HeightField):
 
 @cache
 def _derive(powers: int, order: int) -> Array:
-    """(powers, powers): takes the a_i of x^i to those of its derivative of that order."""
+    """The matrix (powers, powers) that takes coefficients of x^i to those of the derivative of this order."""
     return np.linalg.matrix_power(np.diag(np.arange(1.0, powers), 1), order)
 
 
 def _newton_step(surface: HeightField, foot: Array, q: Array) -> Array:
-    """-H^-1 g of half the squared distance, (n, 2); where H is not positive, without its z'' part."""
+    """The steps -H^-1 g for half the squared distance, (n, 2); H is without z'' if it is not positive."""
     d = surface.derivatives(*foot.T)
     above = d.z - q[:, 2]
     gx, gy = foot[:, 0] - q[:, 0] + above * d.x, foot[:, 1] - q[:, 1] + above * d.y

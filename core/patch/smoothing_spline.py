@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heights as a smoothing spline: of least third derivatives through contacts and across their normals.
+"""Heights as a smoothing spline with the least third derivatives through contacts and across normals.
 
-Beside the paper. A cubic B-spline on SIDE x SIDE knots, whose prior is that of a surface with random third
-derivatives (Wahba 1990, in the knots of Eilers and Marx 1996), so that quadrics are free. How large these are
-and how exact contacts and normals are follow from their marginal likelihood; outlying ones weigh as under a
-Student t distribution. Equations are banded, for thousands of contacts as for hundreds. All in unit radius.
+Beside the paper. It is a cubic B-spline on SIDE x SIDE knots. Its prior is that of a surface with random
+third derivatives (Wahba 1990, on knots as by Eilers and Marx 1996), so that quadrics are free. The size of
+these and the deviations of contacts and normals follow from the marginal likelihood; outliers weigh as under
+a Student t distribution. Equations are banded, however many contacts there are. All is in unit radius.
 """
 
 from functools import cache
@@ -17,29 +17,29 @@ import numpy as np
 from ..arguments import Array
 
 # python -m benchmarks.atlas chose these.
-SIDE = 21  # knots along each axis, evenly spaced over [-half, half]
-ROUGHNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # sizes of third derivatives
-NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # times the least noise
-SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # of normals: facets have some of that
-START = 3, 0, 2  # which of each of these comes first
-SIZE_PASSES = 2  # of finding sizes, with a solve for weights after each
-FAR_OFF, STUDENT = 3.0, 4.0  # standard deviations; degrees of freedom
-LEAST_COSINE = 0.2  # cosine of the angle between a normal and the axis, below which it tells nothing
+SIDE = 21  # There are so many knots along each axis, evenly spaced over [-half, half].
+ROUGHNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # The grid of the size of third derivatives.
+NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # The grid of the noise, in units of the least noise.
+SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # The grid of the normals' deviation, which facets have.
+START = 3, 0, 2  # The search begins at these places of the three grids.
+SIZE_PASSES = 2  # So often sizes are found, each time with a solve for weights after it.
+FAR_OFF, STUDENT = 3.0, 4.0  # Outliers are off by more deviations, and weigh as under t of this freedom.
+LEAST_COSINE = 0.2  # A normal tells nothing if the cosine of its angle to the axis is less.
 ORDER, CUBIC = 3, 3
-WIDTH = CUBIC * SIDE + CUBIC  # of the band
+WIDTH = CUBIC * SIDE + CUBIC  # The width of the band.
 RANK = SIDE**2 - ORDER * (ORDER + 1) // 2
 SPLINE_ROUNDING = 1e-9
 
 
 class Spline(NamedTuple):
-    """Coefficients (SIDE, SIDE) of heights, and standard deviations (SIDE, SIDE) at the knots."""
+    """The coefficients (SIDE, SIDE) of heights, and the standard deviations (SIDE, SIDE) at the knots."""
 
     coefficients: Array
     stds: Array
 
 
 class _Equations(NamedTuple):
-    """Normal equations of data of unit deviation: the band of the matrix, the right side, squares, number."""
+    """Normal equations of data of unit deviation: the matrix's band, right side, sum of squares, number."""
 
     band: Array
     right: Array
@@ -48,7 +48,7 @@ class _Equations(NamedTuple):
 
 
 class _Solution(NamedTuple):
-    """-2 log likelihood, the factor's band, coefficients (SIDE^2,)."""
+    """-2 log likelihood, the band of the Cholesky factor, and the coefficients (SIDE^2,)."""
 
     surprise: float
     factor: Array
@@ -56,15 +56,16 @@ class _Solution(NamedTuple):
 
 
 def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: float, noise: float) -> Spline:
-    """The spline of contacts and unit normals (n, 3), which count by weights (n,).
+    """The spline of contacts and unit normals, (n, 3) each, which count by weights (n,).
 
-    half : of the side of the square that the knots are on
-    noise : standard deviation of a contact, at least
+    half : half the side of the square of knots
+    noise : least standard deviation of a contact
     """
     heights, *slopes = bases(contacts[:, 0], contacts[:, 1], half)
     up = np.maximum(normals[:, 2], LEAST_COSINE)
     asked = -normals[:, :2] / up[:, None]
-    certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)  # a slope s is less sure by 1 + s^2
+    # A slope s has 1 + s^2 times the deviation.
+    certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)
     sizes, sloping = [grid[i] for grid, i in zip(_grids(noise), START, strict=True)], weights * certainty
     for _ in range(SIZE_PASSES):
         data = [_equations([heights], weights, contacts[:, 2:]), _equations(slopes, sloping, asked)]
@@ -84,7 +85,7 @@ def _grids(noise: float) -> tuple[Any, Any, Any]:
 
 
 def _likeliest(data: list[_Equations], sizes: list[float], half: float, noise: float) -> _Solution:
-    """The likeliest solution, by steps up or down of one size after the other; they are changed."""
+    """The likeliest solution, by steps of one size after the other up or down; changes `sizes` in place."""
     best = _solved(data, sizes, half)
     for i, grid in enumerate(_grids(noise)):
         start = grid.index(sizes[i])
@@ -118,7 +119,7 @@ def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solutio
 
 
 def _equations(bases: list[Any], weights: Array, values: Array) -> _Equations:
-    """The least squares of the bases (n, SIDE^2) times coefficients to the columns of values (n, k)."""
+    """The normal equations that fit bases (n, SIDE^2) times coefficients to the columns of values (n, k)."""
     matrix = sum(basis.T @ basis.multiply(weights[:, None]) for basis in bases)
     right = sum(basis.T @ (weights * column) for basis, column in zip(bases, values.T, strict=True))
     square = float(weights @ (values**2).sum(axis=1))
@@ -126,13 +127,13 @@ def _equations(bases: list[Any], weights: Array, values: Array) -> _Equations:
 
 
 def _student(misses: Array, std: float) -> Array:
-    """The weights of contacts that are off by so much."""
+    """The weights (n,) of contacts that are off by `misses` (n,)."""
     ratios = misses / max(std, 1.4826 * float(np.median(misses)))
     return np.where(ratios > FAR_OFF, (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
 
 
 def _stds(factor: Array, half: float) -> Array:
-    """Deviations (SIDE, SIDE) at the knots, from every other one: they are smooth, and cost the most."""
+    """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and take the longest."""
     from scipy.linalg import cho_solve_banded
 
     coarse = slice(None, None, 2)
@@ -145,7 +146,7 @@ def _stds(factor: Array, half: float) -> Array:
 
 
 def between(some: Array) -> Array:
-    """Values (SIDE, SIDE) from those at every other knot."""
+    """Values (SIDE, SIDE) at all knots, interpolated from those at every other knot."""
     full, coarse = np.empty((SIDE, SIDE)), slice(None, None, 2)
     full[coarse, coarse] = some
     full[1::2, coarse] = 0.5 * (some[:-1] + some[1:])
@@ -154,7 +155,7 @@ def between(some: Array) -> Array:
 
 
 def bases(x: Array, y: Array, half: float) -> list[Any]:
-    """Sparse (n, SIDE^2): what coefficients give of heights and of slopes along x and y at n places."""
+    """Sparse matrices (n, SIDE^2) that give heights and slopes along x and y at n places by coefficients."""
     from scipy.sparse import csr_matrix
 
     pitch = 2.0 * half / (SIDE - 1)
@@ -172,7 +173,7 @@ def bases(x: Array, y: Array, half: float) -> list[Any]:
 
 
 def weights_at(at: Array) -> tuple[Any, Array, Array]:
-    """The knot before places (m,) in steps from the middle; weights (m, 4) of four knots and their slopes."""
+    """The knots before places (m,), in steps from the middle; weights (m, 4) of four knots, and slopes."""
     at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - SPLINE_ROUNDING)
     knot = at.astype(np.intp)
     powers = np.vander(at - knot, 4, increasing=True)
@@ -191,7 +192,7 @@ def _tables() -> tuple[Array, Array]:
 
 @cache
 def _penalty() -> Array:
-    """The band of the sum of squares of all third derivatives, by differences, for knots 1 apart."""
+    """The band of the sum of squares of all third derivatives, by differences, for knots at distance 1."""
     from scipy.sparse import csr_matrix, kron
 
     steps = [csr_matrix(np.diff(np.eye(SIDE), k, axis=0)) for k in range(ORDER + 1)]

@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A patch as triangles: Delaunay's, of the rim and of equilateral lattices, one inside the other.
+"""A patch as triangles: the Delaunay triangles of its rim and of nested equilateral lattices inside.
 
-A flat triangle is off a surface of second derivatives H by |e' H e| / 8 at the middle of an edge e, and
-by a third more inside where it is a bowl. So the distance of neighbors that is wanted falls with the
-curvature; the boundary, followed by short edges, asks for more near itself, and only there. Rows of the
-lattices are parallel to x with a point at the origin: symmetric about both axes, as patches may be.
+A flat triangle is off a surface with second derivatives H by |e' H e| / 8 at the middle of an edge e, and by
+a third more inside it on a bowl. So the distance of neighbors that is wanted falls with the curvature. The
+boundary is followed by short edges, which ask for more points near themselves, and only there. Rows of the
+lattices are parallel to x and have a point at the origin, so they are symmetric about both axes, as patches
+are.
 """
 
 import math
@@ -19,15 +20,17 @@ from .domain import Domain
 from .monge import HeightField
 
 # benchmarks.patch_mesh judges all of these.
-CHORD = 4.6  # side^2 = CHORD tolerance / curvature; 8 for equilateral triangles
-COARSEST_EDGE, FINEST_EDGE = 0.25, 0.02  # of neighbors, in mean radii: colors are drawn by them too
-VISIBLE = 1e-3  # Share of the mean radius: a rim that is farther off shows its corners.
-RIM_SAMPLES, MOST_RIM_EDGES = 128, 256  # samples of the boundary; edges of the rim, at most
-RIM_SPACING = 0.65  # Share of the distance wanted inside, along the rim, where the lattice does not fit.
-EDGE_GROWTH = 0.5  # Growth of the distance of neighbors with the distance from the rim.
-CLEAR = 0.6  # Distance of the lattice from the rim, in edges of the rim.
-SMOOTHING_PASSES = 3  # Passes of smoothing.
-UNEQUAL = 1e-6  # With this no four points lie on a circle, where any diagonal would do.
+CHORD = 4.6  # side^2 = CHORD tolerance / curvature; for equilateral triangles it would be 8.
+# Bounds of the distance of neighbors, in mean radii: they carry colors.
+COARSEST_EDGE, FINEST_EDGE = 0.25, 0.02
+VISIBLE = 1e-3  # A rim that is farther off the boundary, as a share of the mean radius, shows its corners.
+RIM_SAMPLES, MOST_RIM_EDGES = 128, 256  # The boundary is sampled so often; the rim has at most so many edges.
+# Points on the rim are this share of the inner distance apart: the lattice does not fit there.
+RIM_SPACING = 0.65
+EDGE_GROWTH = 0.5  # The distance of neighbors grows by this share of the distance from the rim.
+CLEAR = 0.6  # The lattice keeps this share of a rim's edge away from the rim.
+SMOOTHING_PASSES = 3  # Inner points are smoothed so often.
+UNEQUAL = 1e-6  # Points are moved by this share, so that no four lie on a circle, which has two diagonals.
 
 Size = Callable[[Array], Array]
 
@@ -35,13 +38,13 @@ Size = Callable[[Array], Array]
 def patch_mesh(surface: HeightField, domain: Domain, tolerance: float) -> tuple[Array, NDArray[np.intp]]:
     """Points (n, 3) on the patch over its domain, and counterclockwise triangles (m, 3).
 
-    There are as many as it takes to be off the patch by the tolerance at most, as long as that asks for no
-    less than FINEST_EDGE between neighbors; the rim is off the boundary by VISIBLE at most.
+    They are off the patch by at most the tolerance, unless neighbors would have to be nearer than
+    FINEST_EDGE. The rim is off the boundary by at most VISIBLE.
     """
     mean_radius = math.sqrt(domain.area / math.pi)
 
     def size(points: Array) -> Array:
-        """The distance of neighbors that the second derivatives allow, (n,)."""
+        """The distance (n,) of neighbors that the second derivatives allow at points (n, 2)."""
         flattest = CHORD * tolerance / (COARSEST_EDGE * mean_radius) ** 2
         wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(surface, points), flattest))
         return np.maximum(wanted, FINEST_EDGE * mean_radius)
@@ -53,8 +56,8 @@ def patch_mesh(surface: HeightField, domain: Domain, tolerance: float) -> tuple[
 def triangulate(domain: Domain, size: Size, off: float) -> tuple[Array, NDArray[np.intp]]:
     """Points (n, 2), from the origin outward and then along the rim, and counterclockwise triangles (m, 3).
 
-    size : the distance of neighbors that is wanted at points (k, 2), (k,)
-    off : how far the rim may be from the boundary
+    size : a function that gives the wanted distance (k,) of neighbors at points (k, 2)
+    off : how far the rim may be off the boundary, a length
     """
     rim, finest = _rim(domain, size, off)
     inner = _lattice(domain, size, rim, finest)
@@ -64,19 +67,19 @@ def triangulate(domain: Domain, size: Size, off: float) -> tuple[Array, NDArray[
 
 
 def _bend(surface: HeightField, points: Array) -> Array:
-    """8 times the chord error of an equilateral triangle of side 1 at most, (n,), by second derivatives."""
+    """8 times the largest chord error (n,) of an equilateral triangle of side 1, by second derivatives."""
     d = surface.derivatives(*points.T)
     mean, half = 0.5 * np.abs(d.xx + d.yy), np.hypot(0.5 * (d.xx - d.yy), d.xy)
     return mean + half + np.maximum(mean - half, 0.0) / 3.0
 
 
 def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
-    """Points on the boundary, as far apart along it from each other; and the least size in the domain."""
+    """Points (n, 2) on the boundary with equal distances along it, and the least size in the domain."""
     closed = domain.boundary(8 * RIM_SAMPLES)[np.arange(8 * RIM_SAMPLES + 1) % (8 * RIM_SAMPLES)]
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
 
     def around(count: int) -> Array:
-        """`count` points of it in equal steps, (count, 2)."""
+        """The points (count, 2) of the boundary in `count` equal steps."""
         at = lengths[-1] / count * np.arange(count)
         return np.column_stack([np.interp(at, lengths, values) for values in closed.T])
 
@@ -89,7 +92,7 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
 
 
 def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
-    """Points inside and clear of the rim (n, 2), from the origin outward, as size and rim ask."""
+    """Points (n, 2) inside and clear of the rim, from the origin outward, as dense as size and rim ask."""
     from scipy.spatial import cKDTree
 
     edge = float(np.mean(np.hypot(*(rim - np.roll(rim, 1, 0)).T)))
@@ -100,25 +103,25 @@ def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
     points = np.column_stack([0.5 * side * i, row * j])
     there = ((i + j) % 2 == 0) & domain.contains(*points.T)
     i, j, points = i[there], j[there], points[there]
-    # How many times wider the coarsest lattice is that has the point: the powers of two in its place.
+    # The coarsest lattice that has a point is wider by the power of two in the point's place.
     place = np.gcd((i - j) // 2, j)
     wide = np.where(place == 0, MOST_RIM_EDGES, place & -place) * side
-    wide[i == 0] *= 2.0  # No trapezoid may lie across the axis, for its diagonal would lean.
+    wide[i == 0] *= 2.0  # No trapezoid may lie across the axis, because its diagonal would lean.
     distance = cKDTree(rim).query(points)[0]
     wanted = np.minimum(size(points), edge + EDGE_GROWTH * distance)
     kept = np.flatnonzero((wanted < 1.999 * wide) & (distance > CLEAR * edge))
-    outward = np.argsort((i**2 + 3 * j**2)[kept], kind="stable")  # whole numbers: the same in any unit
+    outward = np.argsort((i**2 + 3 * j**2)[kept], kind="stable")  # Whole numbers are the same in any unit.
     return points[kept[outward]]
 
 
 def _delaunay(points: Array, inner: int) -> NDArray[np.intp]:
-    """Counterclockwise triangles (m, 3) of points, the last of which, from `inner` on, are the rim."""
+    """Counterclockwise triangles (m, 3) of points, of which those from `inner` on are the rim."""
     from scipy.spatial import Delaunay
 
     scaled = points / np.abs(points).max()
     scaled *= 1.0 + UNEQUAL * (scaled**2 @ (1.0, 2.0))[:, None]
     triangles = Delaunay(scaled).simplices.astype(np.intp)  # counterclockwise in two dimensions
-    # One outside has its corners on the rim, and goes round the other way than the rim does.
+    # A triangle outside has its corners on the rim, and runs against the rim.
     ahead = triangles < np.roll(triangles, -1, axis=1)
     return triangles[(triangles.min(axis=1) < inner) | (np.count_nonzero(ahead, axis=1) == 2)]
 
@@ -130,8 +133,8 @@ def _doubled_areas(points: Array, triangles: NDArray[np.intp]) -> Array:
 
 
 def _smoothed(points: Array, triangles: NDArray[np.intp], inner: int) -> Array:
-    """The points with those inside, but for the first, between their neighbors."""
-    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()  # each edge inside twice
+    """The points, of which all inside except the first are moved to the means of their neighbors."""
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()  # Inner edges are there twice.
     smoothed, counts = points.copy(), np.maximum(np.bincount(start, minlength=len(points)), 1)
     for _ in range(SMOOTHING_PASSES):
         sums = [np.bincount(start, smoothed[end, axis], len(points)) for axis in (0, 1)]

@@ -14,16 +14,16 @@ from .result import Reconstruction
 
 
 def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
-    """mean_height_std of each, which is several times as fast as one by one."""
+    """The mean_height_std of each, computed together, which is several times as fast as one by one."""
     plain = [r for r in results if r.residual is None]
     of_sextics = iter(_mean_stds_of_sextics(plain))
     return [r.radius * next(of_sextics) if r.residual is None else r.mean_height_std for r in results]
 
 
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
-    """Reconstructions whose mean_height_std is known, which status and message need first."""
+    """The same reconstructions, which now know their mean_height_std; status and message need it first."""
     stds = mean_height_stds(results)
-    # Reconstructions with a residual know it already, and more than the mean.
+    # Those with a residual know it already, and more than the mean.
     pairs = zip(results, stds, strict=True)
     return [replace(r, known_height_std=std) if r.residual is None else r for r, std in pairs]
 
@@ -36,7 +36,7 @@ def _mean_stds_of_sextics(results: Sequence[Reconstruction]) -> list[float]:
     for i, (r, (at, weight)) in enumerate(zip(results, nodes, strict=True)):
         points[i, : len(at)], weights[i, : len(at)] = at / r.radius, weight
     covariance = np.array([r.posterior.covariance for r in results]).reshape(-1, len(TERMS), len(TERMS))
-    # A patch by another method departs from the posterior's mean as well.
+    # A patch by another method departs from the posterior's mean, too.
     off = np.array([
         np.zeros(len(TERMS))
         if r.joint_posterior is not None

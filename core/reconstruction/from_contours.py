@@ -26,10 +26,10 @@ from .start import Given
 from .strokes import gathered
 
 METHODS = ("bayes", *PAPER_METHODS)
-# lambda L^2: of TAGC the paper's 9.99/mm^2 at L = 10 mm; quadratic variation in the paper is subject to
-# f = 0, which 1e5 comes near.
+# Default weights lambda L^2. That of TAGC is the paper's, 9.99/mm^2 at L = 10 mm. The paper minimizes
+# quadratic variation subject to f = 0, to which 1e5 comes near.
 WEIGHTS = {"tagc": 1e3, "quadratic-variation": 1e5}
-STACK = 4000  # contacts that are fitted at once; more do not fit into a processor's cache (benchmarks.speed)
+STACK = 4000  # So many contacts at once fit into a processor's cache (benchmarks.speed).
 
 
 def reconstruct(
@@ -91,7 +91,7 @@ def reconstruct_many(
     weight: float | None = None,
     solver: str = "fast",
 ) -> list[Reconstruction | DegenerateCurvesError]:
-    """What `reconstruct` gives for each of n touches; "bayes" is several times as fast in stacks.
+    """What `reconstruct` gives for each of n touches, in stacks, in which "bayes" is several times as fast.
 
     points : (n, 3); contours_list : n lists of contours; outward : (n, 3); strokes_list : n lists of strokes
 
@@ -116,11 +116,11 @@ def reconstruct_many(
 def fitted(
     points: Array, touches: Sequence[Given], outward: Array, options: Options
 ) -> list[Reconstruction | DegenerateCurvesError]:
-    """What `reconstruct_many` gives for arguments that are in order, (n, 3), n touches and (n, 3)."""
-    # Touches of like size together: a stack has room for its longest contour in all places.
+    """What `reconstruct_many` gives for checked points (n, 3), n touches and outward directions (n, 3)."""
+    # A stack has room for its longest contour in all places, so touches of similar size go together.
     sizes = [touch.size for touch in touches]
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
-    # Slopes of some would cost time in the fits of all, and touches of strokes alone start otherwise.
+    # Measured normals of some would cost time in the fits of all, and strokes alone start differently.
     kinds = [(has_measured_normals(touch.contours), touch.is_of_strokes) for touch in touches]
     for kind in dict.fromkeys(kinds):
         order = [i for i in range(len(touches)) if kinds[i] == kind]
@@ -141,7 +141,7 @@ def options_of(
     solver: str,
     radius: float | None = None,
 ) -> Options:
-    """The options of a fit. Raises ValueError for bad ones."""
+    """The checked options of a fit. Raises ValueError for bad ones."""
     for name, value, choices in (("method", method, METHODS), ("solver", solver, SOLVERS)):
         if not isinstance(value, str) or value not in choices:
             raise ValueError(f"{name}: expected one of {', '.join(choices)}, got {shown(value)}")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where to touch next: the sampling plane whose contour would tell most."""
+"""Where to touch next: the sampling plane whose contour would tell most. Beside the paper."""
 
 import math
 from collections.abc import Callable
@@ -12,22 +12,22 @@ from ..arguments import Array, unit_vector
 from ..contours.contour import SamplingPlane
 from .result import Reconstruction
 
-TRIED = np.radians(np.arange(0.0, 180.0, 3.0))  # azimuths: 1.5 degrees off, a plane ends a 38th of L aside
-COARSE_STRIDE = 5  # So many azimuths lie between those that are tried first.
-TELLING_CONTACTS = 24  # of a contour: more tell of its seven terms no more than as many of less noise
-FEW_CONTACTS = 8  # of those that are compared
-NEARBY = np.arange(-(COARSE_STRIDE // 2), COARSE_STRIDE // 2 + 1)  # Azimuths about the best of those.
+# Azimuths that are tried: a plane that is 1.5 degrees off ends a 38th of L aside.
+TRIED = np.radians(np.arange(0.0, 180.0, 3.0))
+COARSE_STRIDE = 5  # Each fifth of them is tried first, with contours of FEW_CONTACTS,
+FEW_CONTACTS = 8
+NEARBY = np.arange(-(COARSE_STRIDE // 2), COARSE_STRIDE // 2 + 1)  # and then those next to the best.
+TELLING_CONTACTS = 24  # More contacts tell no more of a contour's seven terms than as many with less noise.
 
 
 def suggest_plane(
     r: Reconstruction, outward: ArrayLike | None = None, tangent: ArrayLike | None = None
 ) -> tuple[SamplingPlane, float]:
-    """The plane that would lower the mean variance of the height over the domain most.
+    """The sampling plane that would lower the mean variance of the height over the domain most.
 
-    outward, tangent : what the contours were tracked with, and the plane is measured by, see `track`;
-        d3 and d1 of the frame without
+    outward, tangent : as in `track`, from which the azimuth is measured; n and d1 of the frame by default
 
-    Also the mean height_std that is expected after it, in the caller's unit.
+    Also returns the mean height_std that is expected after it, in the caller's unit.
 
     The contour is assumed to have the length, number of contacts and noise of those before. Its
     effect depends on where it runs, not on the heights found there.
@@ -38,7 +38,7 @@ def suggest_plane(
     widening = r.geometry.node_widening**2
 
     def lost(azimuths: NDArray[np.intp], most: int) -> Array:
-        """What a contour at each of these takes off the variances at the points, (k, n), in unit radius."""
+        """What a contour at each of k azimuths takes off the variances at n points, (k, n), in L^2."""
         count = min(wanted, most)
         noise = float(r.uncertainty.noise) ** 2 * count / wanted
         return widening * _lost(covariances, TRIED[azimuths % len(TRIED)], count, noise)
@@ -57,10 +57,10 @@ def suggest_plane(
 def _lost(
     covariances: Callable[[Array], tuple[Array, Array]], azimuths: Array, count: int, noise: float
 ) -> Array:
-    """What contours at azimuths (k,), of so many contacts of that noise^2, take off variances, (k, n).
+    """What contours at azimuths (k,), of `count` contacts with this noise^2, take off the variances, (k, n).
 
-    A contour's heights have the covariance `seen`, and `shared` with those at the n points, off whose
-    variance it takes the diagonal of shared' seen^-1 shared.
+    The heights of a contour have the covariance `seen`, and `shared` with those at the n points. It takes the
+    diagonal of shared' seen^-1 shared off their variances.
     """
     directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
     shared, seen = covariances(np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A patch with its frame, and everything one may ask of it."""
+"""A patch with its frame, and everything that may be asked of it."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -23,26 +23,27 @@ from ..patch.monge import MongePatch, exponents, monomials
 from ..patch.residual import Residual
 from .status import Taps, contradicted, doubt, notes
 
-MESH_SHARE = 0.6  # Share of mean_height_std that the mesh is off the patch at most (benchmarks.patch_mesh).
+# The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh).
+MESH_SHARE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
     """A patch around a reference point, its contacts and all results, in the caller's unit.
 
-    geometry : the surface that was found: the posterior's mean for "bayes", or else `patch`
+    geometry : the surface that was found: the posterior's mean for "bayes", `patch` for other methods
     patch : equation (1) of the degree asked for, in the frame
     contours : the fitted contours, in the world
     strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
     noise : least standard deviation of a contact, in units of L
-    method : of the fit
-    converged : whether its solver did
-    joint_posterior : the posterior of "bayes"
-    taps : what was felt between the curves; None where nobody tapped
+    method : the method of the fit
+    converged : whether its solver converged
+    joint_posterior : the posterior of "bayes", in the frame and in units of L; None for other methods
+    taps : what was felt between the curves; None if nobody tapped there
     known_height_std : mean_height_std, if it is known already
     known_curves : the contours as Curves of one touch, in the world, if they are known already
 
-    All else is computed from these when it is needed.
+    All else is computed from these when it is asked for.
     """
 
     geometry: Geometry
@@ -69,7 +70,7 @@ class Reconstruction:
 
     @property
     def domain(self) -> Domain:
-        """The part of the tangent plane that the patch is meant for."""
+        """The part of the tangent plane over which the patch is valid, bounded by a closed spline (8)."""
         return self.geometry.domain
 
     @property
@@ -100,25 +101,25 @@ class Reconstruction:
 
     @property
     def uncertainty(self) -> Residual | Posterior:
-        """What knows the covariances of the heights, in the frame and in units of L."""
+        """The residual or posterior that has the covariances of heights, in the frame and in units of L."""
         return self.posterior if self.residual is None else self.residual
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height of the surface at local (x, y), in their shape.
 
-        For "bayes" it is the posterior's mean, a sextic and the residual, whatever the patch's degree; for
-        the paper's methods that of the patch.
+        For "bayes" it is the posterior's mean, a sextic and the residual, whatever the degree of the patch.
+        For the paper's methods it is the height of the patch.
         """
         return self.geometry.height(x, y)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Standard deviation of the height at local (x, y), in their shape; blind directions included."""
+        """Standard deviation of the height at local (x, y), in their shape, including blind directions."""
         return self._height_std(x, y, self.geometry.widening(x, y))
 
     def _height_std(self, x: ArrayLike, y: ArrayLike, widening: Array) -> Array:
         u, v = self.geometry.in_unit_radius(x, y)
         std = widening * self.uncertainty.height_std(u, v)
-        if self.joint_posterior is None:  # a patch by another method departs from the posterior's mean too
+        if self.joint_posterior is None:  # A patch by another method departs from the posterior's mean, too.
             off = self.posterior.height(u, v) - np.ravel(self.height(x, y)) / self.radius
             std = np.hypot(std, off)
         return self.radius * std.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
@@ -138,7 +139,7 @@ class Reconstruction:
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
-        It is as fine as the patch is certain: off it by 0.6 of mean_height_std at most.
+        It is as fine as the patch is certain: off the patch by at most 0.6 times mean_height_std.
         """
         return self.geometry.mesh(MESH_SHARE * self.mean_height_std)
 
@@ -173,7 +174,7 @@ class Reconstruction:
 
     @property
     def blind_share(self) -> float:
-        """`blind` as a share of all the coefficients."""
+        """The share of the coefficients that `blind` counts."""
         return self.blind / terms_to(self.patch.degree)
 
     @cached_property
@@ -184,7 +185,7 @@ class Reconstruction:
 
     @property
     def fit_error(self) -> float:
-        """(6), the mean of |dz| over the contacts."""
+        """The mean of |dz| over the contacts (6), a length."""
         return float(self._departures.mean())
 
     @property
@@ -194,7 +195,7 @@ class Reconstruction:
 
     @cached_property
     def total_absolute_curvature(self) -> float:
-        """(8), the integral of |K| over the patch."""
+        """The integral of |K| over the patch (8)."""
         return total_absolute_curvature(self.patch, self.domain)
 
     @cached_property
@@ -204,7 +205,7 @@ class Reconstruction:
         return least_squares.condition_number(monomials(x, y, exponents(3, self.patch.degree)))
 
     def moved(self, matrix: ArrayLike) -> "Reconstruction":
-        """This reconstruction after a similarity of the world, (4, 4): rotation, one scale above 0 and shift.
+        """This reconstruction after a similarity (4, 4) of the world: rotation, scale above 0 and shift.
 
         Raises ValueError for any other matrix.
         """
@@ -237,7 +238,7 @@ class Reconstruction:
 
     @cached_property
     def contradiction(self) -> tuple[float, float]:
-        """Number of deviations, and angle in radians, by which fitted normals contradict the contacts."""
+        """The number of deviations, and the angle in radians, by which fitted normals contradict contacts."""
         if self.joint_posterior is None or not has_measured_normals(self.contours):
             return 0.0, 0.0
         contacts, normals = measured_normals(self.contours, self.frame, self.radius)

@@ -21,15 +21,15 @@ from .result import Reconstruction
 from .status import Taps
 
 VERSION = 2
-ORTHONORMAL = 1e-6  # Axes of a file may be in single precision.
+ORTHONORMAL = 1e-6  # Axes may be off by so much, because files may have them in single precision.
 LEAST_PIVOT = 1e-3  # A residual's factor has no smaller pivot; its priors leave ten times as much.
-COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Coefficients of the degrees there are.
+COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Numbers of coefficients by degree.
 
 
 def to_dict(r: Reconstruction) -> dict[str, Any]:
-    """`r` as a dict of numbers, words, lists and dicts, as in JSON; `from_dict` reads it.
+    """A reconstruction as JSON has it: a dict of numbers, words, lists and dicts, which `from_dict` reads.
 
-    Lengths are in the caller's unit, those of the geometry in its frame; `noise` and `posterior` are in
+    Lengths are in the caller's unit, those of the geometry in its frame. `noise` and `posterior` are in
     units of the radius. `status` and `message` are for readers only: they follow from the rest.
     """
     posterior, residual = r.joint_posterior, r.residual
@@ -45,7 +45,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
             "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
             "radius": r.radius,
             "polynomial": polynomial_dict(r.geometry.polynomial),
-            "residual": None if residual is None else _residual_dict(residual),
+            "residual": residual and plain({f.name: getattr(residual, f.name) for f in fields(residual)}),
             "domain": r.domain.ends.tolist(),
             "brinks": None if r.domain.brinks is None else r.domain.brinks.tolist(),
         },
@@ -62,12 +62,8 @@ def polynomial_dict(patch: MongePatch) -> dict[str, Any]:
     return {"k1": patch.k1, "k2": patch.k2, "coefficients": patch.coefficients.tolist()}
 
 
-def _residual_dict(residual: Residual) -> dict[str, Any]:
-    return plain({field.name: getattr(residual, field.name) for field in fields(residual)})
-
-
 def plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Arrays as lists."""
+    """The same values, with arrays as lists."""
     return {
         key: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
         for key, value in values.items()
@@ -75,7 +71,7 @@ def plain(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def from_dict(d: Mapping[str, Any]) -> Reconstruction:
-    """The reconstruction from which `to_dict` made this, to the last bit.
+    """The reconstruction that `to_dict` made `d` from, to the last bit.
 
     Raises ValueError for another version, and for missing or wrong values.
     """
@@ -147,7 +143,7 @@ def _contours(contours: Any, may_be_none: bool) -> tuple[Contour, ...]:
 
 
 def _taps(d: Any) -> Taps | None:
-    """None in files that were written before there were taps, too."""
+    """The taps, or None if there were none or the file was written before there were taps."""
     if d is None:
         return None
     taps, missed = (int(number(name, _of(d, name), least=0.0)) for name in ("number", "missed"))
@@ -187,7 +183,7 @@ def _residual(d: Any) -> Residual:
     }
     values = {name: finite_array(name, _of(d, name), shape) for name, shape in shapes.items()}
     factor, variances, noise = (values[name] for name in ("factor", "variances", "noise"))
-    # This is the factor of the precision, which priors keep from being singular.
+    # It is the factor of the precision, which priors keep from being singular.
     if not np.array_equal(factor, np.tril(factor)) or factor.diagonal().min() < LEAST_PIVOT:
         raise ValueError(
             f"factor: expected a lower triangle, its diagonal {LEAST_PIVOT:g} or more, got another"

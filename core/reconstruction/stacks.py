@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Touches that are fitted together: the paper's sections III and IV, or the Bayesian fit, in stacks."""
+"""Touches that are fitted together, in stacks: the paper's sections III and IV, or the Bayesian fit."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -25,7 +25,7 @@ from .start import Given, Start, curves_start, domain_of, levels, strokes_start
 
 
 class Options(NamedTuple):
-    """How to fit, checked."""
+    """The options of a fit, checked."""
 
     method: str
     degree: int | None  # None for "auto"
@@ -36,7 +36,7 @@ class Options(NamedTuple):
 
 
 class _Parts(NamedTuple):
-    """What a patch follows from: the curves of one touch, in the frame; all but the radius in its unit."""
+    """What the patch of one touch follows from, in the frame; all but the radius in units of it."""
 
     frame: Frame
     radius: float
@@ -47,12 +47,12 @@ class _Parts(NamedTuple):
     k2: float
     noise: float
     degree: int
-    posterior: Posterior | None  # What the joint fit has found, where that makes the patch.
-    residual: Residual | None  # beside it, where the contacts ask for one
+    posterior: Posterior | None  # What the joint fit has found, if that makes the patch.
+    residual: Residual | None  # What the surface is beside it, if the contacts ask for that.
 
 
 class _Fit(NamedTuple):
-    """b touches in the frames that the method finds; contacts in unit radius."""
+    """b touches in the frames that the method finds, with contacts in unit radius."""
 
     points: Array  # (b, 3), in the world
     axes: Array  # (b, 3, 3)
@@ -67,17 +67,18 @@ class _Fit(NamedTuple):
 def fitted_stack(
     points: Array, touches: Sequence[Given], outward: Array, options: Options
 ) -> list[Reconstruction | DegenerateCurvesError]:
-    """Results of touches, all of strokes alone or none, whose arguments are in order."""
+    """The results of touches whose arguments are checked, and which are all of strokes alone or none is."""
     if touches[0].is_of_strokes:
         start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
     else:
         start, contours, errors = curves_start(points, touches, outward, options.noise)
     found = iter(() if start is None else _fitted(start, options))
-    return [error or _result(next(found), c, options) for error, c in zip(errors, contours, strict=True)]
+    each = zip(errors, contours, outward, strict=True)
+    return [error or _result(next(found), c, up, options) for error, c, up in each]
 
 
 def _fitted(start: Start, options: Options) -> list[_Parts]:
-    """Touches in the Darboux frames that the method finds."""
+    """The touches in the Darboux frames that the method finds."""
     fit, curves, places = _fit(start, options), start.curves, start.curves.present[0].size
     along = curves.along / fit.radii[:, None, None]
     curvatures = fit.radii[:, None, None] * (curves.curvatures @ fit.axes)
@@ -102,7 +103,7 @@ def _fitted(start: Start, options: Options) -> list[_Parts]:
 
 
 def _fit(start: Start, options: Options) -> _Fit:
-    """The frames of the paper, or those of the joint fit."""
+    """The touches in the frames of the paper, or in those of the joint fit."""
     contacts, present = start.contacts()
     tangents, count = start.curves.tangents @ start.axes, len(start.points)
     degrees = [options.degree or 0] * count
@@ -122,7 +123,7 @@ def _fit(start: Start, options: Options) -> _Fit:
 
 
 def _with_residuals(start: Start, fit: _Fit, posteriors: Posterior, weights: Array) -> _Fit:
-    """The joint fit in unit radius, with residuals and in their frames where the contacts ask for them."""
+    """The joint fit in unit radius; where contacts ask for a residual, with it and in its frame."""
     points, axes, radii, contacts, tangents = fit[:5]
     if start.alone:
         level = levels(contacts, weights, posteriors)
@@ -147,20 +148,20 @@ def _with_residuals(start: Start, fit: _Fit, posteriors: Posterior, weights: Arr
 
 
 def _in_unit_radius(radii: Array, contacts: Array, places: int) -> tuple[Array, Array, Array]:
-    """The farthest of the first `places` contacts, or of all, put at 1; and where it was."""
+    """Radii and contacts, such that the farthest of the first `places`, or of all, is at 1; the factors."""
     farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, : places or None].max(axis=1)
     return radii * farthest, contacts / farthest[:, None, None], farthest
 
 
 def _joint(start: Start, contacts: Array, present: NDArray[np.bool_]) -> tuple[Array, Posterior, Array]:
-    """The joint fit of all the contacts of each touch."""
+    """The joint fit of all contacts of each touch: turns, posteriors, weights."""
     normals = _normals(start.curves, start.axes, contacts)
     tangent, noise = (start.tangents[:, None] @ start.axes)[:, 0], start.stds / start.radii
     first, through = (start.k1, start.k2, tangent, noise), not start.alone
     most = present.sum(axis=1).max()
     if most == present.shape[1]:
         return joint_fit(contacts, present.astype(float), *first, normals, through)
-    # Short curves beside a long one are filled up with what costs time.
+    # Short curves are filled up to the length of the longest, and fitting that too would take time.
     kept = np.argsort(~present, axis=1, kind="stable")[:, :most]
     rows = np.arange(len(kept))[:, None]
     few, some = contacts[rows, kept], present[rows, kept].astype(float)
@@ -172,7 +173,7 @@ def _joint(start: Start, contacts: Array, present: NDArray[np.bool_]) -> tuple[A
 
 
 def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
-    """The measured normals in these axes, in the shape of the contacts; of strokes there are none."""
+    """The measured normals in these axes, in the shape of the contacts, 0 for strokes; or None."""
     if curves.normals is None:
         return None
     normals = np.zeros_like(contacts)
@@ -181,8 +182,13 @@ def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
 
 
 def _result(
-    touch: _Parts, contours: Sequence[Contour], options: Options
+    touch: _Parts, contours: Sequence[Contour], outward: Array, options: Options
 ) -> Reconstruction | DegenerateCurvesError:
+    if touch.frame.axes[:, 2] @ outward <= 0.0:
+        return DegenerateCurvesError(
+            "the contacts show a surface that faces away from the outward direction: give the direction to "
+            "its outer side at the point, or move the point away from the edge"
+        )
     try:
         domain = domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)
     except ValueError:

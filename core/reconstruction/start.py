@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where fits start: the contacts of touches in frames of the paper, or in those that strokes show."""
+"""Where fits start: contacts in the frames of the paper (III), or in those that strokes show."""
 
 import math
 from collections.abc import Sequence
@@ -25,11 +25,11 @@ from ..patch.domain import BRINK, Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
 from .strokes import STRIPS, FirstFrame, first_frame, means, unit_in
 
-TOUCH_ROUNDING = 1e-3  # Share of a touch that rounding may take, far from the origin; MISFIT has room for it.
+TOUCH_ROUNDING = 1e-3  # Far from the origin rounding may take this share of a touch; MISFIT has room for it.
 
 
 class Given(NamedTuple):
-    """The contacts of one touch: contours, strokes (n, 3), and the largest deviation that strokes bring."""
+    """The contacts of one touch: contours, strokes (n, 3), and the largest noise that strokes state."""
 
     contours: list[Contour]
     strokes: Array
@@ -37,18 +37,18 @@ class Given(NamedTuple):
 
     @property
     def is_of_strokes(self) -> bool:
-        """Whether there is nothing else."""
+        """Whether there are strokes only."""
         return len(self.strokes) > 0 and not self.contours
 
     @property
     def size(self) -> int:
-        """How many places its contacts take in a stack."""
+        """The number of places that its contacts take in a stack."""
         longest = max((len(contour.points) for contour in self.contours), default=0)
         return len(self.contours) * longest + min(len(self.strokes), STRIPS**2)
 
 
 class Start(NamedTuple):
-    """b touches as the joint fit gets them, in axes near to the Darboux frames."""
+    """b touches as the joint fit takes them, in axes near to the Darboux frames."""
 
     points: Array  # (b, 3), in the world
     axes: Array
@@ -59,7 +59,7 @@ class Start(NamedTuple):
     curves: Curves  # relative to the points, in the world
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
-    told: NDArray[np.bool_]  # (b,), whether these are known to be all their noise; of means it is more
+    told: NDArray[np.bool_]  # (b,), whether these are known to be all of the noise; of means it is more
 
     @property
     def alone(self) -> bool:
@@ -67,7 +67,7 @@ class Start(NamedTuple):
         return not self.curves.present.any()
 
     def contacts(self) -> tuple[Array, NDArray[np.bool_]]:
-        """Contacts of curves, of strokes, (b, n, 3), in the axes and in unit radius; and which are there."""
+        """Contacts (b, n, 3) of curves, then strokes, in the axes and in unit radius; a mask (b, n)."""
         b, most = len(self.points), max(map(len, self.strokes))
         local = (self.curves.points @ self.axes[:, None] / self.radii[:, None, None, None]).reshape(b, -1, 3)
         beside, there = np.zeros((b, most, 3)), np.zeros((b, most), dtype=bool)
@@ -81,7 +81,7 @@ Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | 
 
 
 def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: float | None) -> Started:
-    """The start of fits to contours with strokes beside them, the contours as they are fitted, and errors."""
+    """The start of fits to contours with strokes beside them, the thinned contours, and errors."""
     thin = [[thinned(c, point) for c in touch.contours] for point, touch in zip(points, given, strict=True)]
     touches = [[contour for contour, _ in c] for c in thin]
     curves = curves_through(*stacked(points, touches))
@@ -113,14 +113,14 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
 
 
 def _std(noise: float | None, size: int, known: list[float]) -> float:
-    """The least deviation of contacts, the means of `size` others of that noise; or what is known of them."""
+    """The least deviation of contacts, each a mean of `size` with this noise, or the largest known one."""
     return max(known) if noise is None else noise / math.sqrt(size)
 
 
 def _beside(
     curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, strokes: Array
 ) -> tuple[Array, int]:
-    """Strokes (n, 3) over the domain of curves as means, in the axes and in unit radius, and of how many."""
+    """Strokes (n, 3) over the domain of curves as means, in unit radius; the least number in a mean."""
     if not len(strokes):
         return strokes, 1
     local = strokes @ axes / radius
@@ -129,7 +129,7 @@ def _beside(
 
 
 def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArray[np.bool_]:
-    """Which strokes (n, 3) are over the domain of curves, all in unit radius; none where they bound none."""
+    """Which strokes (n, 3) are over the domain of curves, all in unit radius; none if there is no domain."""
     try:
         domain = domain_of(curves, contours)
     except ValueError:
@@ -140,7 +140,7 @@ def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArra
 def strokes_start(
     points: Array, given: Sequence[Given], outward: Array, noise: float | None, radius: float | None
 ) -> Started:
-    """What `curves_start` gives, of strokes alone."""
+    """What `curves_start` gives, for strokes alone."""
     frames = [
         first_frame(touch.strokes - point, up, radius)
         for point, touch, up in zip(points, given, outward, strict=True)
@@ -168,7 +168,7 @@ def strokes_start(
 
 
 def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
-    """The heights at the origin, (b,), that contacts (b, n, 3) ask of surfaces that pass through it."""
+    """The mean heights (b,) by which contacts (b, n, 3) are above surfaces that pass through the origin."""
     b, n = weights.shape
     basis = monomials(contacts[..., 0].ravel(), contacts[..., 1].ravel(), TERMS).reshape(b, n, -1)
     off = contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0]
@@ -177,9 +177,9 @@ def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
 
 
 def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
-    """The domain through the curves' ends on either side of the point. Raises ValueError if they bound none.
+    """The domain through the ends of the curves on both sides of the point. Raises ValueError without one.
 
-    Where the surface ended before the first contact of a side, it ends at the point.
+    If the surface ended before the first contact of a side, it ends at the point.
     """
     last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
     rows, ahead = np.arange(len(last)), curves.tangents[:, :2]

@@ -1,37 +1,41 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a reconstruction can be trusted: what gives reason to doubt it, and what to do about that."""
+"""Whether a reconstruction can be trusted: what gives reason to doubt it, and what to do about that."""
 
 import math
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import Array
-from ..bayes.posterior import Posterior, terms_to
-from ..patch.monge import MongePatch
-from ..patch.residual import Residual
+from ..bayes.posterior import terms_to
 
-# Chosen with benchmarks.stability, but for what benchmarks.real says of rough surfaces.
-DOUBTFUL_STD = 0.02  # Share of the radius that the height may deviate on average over the domain.
-DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise this many times larger.
-DOUBTFUL_TURN = math.radians(10.0)  # Angle that the frame may be off.
-LIKELY = 0.5  # Probability of that on a rough surface, whose directions are others at each scale.
-DOUBTFUL_CURVATURE = 0.1  # Deviation in units of 1 / radius: what a curve tells that ends at a quarter of it.
-DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point,
-SIGNIFICANT = 5.0  # and standard deviations of it.
-LEAST_SCATTER = 0.3  # Share of a contact's noise: few contacts may happen to scatter less.
-CONTRADICTED = 0.01  # Radians by which normals may contradict the contacts, beside SIGNIFICANT deviations.
-DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts may be missed, beside the noise.
-CONTRADICTING = 3.0  # A surface that is off by more than so many deviations on average contradicts the patch.
+# benchmarks.stability chose these, and benchmarks.real LIKELY and what taps say. A fit is in doubt beyond
+# them.
+DOUBTFUL_STD = 0.02  # Mean deviation of the height over the domain, as a share of the radius.
+DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise so many times larger.
+DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
+LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
+DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of curves a quarter as long.
+DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
+SIGNIFICANT = 5.0  # so many standard deviations as well.
+# Scatter counts as at least this share of a contact's noise: few contacts may scatter less.
+LEAST_SCATTER = 0.3
+# Angle in radians by which normals contradict the contacts, if it is SIGNIFICANT as well.
+CONTRADICTED = 0.01
+DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
+CONTRADICTING = 3.0  # Mean number of deviations by which the surface is off the patch between the curves.
 DOUBTFUL_GAP = 0.1  # Share of the taps between the curves that feel no surface.
 
 
-class Taps(NamedTuple):
-    """What a finger that tapped between the curves found, so many times.
+Judged = Any  # A Reconstruction, whose module imports this one.
 
-    missed : taps that met no surface within the radius
-    off : how far the surface is off the patch at most, in units of L, where taps contradict it; or 0
+
+class Taps(NamedTuple):
+    """What a finger that tapped between the curves has found.
+
+    number : how often it tapped
+    missed : how often it met no surface within the radius
+    off : the largest distance of the surface from the patch, in units of L, if taps contradict it; else 0
     """
 
     number: int
@@ -39,68 +43,8 @@ class Taps(NamedTuple):
     off: float = 0.0
 
 
-class _Judged(Protocol):
-    """What a status follows from; see Reconstruction."""
-
-    @property
-    def method(self) -> str:
-        """The method of the fit."""
-
-    @property
-    def converged(self) -> bool:
-        """Whether the solver of the fit converged."""
-
-    @property
-    def radius(self) -> float:
-        """The radius L."""
-
-    @property
-    def noise(self) -> float:
-        """The least standard deviation of a contact, in units of L."""
-
-    @property
-    def misses(self) -> Array:
-        """The distances at which the curves pass the point, and their deviations, (c, 2)."""
-
-    @property
-    def residual(self) -> Residual | None:
-        """What the surface is beside its polynomial, if anything."""
-
-    @property
-    def posterior(self) -> Posterior:
-        """What the contacts leave open."""
-
-    @property
-    def condition_number(self) -> float:
-        """The condition number of the least-squares system."""
-
-    @property
-    def mean_height_std(self) -> float:
-        """The mean deviation of the height over the domain."""
-
-    @property
-    def typical_miss(self) -> float:
-        """The median of |dz| over the contacts."""
-
-    @property
-    def patch(self) -> MongePatch:
-        """Equation (1), of the degree asked for."""
-
-    @property
-    def blind(self) -> int:
-        """Directions among its coefficients that the contacts do not show."""
-
-    @property
-    def contradiction(self) -> tuple[float, float]:
-        """The deviations, and the angle, by which normals contradict contacts."""
-
-    @property
-    def taps(self) -> Taps | None:
-        """What was felt between the curves, if a finger tapped there."""
-
-
-def doubt(r: _Judged) -> tuple[str, str] | None:
-    """Status and a sentence of advice; None where there is no doubt."""
+def doubt(r: Judged) -> tuple[str, str] | None:
+    """The status and a sentence of advice, or None if there is no doubt."""
     if not r.converged:
         return "not_converged", (
             "The minimization stopped at its step limit, and the patch is the best so far: use the "
@@ -115,7 +59,7 @@ def doubt(r: _Judged) -> tuple[str, str] | None:
 
 
 def contradicted(taps: Taps | None) -> tuple[str, str] | None:
-    """Status and a sentence of advice where taps contradict a fit; None where they do not."""
+    """The status and a sentence of advice if taps contradict a fit, or None."""
     if taps is None:
         return None
     if taps.off:
@@ -132,8 +76,8 @@ def contradicted(taps: Taps | None) -> tuple[str, str] | None:
     return None
 
 
-def notes(r: _Judged) -> str:
-    """What else is to be said, whatever the status: sentences, each after a space."""
+def notes(r: Judged) -> str:
+    """What else there is to say, whatever the status: sentences, each after a space."""
     message = ""
     if r.taps is not None and r.taps.missed:
         message += f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface."
@@ -145,7 +89,7 @@ def notes(r: _Judged) -> str:
     return message
 
 
-def _about_data(r: _Judged) -> tuple[str, str] | None:
+def _about_data(r: Judged) -> tuple[str, str] | None:
     deviations, angle = r.contradiction
     if deviations > SIGNIFICANT and angle > CONTRADICTED:
         return "uncertain", (
@@ -162,7 +106,7 @@ def _about_data(r: _Judged) -> tuple[str, str] | None:
     return None
 
 
-def _about_heights(r: _Judged) -> tuple[str, str] | None:
+def _about_heights(r: Judged) -> tuple[str, str] | None:
     share = r.mean_height_std / r.radius
     if share > DOUBTFUL_STD:
         return "uncertain", (
@@ -172,7 +116,7 @@ def _about_heights(r: _Judged) -> tuple[str, str] | None:
     return None
 
 
-def _about_frame(r: _Judged) -> tuple[str, str] | None:
+def _about_frame(r: Judged) -> tuple[str, str] | None:
     distances, stds = r.misses.T / r.radius
     stds = np.maximum(stds, LEAST_SCATTER * r.noise)
     apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strokes: contacts that run beside the reference point, and the frame they show where there are no contours.
 
-A robot that wipes over an object has thousands of them, with noise in all directions, and the fit takes where
-one lies in the tangent plane for exact. So the fit gets means of neighbors, of their heights over a quartic:
-what the shape adds to a mean is no noise.
+A robot that wipes over an object has thousands of them, with noise in all directions, but the fit takes their
+places in the tangent plane for exact. So it gets means of neighbors, in which this noise averages out. Their
+heights are averaged relative to a quartic, so that the shape itself does not change the mean.
 """
 
 import math
@@ -20,26 +20,29 @@ from ..contours.contour import Contour, cross
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.monge import QUADRIC, QUARTIC, monomials
 
-# Strips, and means in each: with more the offsets of rows count for texture (benchmarks.robot).
+# benchmarks.robot chose these. There are so many strips of as many means each: with more, the offsets of rows
+# count as texture.
 STRIPS, LEAST_STRIPS = 10, 6
-ROWS = 4  # that a mean takes in at least, on average
-STROKE_CELL = 0.02  # of the radius: contacts in one such square tell of one place
-QUARTIC_CONTACTS = 2000  # contacts that the quartic is fitted to
-FIRST_REACH = 0.5  # of the farthest contact: those that the first quadric is fitted to, if they can carry one
-DETERMINED = 0.02  # the least singular value of a quadric's terms on average over contacts, in unit radius
-OPEN = 1e-3  # share of the largest singular value: contacts on a few lines leave such terms of a quartic open
-STRAY = 2.0  # times as far as all others: contacts that are none of the surface there,
-FEW = 0.02  # if they are but this share of all
-FAR = 0.999  # of the greatest distance, that is as far: rounding must not choose
+ROWS = 4  # A mean consists of contacts of at least so many rows, on average.
+STROKE_CELL = 0.02  # Contacts in a square of this share of the radius tell of one place.
+QUARTIC_CONTACTS = 2000  # The quartic is fitted to so many contacts.
+FIRST_REACH = 0.5  # The first quadric is fitted within this share of the largest distance, if that suffices.
+DETERMINED = 0.02  # It suffices if the least singular value of its terms, averaged over contacts, is larger.
+OPEN = 1e-3  # Terms of a quartic below this share of the largest singular value are left out.
+STRAY = 2.0  # Contacts so many times as far away as all others do not belong to the surface,
+FEW = 0.02  # if they are at most this share of all.
+# Contacts at this share of the largest distance count as equally far, so that rounding does not choose.
+FAR = 0.999
 
 
 class FirstFrame(NamedTuple):
-    """Axes d1, d2, n (3, 3) near to the Darboux frame at the foot of a place, and what is known in them.
+    """What contacts show alone around a place.
 
+    axes : (3, 3), columns d1, d2, n near to the Darboux frame at the foot of the place
     k1, k2 : curvatures in unit radius
     radius : the largest distance of a contact from the place in the tangent plane
     contacts : (n, 3), relative to the place, in these axes and in unit radius
-    along : (2,), toward the farthest of them, which is the same whatever the side of the normal
+    along : (2,), toward the farthest of them, the same for either side of the normal
     """
 
     axes: Array
@@ -51,12 +54,13 @@ class FirstFrame(NamedTuple):
 
 
 def gathered(strokes: Sequence[ArrayLike | Contour], contours: Sequence[Contour] = ()) -> tuple[Array, float]:
-    """All contacts of strokes, (n, 3), each once, and the largest deviation they bring. Raises ValueError.
+    """All different contacts of strokes, (n, 3), and the largest noise that any of them states.
 
-    A sensor at rest writes one contact many times, and strokes may repeat contours: that tells no more.
+    Repeated contacts, as of a sensor at rest or of contours that are given too, would tell no more. Raises
+    ValueError for strokes of another shape or with numbers that are not finite.
     """
     given: list[object] = list_of("strokes", strokes, object)
-    if not given:  # as mostly: touches of contours alone are not to pay for them
+    if not given:  # In most cases there are only contours, which should not take longer.
         return np.empty((0, 3)), 0.0
     arrays = [
         stroke.points if isinstance(stroke, Contour) else finite_array("strokes", stroke, (None, 3), LARGEST)  # type: ignore[arg-type]
@@ -70,11 +74,11 @@ def gathered(strokes: Sequence[ArrayLike | Contour], contours: Sequence[Contour]
 
 
 def means(contacts: Array, along: Array, strips: int = STRIPS) -> tuple[Array, int]:
-    """Contacts (n, 3) in unit radius, or strips^2 means of neighbors; and of how many these are, at least.
+    """Contacts (n, 3) in unit radius, or strips^2 means of neighbors; the least number of contacts in a mean.
 
-    Each mean has an equal share of the area that was felt, in strips across the direction `along` (2,): where
-    a sensor dwells it tells no more of the shape. Contacts that follow each other share the error of their
-    row, so where these are far apart strips are fewer.
+    Strips run across the direction `along` (2,). Each mean has an equal share of the area that was felt,
+    because a sensor tells no more of the shape where it dwells. Contacts that follow each other share the
+    error of their row, so there are fewer strips if rows are far apart.
     """
     n = len(contacts)
     if n <= strips**2:
@@ -96,9 +100,9 @@ def means(contacts: Array, along: Array, strips: int = STRIPS) -> tuple[Array, i
 
 
 def _groups(flat: Array, along: Array, strips: int) -> NDArray[np.intp]:
-    """The group of each of n contacts, (n,): by equal shares of the cells that (n, 2) are in."""
+    """The group (n,) of each contact (n, 2), such that all groups have equal shares of occupied cells."""
     run, across = flat @ along, flat[:, 1] * along[0] - flat[:, 0] * along[1]
-    across *= np.copysign(1.0, np.sum(across**3))  # the same whatever the side of the normal
+    across *= np.copysign(1.0, np.sum(across**3))  # It is the same for either side of the normal.
     places = np.clip(np.column_stack([run, across]), -1.0, 1.0) / STROKE_CELL
     cells = places.round().astype(np.intp) @ [1, round(4.0 / STROKE_CELL)]
     cells -= cells.min()
@@ -108,7 +112,7 @@ def _groups(flat: Array, along: Array, strips: int) -> NDArray[np.intp]:
 
 
 def _equal(shares: Array, order: NDArray[np.intp], within: NDArray[np.intp], parts: int) -> NDArray[np.intp]:
-    """Numbers (n,) of so many parts of equal shares, in that order in each group of `within`."""
+    """The part (n,) of each contact if each group of `within`, in this order, is cut into equal shares."""
     passed = np.cumsum(shares[order]) - 0.5 * shares[order]
     totals = np.bincount(within, shares)
     passed -= (np.cumsum(totals) - totals)[within[order]]
@@ -122,12 +126,12 @@ def _basis(contacts: Array) -> Array:
 
 
 def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | DegenerateCurvesError:
-    """What contacts (n, 3) relative to a place show alone; or why they carry no fit.
+    """What contacts (n, 3) around a place show alone, by a plane and a quadric; or why they carry no fit.
 
     radius : only contacts within it take part; None for all
 
-    A plane and a quadric through the nearest ones. Contacts farther from the plane than the farthest in it
-    are of another side of the object.
+    Contacts that are farther from the plane than the farthest foot in it belong to another side of the
+    object.
     """
     distances = np.sqrt(np.einsum("ni,ni->n", r, r))
     used = distances <= (radius or _farthest(distances))
@@ -159,14 +163,14 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
 
 
 def _farthest(distances: Array) -> float:
-    """The largest of the distances (n,), but for stray contacts: a gap sets them apart."""
+    """The largest of the distances (n,), except those of stray contacts, which a gap sets apart."""
     last = np.sort(distances)[-1 - int(FEW * len(distances)) :]
     gaps = np.flatnonzero(last[1:] > STRAY * last[:-1])
     return float(last[gaps[0] if len(gaps) else -1]) if len(last) else 0.0
 
 
 def unit_in(axes: Array, direction: Array) -> Array:
-    """A direction's part in the tangent plane of axes (3, 3), (2,), of length 1."""
+    """The part (2,) of a direction in the tangent plane of axes (3, 3), scaled to length 1."""
     flat = direction @ axes[:, :2]
     found: Array = flat / max(float(np.hypot(*flat)), 1e-300)
     return found

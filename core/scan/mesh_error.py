@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a surface is from a patch all over it, vertices or none, and what that says of the patch."""
+"""How far a surface is from a patch all over it, even without vertices, and what that says of the patch."""
 
 from collections.abc import Sequence
 
@@ -10,13 +10,13 @@ from ..contours.finger import Surface
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING
 
-# benchmarks.refusals counts the patches that are off and say nothing.
+# benchmarks.refusals counts the patches that are off and do not say so.
 PATCH_SAMPLES = 15  # So many samples of a patch are compared with the mesh.
 MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh.
 
 
 def height_error(r: Reconstruction, surface: Surface) -> float | None:
-    """The mean distance in height of patch and surface over the domain; None where there is no surface."""
+    """The mean distance in height of patch and surface over the domain, or None if there is no surface."""
     points, weights = r.domain.nodes
     some = slice(None, None, len(points) // PATCH_SAMPLES | 1)
     points, weights = points[some], weights[some]
@@ -29,9 +29,9 @@ def height_error(r: Reconstruction, surface: Surface) -> float | None:
 
 
 def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
-    """Status and message: the fit's own, unless it has no doubt and the mesh contradicts it.
+    """Status and message: those of the fit, unless it has no doubt but the mesh contradicts it.
 
-    mean : distance of the mesh from the patch, on average
+    mean : mean distance of the mesh from the patch, a length
     """
     std, percent = r.mean_height_std, 100.0 / r.radius
     if r.status != "ok" or mean <= CONTRADICTING * std:
@@ -44,9 +44,9 @@ def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
 
 
 def _height_off(surface: Surface, start: list[float], up: list[float], reach: float) -> float | None:
-    """How far along `up`, either way, the nearest layer is whose outside is up; None beyond `reach`.
+    """How far along `up`, in either direction, the nearest layer with its outside up is; None beyond `reach`.
 
-    Layers that are seen from within are another wall of the object, or its other side.
+    Layers that are seen from inside are another wall of the object, or its other side.
     """
     nearest = None
     for sign in (1.0, -1.0):

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where on a scanned mesh tracked contours belong (paper, V): tangent planes aligned, contours turned.
+"""Where on a scanned mesh tracked contours belong (paper, V): tangent planes are aligned, contours turned.
 
 The paper turns the contours in fine steps at every vertex. Here a polynomial (1) stands for the mesh around
-places that are some way apart, on which all turns cost a product of matrices; the best of them then move as
+places that are some way apart, and all turns on it are one product of matrices. The best of them then move as
 rigid bodies to where the contacts are nearest to the triangles. A place is (3, 4): the frame's axes on the
 mesh as columns, and its origin.
 """
@@ -20,32 +20,33 @@ from ..reconstruction.result import Reconstruction
 from .sampling import spaced
 from .scanned_mesh import Mesh, corners_of, mesh_distances, mesh_of
 
-# What was felt is an array (2, n, 3): contacts, and the patch's unit normals there, in the frame.
-# Lengths are in units of the patch's radius. benchmarks.registration judges these and those of the mesh.
-SPACING = 0.1  # Spacing of the points that a polynomial is fitted to.
+# `felt` is an array (2, n, 3): contacts, and the patch's unit normals there, in the frame. Lengths are in
+# units of the patch's radius. benchmarks.registration judges these numbers and those of scanned_mesh.py.
+SPACING = 0.1  # Points to which a polynomial is fitted are so far apart.
 MOST_POINTS = 400
-PLACE_SPACING = 0.2  # between the places that are tried
+PLACE_SPACING = 0.2  # Places that are tried are so far apart.
 TRIED_TURNS = 36
-POLYNOMIAL_RIDGE = 1e-3  # where a polynomial has few points
-COARSE_CONTACTS = 60  # The coarse search takes no more contacts.
-COARSE_PLACES, COARSE_STEPS = 400, 8  # places that move to the planes of the nearest triangles
-FINE, FINE_STEPS = 24, 20  # and of them to the triangles themselves
-NEAREST_TRIANGLES = 16  # triangles that are measured
-SAME_PLACE, SAME_TURN = 0.05, math.radians(2.0)  # poses that differ by less are one
-AMBIGUOUS = 1.5  # times the residual is about as good
-SIGNIFICANT_SHIFT = 3.0  # standard deviations
-LEAST_RESIDUAL = 1e-3  # less is none: the mesh's own facets
+POLYNOMIAL_RIDGE = 1e-3  # It keeps a polynomial with few points flat.
+COARSE_CONTACTS = 60  # The coarse search takes at most so many contacts.
+COARSE_PLACES, COARSE_STEPS = 400, 8  # So many places move, in so many steps, to planes of nearest triangles.
+FINE, FINE_STEPS = 24, 20  # So many of them then move to the triangles themselves.
+NEAREST_TRIANGLES = 16  # Distances to so many triangles are measured.
+SAME_PLACE, SAME_TURN = 0.05, math.radians(2.0)  # Poses that differ by less count as one.
+AMBIGUOUS = 1.5  # A residual that is larger by less than this factor is about as good.
+SIGNIFICANT_SHIFT = 3.0  # A shift by fewer standard deviations is noise.
+LEAST_RESIDUAL = 1e-3  # Residuals count as at least this, because of the mesh's own facets.
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Contacts placed on a mesh: a contact p is at rotation @ p + translation.
+    """Contacts that are placed on a mesh: a contact p is at rotation @ p + translation.
 
     rotation : (3, 3), never a mirror; translation : (3,)
-    residual : RMS distance of the contacts to the mesh
+    residual : root mean square distance of the contacts to the mesh, a length
     vertex : index of the vertex nearest to the reference point
     is_ambiguous : whether a pose that differs by more than a 20th of the radius or 2 degrees is about as
-        good, as on a sphere or a cylinder: a residual less than 1.5 times this one's, or a shift within noise
+        good, as on a sphere or a cylinder: its residual is less than 1.5 times this one, or the shift is
+        noise
     """
 
     rotation: Array
@@ -56,7 +57,7 @@ class Pose:
 
 
 def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: int = 5) -> list[Pose]:
-    """The poses that bring a touch's contacts nearest to a mesh, the best first, at most `best` of them.
+    """The poses that bring a touch's contacts nearest to a mesh (paper, V), the best first, at most `best`.
 
     vertices : (n, 3), in the contacts' unit; faces : (m, 3), indices, counterclockwise from outside
 
@@ -87,7 +88,7 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
 
 
 def _coarse(felt: Array, mesh: Mesh) -> Array:
-    """The most promising places, moved to where the contacts are nearest to the planes of triangles."""
+    """The most promising places (m, 3, 4), moved to where contacts are nearest to the planes of triangles."""
     from scipy.spatial.transform import Rotation
 
     felt = felt[:, :: math.ceil(felt.shape[1] / COARSE_CONTACTS)]
@@ -107,14 +108,14 @@ def _coarse(felt: Array, mesh: Mesh) -> Array:
 
 
 def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
-    """Places all over the mesh (m, 3, 4), and the polynomials that stand for it there, (k, m)."""
+    """Places all over the mesh, (m, 3, 4), and coefficients (k, m) of the polynomials that stand for it."""
     from scipy.spatial import cKDTree
 
     rng = np.random.default_rng(0)
     points = [i for i in spaced(mesh.centers, SPACING, rng) if i is not None]
     chosen = [points[i] for i in spaced(mesh.centers[points], PLACE_SPACING, rng) if i is not None]
     places = np.concatenate([_axes(mesh.smooth[chosen]), mesh.centers[chosen, :, None]], axis=2)
-    # The last one is what a query finds where there is nothing.
+    # A query that finds nothing gives the index of the last row.
     co, normals = (np.vstack([a[points], np.zeros(3)]) for a in (mesh.centers, mesh.smooth))
     tree, nearest, fields = cKDTree(co[:-1]), range(1, min(MOST_POINTS, len(points)) + 1), []
     for part in np.array_split(places, math.ceil(len(places) / 500)):
@@ -130,20 +131,20 @@ def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
 
 
 def _scores(felt: Array, fields: Array) -> Array:
-    """Sums of squared distances of the contacts to polynomials (k, m).
+    """The sums (m,) of squared distances of the contacts to polynomials (k, m).
 
-    What a small tilt and a shift along the normal make good does not count: so neither does, on a quadric,
-    a small shift along the surface.
+    What a small tilt and a shift along the normal can remove does not count. On a quadric, neither does what
+    a small shift along the surface can remove.
     """
     x, y, z = felt[0].T
-    weights = felt[1, :, 2:]  # a height on a slope is less of a distance
+    weights = felt[1, :, 2:]  # On a slope a height is more than the distance.
     off = weights * (z[:, None] - monomials(x, y, QUARTIC) @ fields)
     free = np.linalg.qr(weights * monomials(x, y, exponents(0, 1)))[0]
     return np.sum(off**2, axis=0) - np.sum((free.T @ off) ** 2, axis=0)
 
 
 def _axes(normals: Array) -> Array:
-    """Right-handed frames (m, 3, 3), any with these normals as third columns."""
+    """Right-handed frames (m, 3, 3) whose third columns are these normals (m, 3)."""
     first = np.cross(np.eye(3)[np.abs(normals).argmin(axis=1)], normals)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(normals, first), normals], axis=2)
@@ -177,7 +178,7 @@ def _descended(
 
 
 def _distinct(places: Array, residuals: Array) -> list[int]:
-    """Indices of places that differ, the best first."""
+    """The indices of places that differ from each other, the best first."""
     found: list[int] = []
     for i in np.argsort(residuals).tolist():
         far = np.linalg.norm(places[found, :, 3] - places[i, :, 3], axis=1) > SAME_PLACE

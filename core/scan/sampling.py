@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points at random or of an even spacing: where to touch, for touches all over a surface."""
+"""Points on a surface, at random or evenly spaced, for touches all over it."""
 
 from collections.abc import Iterator
 
@@ -9,16 +9,17 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 
-SORTED_AT_ONCE = 100_000  # points that are sorted at once (benchmarks.stability_map)
-JAMMED = 0.575  # points in a square of the spacing, once no more have room
-SAMPLING_CELL = 0.5  # Share of the spacing: only one point in each cell is asked for its neighbors.
+SORTED_AT_ONCE = 100_000  # So many points are sorted at once (benchmarks.stability_map).
+JAMMED = 0.575  # A square of the spacing has so many points when no more have room, see spaced_count.
+# Only one point in each cell, this share of the spacing wide, is asked for its neighbors.
+SAMPLING_CELL = 0.5
 
 
 def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[int | None]:
-    """Yields indices of points (n, 3) none of which are nearer to each other than `spacing`.
+    """Yields indices of points (n, 3) that are no nearer to each other than `spacing`.
 
-    They come in random order, so that a part of them is an even cover too, until no more have room. It
-    yields None now and then during longer work.
+    They come in random order, until no more have room, so that a part of them covers the surface evenly, too.
+    During longer work it yields None now and then.
     """
     from scipy.spatial import cKDTree
 
@@ -39,10 +40,11 @@ def spaced(points: Array, spacing: float, rng: np.random.Generator) -> Iterator[
 
 
 def spaced_count(area: float, spacing: float) -> int:
-    """How many points `spaced` takes, about, of a surface of that area with points everywhere.
+    """About how many points `spaced` takes of a surface of this area with points everywhere.
 
-    Disks of half the spacing, put at random where there is room, come to cover 0.547 of a plane (Feder 1980,
-    Random sequential adsorption), or 0.70 points in a square of the spacing; the grid leaves out a sixth.
+    Disks of half the spacing that are put at random where there is room cover 0.547 of a plane in the end
+    (Feder 1980, Random sequential adsorption), which is 0.70 points in a square of the spacing. The grid
+    omits a sixth.
     """
     return max(1, round(JAMMED * area / spacing**2))
 
@@ -50,7 +52,7 @@ def spaced_count(area: float, spacing: float) -> int:
 def scattered(
     points: Array, triangles: NDArray[np.intp], count: int, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """`count` random points of a mesh, evenly by area, and its unit normals there, (count, 3) each.
+    """`count` random points of a mesh, uniform by area, and its unit normals there, (count, 3) each.
 
     points : (n, 3); triangles : (m, 3), counterclockwise from outside
 
@@ -70,7 +72,7 @@ def scattered(
 
 
 def _one_a_cell(points: Array, size: float) -> NDArray[np.intp]:
-    """The first of the points (n, 3) in each cell of a grid."""
+    """The indices of the first of the points (n, 3) in each cell of a grid."""
     cells = np.floor(points / size)
     cells -= cells.min(axis=0)
     across = cells.max(axis=0) + 1.0

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A scanned mesh as triangles of like size, and how far contacts are from it.
+"""A scanned mesh as triangles of similar size, and how far contacts are from it.
 
-Lengths are in units of the patch's radius; places and what was felt are those of pose_search.py.
+Lengths are in units of the patch's radius; places and `felt` are those of pose_search.py.
 """
 
 from typing import Any, NamedTuple
@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..arguments import Array, finite_array
 
 LARGEST_MESH = 40.0
-LONGEST_EDGE = 0.25  # longer ones are halved: a patch covers a hundred triangles
-FACING_WEIGHT = 0.05  # what a right angle between normals counts, about, as a distance to a triangle
+LONGEST_EDGE = 0.25  # Longer edges are halved, so that a patch covers a hundred triangles.
+FACING_WEIGHT = 0.05  # A right angle between normals counts about as much as this distance to a triangle.
 TOUCHING = 1e-9
 
 
 class Mesh(NamedTuple):
-    """Triangles (m, 3, 3) of like size, unit normals, centers and smooth normals there (m, 3), a tree."""
+    """Triangles (m, 3, 3) of similar size; their normals, centers and smooth normals (m, 3); a KD-tree."""
 
     triangles: Array
     normals: Array
@@ -29,7 +29,7 @@ class Mesh(NamedTuple):
 
 
 def corners_of(faces: ArrayLike, count: int) -> NDArray[np.intp]:
-    """The faces as indices of vertices (m, 3), of which there are `count`. Raises ValueError for others."""
+    """The faces as indices (m, 3) of `count` vertices. Raises ValueError for anything else."""
     indices = finite_array("faces", faces if np.size(faces) else np.zeros((0, 3)), (None, 3))
     if not len(indices):
         raise ValueError("faces: expected triangles, got none: make a mesh of a cloud of points first")
@@ -39,7 +39,7 @@ def corners_of(faces: ArrayLike, count: int) -> NDArray[np.intp]:
 
 
 def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> Mesh:
-    """The mesh as it is searched. Raises ValueError where its size cannot be that of what was touched."""
+    """The mesh as it is searched. Raises ValueError if its size does not suit the patch."""
     from scipy.spatial import cKDTree
 
     size = np.linalg.norm(np.ptp(co[corners], axis=(0, 1)))
@@ -63,13 +63,13 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> Mesh:
 
 
 def _across(triangles: Array) -> Array:
-    """Normals (..., 3) of triangles (..., 3, 3), twice the area long."""
+    """The normals (..., 3) of triangles (..., 3, 3), whose lengths are twice the areas."""
     a, b, c = np.moveaxis(triangles, -2, 0)
     return np.cross(b - a, c - a)
 
 
 def _halved(pieces: Array) -> Array:
-    """Triangles (m, 3, 6) with normals, cut at their longest edges until none is longer than LONGEST_EDGE."""
+    """Triangles with normals, (m, 3, 6), that are halved until no edge is longer than LONGEST_EDGE."""
     done = []
     while len(pieces):
         edges = np.linalg.norm((np.roll(pieces, -1, axis=1) - pieces)[..., :3], axis=2)
@@ -83,9 +83,10 @@ def _halved(pieces: Array) -> Array:
 
 
 def mesh_distances(places: Array, felt: Array, mesh: Mesh, neighbors: int) -> tuple[Array, Array]:
-    """Distances of the contacts to the mesh, (m, n, 1), and their derivatives (m, n, 6) by the motion.
+    """Distances (m, n, 1) of the contacts to the mesh, and their derivatives (m, n, 6) by the motion.
 
-    To the plane of the nearest triangle, or of some that are near to the nearest point.
+    With one neighbor it is the distance to the plane of the nearest triangle; with more, to the nearest point
+    of several triangles.
     """
     turned = places[..., :3].swapaxes(1, 2)
     arms, normals = felt[0] @ turned, (felt[1] @ turned).reshape(-1, 3)
@@ -94,13 +95,13 @@ def mesh_distances(places: Array, felt: Array, mesh: Mesh, neighbors: int) -> tu
     nearest = near[:, 0]
     up, offsets = mesh.normals[nearest], points - mesh.centers[nearest]
     if neighbors > 1:
-        near %= len(mesh.centers)  # where there are fewer
+        near %= len(mesh.centers)  # There may be fewer.
         away = points[:, None] - _feet(points[:, None], mesh.triangles[near])
-        # Triangles that face the other way are of the other side of a thin wall, however near.
+        # Triangles that face the other way belong to the other side of a thin wall, however near they are.
         back = np.einsum("nki,ni->nk", mesh.smooth[near], normals) < 0.0
         row, least = np.arange(len(points)), (np.linalg.norm(away, axis=2) + back).argmin(axis=1)
         offsets = away[row, least]
-        # On the surface there is no direction to it but the normal.
+        # On the surface itself, only the normal gives a direction to it.
         up = offsets + TOUCHING * mesh.normals[near[row, least]]
         up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
     distances, up = np.sum(offsets * up, axis=1).reshape(*arms.shape[:2], 1), up.reshape(arms.shape)
@@ -108,7 +109,7 @@ def mesh_distances(places: Array, felt: Array, mesh: Mesh, neighbors: int) -> tu
 
 
 def _feet(points: Array, triangles: Array) -> Array:
-    """The point of each triangle (..., 3, 3) nearest to a point (..., 3)."""
+    """The point (..., 3) of each triangle (..., 3, 3) that is nearest to a point (..., 3)."""
     across, corners = _across(triangles), np.moveaxis(triangles, -2, 0)
     edges, arms = np.roll(corners, -1, axis=0) - corners, points - corners
     height = np.sum(arms[0] * across, axis=-1, keepdims=True)

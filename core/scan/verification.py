@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a patch is from its contacts and from a mesh (paper, section V)."""
+"""How far a patch is from its contacts and from a mesh (paper, V)."""
 
 import heapq
 import math
@@ -17,18 +17,18 @@ from ..patch.domain import GRID, Domain
 from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 
-EXTRA = 9  # contours, as in the paper's Fig. 3
+EXTRA = 9  # So many more contours are tracked, as in the paper's Fig. 3.
 # benchmarks.scans prints what is found with these.
-STEPS_A_RADIUS = 12  # Steps of such a contour in a radius.
-FOOT_REACH = (0.01, 0.1, 1.0)  # Shares of the radius within which the mesh is looked for at the point.
-MISSES_AT_ONCE = 5000  # vertices whose distances are found in one step, in some hundredths of a second
-OWN_LAYER = 1e-3  # Share of a reach: a layer that is nearer is the vertex's own.
+STEPS_A_RADIUS = 12  # Such a contour has so many steps in a radius.
+FOOT_REACH = (0.01, 0.1, 1.0)  # At the point, the mesh is looked for within these shares of the radius.
+MISSES_AT_ONCE = 5000  # A step finds the distances of so many vertices, in some hundredths of a second.
+OWN_LAYER = 1e-3  # A layer within this share of the reach is the vertex's own.
 
 
 def reachable(
     geometry: Geometry, surface: Surface, vertices: ArrayLike, normals: ArrayLike
 ) -> NDArray[np.intp]:
-    """Indices of the overlapped world vertices (n, 3) of `surface` that nothing hides from above."""
+    """The indices (m,) of the overlapped world vertices (n, 3) that nothing of `surface` hides from above."""
     points = np.asarray(vertices, dtype=float)
     over = overlapped(geometry, points, normals)
     up = _vector(geometry.frame.axes[:, 2])
@@ -39,19 +39,19 @@ def reachable(
 def verify(
     r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
 ) -> dict[str, float]:
-    """Measures of how good a patch is, as plain numbers, with lengths in the caller's unit.
+    """Measures of how good a patch is (paper, V), as plain numbers, with lengths in the caller's unit.
 
     vertices : (n, 3), the `reachable` vertices of the mesh, in the world
     extra : number of contours to track on the surface between those that were fitted
 
-    contacts, contact_distance_mean, .._median, .._max, .._rms : Euclidean distances to the patch
-    vertices, vertex_distance_mean, ... : the same, where there are vertices
+    contacts, contact_distance_mean, .._median, .._max, .._rms : their number and Euclidean distances
+    vertices, vertex_distance_mean, ... : the same for vertices, if there are any
     fit_error : (6) over the contacts
-    extra_contours, extra_points, extra_fit_error : how many there are, without noise, and (6) over them;
-        the last only if there are points
+    extra_contours, extra_points, extra_fit_error : the numbers of contours and their contacts, without noise,
+        and (6) over these, if there are any
     total_absolute_curvature : (8)
-    overlap : the share of the patch's area that has surface below it that a finger could reach, to
-      about 0.01; the paper has no number for it
+    overlap : the share of the patch's area with surface below it that a finger could reach, to about 0.01;
+        the paper has no number for it
 
     Raises ValueError for bad numbers.
     """
@@ -62,7 +62,7 @@ def verify(
 def verifying(
     r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
 ) -> Iterator[dict[str, float]]:
-    """`verify` in short steps: each yields what is known so far, and the last all of it."""
+    """`verify` in short steps: each yields what is known so far, and the last one everything."""
     local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
     found: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
     found |= _spread("contact", distances(r.geometry, r.contacts))
@@ -88,7 +88,7 @@ def verifying(
 
 
 def _spread(name: str, misses: Array) -> dict[str, float]:
-    """Mean, median, maximum and root mean square; nothing of nothing."""
+    """Mean, median, maximum and root mean square of distances by name; empty if there are none."""
     if not len(misses):
         return {}
     rms = math.sqrt(np.mean(misses**2))
@@ -97,13 +97,13 @@ def _spread(name: str, misses: Array) -> dict[str, float]:
 
 
 def _extra_contours(r: Reconstruction, surface: Surface, count: int) -> list[Array]:
-    """Contacts (n, 3) over the domain, in the frame and without the first, of contours between the others."""
+    """Local contacts (n, 3) over the domain, without the point, of contours between the fitted ones."""
     start = _start(r, surface)
     if start is None:
         return []
     planes = [SamplingPlane(azimuth) for azimuth in _azimuths_between(r.domain, count)]
     normal, tangent = r.frame.axes[:, 2], r.frame.axes[:, 0]
-    extent, step = 2.0 * r.radius, r.radius / STEPS_A_RADIUS  # Steep patches are followed to the rim too.
+    extent, step = 2.0 * r.radius, r.radius / STEPS_A_RADIUS  # Steep patches are followed to the rim, too.
     contours = []
     for contour in track(surface, start, normal, planes, extent=extent, step=step, tangent=tangent):
         local = r.frame.to_local(contour.points[(contour.points != start).any(axis=1)])
@@ -112,7 +112,7 @@ def _extra_contours(r: Reconstruction, surface: Surface, count: int) -> list[Arr
 
 
 def _azimuths_between(domain: Domain, count: int) -> list[float]:
-    """`count` directions between those of the curves that end on the boundary, each where most room is."""
+    """`count` azimuths between those of the curves' ends on the boundary, each where there is most room."""
     x, y = domain.ends.T
     lines = np.sort(np.arctan2(y, x) % math.pi)
     widths = np.diff(lines, append=lines[0] + math.pi)
@@ -128,13 +128,13 @@ def _azimuths_between(domain: Domain, count: int) -> list[float]:
 
 
 def _start(r: Reconstruction, surface: Surface) -> Vector | None:
-    """The place of the surface nearest to the reference point along the normal; None where there is none."""
+    """The place of the surface nearest to the reference point along the normal, or None."""
     hits = (_below(r, surface, (0.0, 0.0, reach * r.radius), 2.0 * reach * r.radius) for reach in FOOT_REACH)
     return next((hit for hit in hits if hit is not None), None)
 
 
 def _overlap(r: Reconstruction, surface: Surface) -> float:
-    """See `verify`: rays from above onto a grid over the domain."""
+    """The overlap of `verify`, by rays from above onto a grid over the domain."""
     points, _ = r.domain.grid(GRID)
     d = r.geometry.derivatives(*points.T)
     area = np.sqrt(1.0 + d.x**2 + d.y**2)
@@ -143,7 +143,7 @@ def _overlap(r: Reconstruction, surface: Surface) -> float:
 
 
 def _below(r: Reconstruction, surface: Surface, local: Vector, distance: float) -> Vector | None:
-    """Where a ray from a local point down along the normal meets what a finger can reach, in the world."""
+    """The world point where a ray from a local point down along the normal meets what a finger can reach."""
     up = _vector(r.frame.axes[:, 2])
     hit = surface.ray_cast(_vector(r.frame.to_world(local)), (-up[0], -up[1], -up[2]), distance)
     if hit is None or np.dot(hit[1], up) <= 0.0:

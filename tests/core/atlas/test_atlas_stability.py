@@ -103,7 +103,7 @@ def test_of_two_shells_the_outer_one_is_felt_and_closed():
 
 def test_both_sides_of_a_wall_stay_apart():
     solid = solids.block(1.0, 0.8, 0.05)
-    atlas = explored(solid, tolerance=4e-3, most=60)
+    atlas = explored(solid, tolerance=4e-3, most=40)
     x, y = np.random.default_rng(0).uniform(-0.6, 0.6, (2, 200))
     for z, side in ((0.05, 0.0), (-0.05, 0.0), (0.0, -0.05), (0.08, 0.03), (-0.08, 0.03)):
         distance, _ = atlas.distance(np.column_stack([x, y, np.full(200, z)]))

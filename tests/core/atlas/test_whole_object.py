@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import core
-from core.atlas import meshing
+from core.atlas import join, meshing
 from core.atlas.boundaries import gaussian_curvature_of
 from core.atlas.charts import Charts
-from core.atlas.field import blended
+from core.atlas.field import LAYER, Blend, Felt, blended
 from tests import solids
 
-pytestmark = pytest.mark.xdist_group("whole object")
 RING = solids.ring(small=0.5)
 
 
@@ -91,7 +91,7 @@ def test_deviations_of_bends_are_true_where_patches_meet(ball, ring):
         out = np.hypot(curves[:, 0], curves[:, 1]) - 1.0
         cosine = out / np.hypot(out, curves[:, 2])
         true = np.ones(len(curves)) if atlas is ball else cosine / (0.5 * (1.0 + 0.5 * cosine))
-        assert np.mean(np.abs(bends - true) <= 1.645 * stds) > 0.75
+        assert 0.83 < np.mean(np.abs(bends - true) <= 1.645 * stds) < 0.98
         assert np.mean(np.abs(bends[0] - bends[1]) <= 1.645 * np.hypot(*stds)) > 0.75
 
 
@@ -140,6 +140,54 @@ def test_contacts_mend_holes_at_sharp_edges(block, monkeypatch):
     assert off.mean() < 0.5 * before.mean()
 
 
+def test_edges_that_were_felt_on_both_sides_are_closed(block):
+    """Patches end short of them, and the vertices there are beyond all rims."""
+    assert solids.topology(block.mesh(0.1).triangles).open == 0
+
+
+def felt_plane(charts):
+    """Contacts on a square of z = 0 around the middle of a ball, where no patch reaches."""
+    xy = np.stack(np.meshgrid(*[np.linspace(-0.05, 0.05, 11)] * 2), axis=-1).reshape(-1, 2)
+    points = np.column_stack([xy, np.zeros(len(xy))])
+    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    return Felt(points, up, np.zeros(len(points), dtype=np.intp), cKDTree(points))
+
+
+@pytest.mark.parametrize("std", [np.inf, 1e-3])
+def test_beyond_all_rims_the_nearest_contacts_tell_the_side(ball, std, monkeypatch):
+    """A patch that goes on as it is beyond its rim does not know that the surface turned."""
+    places = np.array([[0.0, 0.0, 0.06], [0.0, 0.0, -0.06], [0.2, 0.0, 0.06]])  # the last: far to the side
+    wrong = Blend(np.array([-0.5, 0.5, -0.5]), np.full(3, std), -np.eye(3), np.full(3, 1))
+    monkeypatch.setattr(join, "blended", lambda *_: Blend(*(values.copy() for values in wrong)))
+    found = join.told(ball.charts, felt_plane(ball.charts), places, room=0.5)
+    if np.isfinite(std):
+        assert found.distance == pytest.approx(wrong.distance)
+    else:
+        assert found.distance == pytest.approx([0.06, -0.06, -0.5])
+        assert found.normal[:2] == pytest.approx(np.array([[0.0, 0.0, 1.0]] * 2))
+        assert found.node.tolist() == [0, 0, 1]
+
+
+def test_where_no_patch_is_the_deviation_is_inf_unless_a_contact_is_near(ball):
+    reach = LAYER * ball.charts.radii[0]
+    places = np.array([[0.0, 0.0, 0.9 * reach], [0.0, 0.0, 1.1 * reach]])
+    found = join.told(ball.charts, felt_plane(ball.charts), places)
+    assert found.distance == pytest.approx(places[:, 2])
+    assert np.isfinite(found.std).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_contacts_alone_keep_creases_and_valleys_sharp(ball, way):
+    """Of a roof the inside is below both slopes, of a valley below either."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-1.0, 1.0, 20), np.linspace(-1.0, 1.0, 21)))
+    points = np.column_stack([x, y, -way * np.abs(x)])
+    normals = np.column_stack([way * np.sign(x), 0.0 * x, np.ones(len(x))]) / np.sqrt(2.0)
+    felt = Felt(points, normals, np.zeros(len(points), dtype=np.intp), cKDTree(points))
+    heights = np.array([0.3, -0.3])
+    distance, _ = felt.told_alone(np.column_stack([np.full(2, 1e-3), np.zeros(2), heights]))
+    assert distance == pytest.approx((heights + way * 1e-3) / np.sqrt(2.0))
+
+
 def test_progress_can_end_it_with_what_is_there():
     told = []
 
@@ -186,9 +234,9 @@ def test_far_away_the_nearest_place_counts(ball):
     assert np.isfinite(std).all()
 
 
-def test_steps_tell_what_was_found():
+def test_steps_tell_what_was_found_and_the_same_seed_makes_the_same_touches(ball):
     solid = solids.ball()
-    steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=4e-3, rng=0)
+    steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=4e-3, noise=1e-3, rng=0)
     found, joining = [], []
     try:
         while True:
@@ -200,14 +248,8 @@ def test_steps_tell_what_was_found():
     assert len(found) == len(atlas.patches) <= progress.done
     assert joining[0] is None
     assert joining[-1] == 1.0
-
-
-def test_the_same_seed_makes_the_same_touches(ball):
-    again = explored(solids.ball(), noise=1e-3)
-    assert all(
-        np.array_equal(a.frame.origin, b.frame.origin)
-        for a, b in zip(again.patches, ball.patches, strict=True)
-    )
+    for again, first in zip(atlas.patches, ball.patches, strict=True):
+        assert np.array_equal(again.frame.origin, first.frame.origin)
 
 
 @pytest.mark.parametrize(

@@ -114,6 +114,34 @@ def test_curves_in_next_to_no_doubt_grow_fast(monkeypatch):
     assert len(results) == 3  # of 24, 54 and 96 contacts
 
 
+def test_between_a_length_in_no_doubt_and_one_in_doubt_one_stretch_more_is_tried():
+    def high(x, y):
+        return 0.3 * np.exp(-(((np.hypot(x, y) - 7.0) / 0.3) ** 2))
+
+    def gradient(x, y):
+        r = max(np.hypot(x, y), 1e-9)
+        return np.array([x, y]) / r * -2.0 * (r - 7.0) / 0.3**2 * high(x, y)
+
+    assert 5.0 < explore(bowl_with(high, gradient)).extent < 7.0  # a wall all round
+
+
+class Strip:
+    """The plane z = 0 between two lines along x."""
+
+    def ray_cast(self, origin, direction, distance):
+        gone = -origin[2] / direction[2] if direction[2] else -1.0
+        x, y = (o + gone * d for o, d in zip(origin[:2], direction[:2], strict=True))
+        return ((x, y, 0.0), UP) if 0.0 <= gone <= distance and abs(y) <= 3.0 else None
+
+
+def test_a_touch_is_as_long_as_it_is_sure():
+    """Curves along a strip tell too little of it across, once they are that much longer."""
+    found = explore(Strip())
+    assert found.result.status == "ok"
+    assert explore(Strip(), extent=found.extent).result.status == "ok"
+    assert explore(Strip(), extent=1.2 * found.extent).result.status == "uncertain"
+
+
 def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
     tried = growth.tried
 

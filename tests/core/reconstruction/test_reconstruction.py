@@ -26,6 +26,8 @@ from core import (
     reconstruct_many,
     track,
 )
+from core.contours.curves import curves_through, stacked
+from core.contours.local_geometry import surface_normals
 
 
 @pytest.mark.parametrize("planes", [UPRIGHT, TILTED], ids=["upright", "tilted"])
@@ -323,6 +325,20 @@ def test_curves_to_one_side_of_the_point_that_end_together_bound_no_patch():
     curves = [Contour(np.column_stack([s, bend * s * (1.0 - s), 0.0 * s])) for bend in (-0.1, 0.0, 0.1)]
     with pytest.raises(DegenerateCurvesError, match="fewer than three separate places"):
         reconstruct((0, 0, 0), curves, outward=(0, 0, 1))
+
+
+def test_an_outward_direction_that_the_surface_turns_away_from_is_refused():
+    surface = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    curves, p = surface.track(UPRIGHT), surface.point
+    tangents = curves_through(*stacked(p[None], [curves])).tangents[0]
+    begins, ends = surface_normals(tangents, surface.normal), surface.fit(curves).frame.axes[:, 2]
+    assert 1e-6 < np.linalg.norm(begins - ends) < 1e-2
+    # On the side of the one normal, and not on that of the other.
+    for outward in (begins - ends, ends - begins):
+        with pytest.raises(DegenerateCurvesError, match="faces away from the outward direction"):
+            reconstruct(p, curves, outward=outward)
+    r = reconstruct(p, curves, outward=begins - ends + 0.01 * begins)
+    np.testing.assert_allclose(r.frame.axes[:, 2], ends)
 
 
 def test_no_numbers_but_finite_ones_come_out_of_random_curves():

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Touches near one that chose its extent, in little more time than one whose extent is given.
+
+While a handle is dragged, each touch is near the one before. Its half curves are as long as those were. They
+become shorter at once if the fit is in doubt, and longer in the next touch if the doubt is small.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import LARGEST, Array, finite_array, number, unit_vector
+from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane
+from ..contours.finger import Surface
+from ..contours.local_geometry import DegenerateCurvesError
+from ..contours.tracking import following
+from ..reconstruction.from_contours import fitted, options_of
+from ..reconstruction.result import Reconstruction
+from ..reconstruction.stacks import Options
+from ..reconstruction.start import Given
+from ..reconstruction.strokes import gathered
+from .enough import CONTACT_COUNTS, spacing
+from .growth import FELT, GROWN_STD, SEEDS, STRETCH, Felt, Grown
+from .one_touch import Exploration
+from .side_by_side import given
+
+# benchmarks.nearby judges these.
+LONGER = 1.08  # A half curve becomes longer by this factor at once, and shorter by at least it.
+NO_LONGER = 0.6  # A half curve that is in more doubt does not become longer; growth would end at 1.
+MOST_FITS = 4  # A touch takes at most so many fits; if it is still in doubt, the next one goes on.
+
+
+class Nearby(NamedTuple):
+    """A touch near another, and how long the half curves of the next one should be, (p, 2)."""
+
+    found: Exploration
+    reaches: Array
+
+
+def explore_nearby(
+    surface: Surface,
+    point: ArrayLike,
+    outward: ArrayLike,
+    planes: Sequence[SamplingPlane],
+    reaches: ArrayLike,
+    *,
+    farthest: float,
+    step: float | str = "auto",
+    noise: float = 0.0,
+    rng: np.random.Generator | int | None = None,
+    tangent: ArrayLike | None = None,
+    method: str = "bayes",
+    degree: int | str = "auto",
+    weight: float | None = None,
+    solver: str = "fast",
+) -> Nearby:
+    """Touches near a touch that chose its extent, as far as that or less far, with one fit as a rule.
+
+    reaches : (p, 2), lengths of the half curves, from `reaches_of` or the Nearby before
+    farthest : greatest length of a half curve
+    step : as in `track`; "auto" takes few contacts, and adds none even if they would tell more
+
+    All else is as in `explore`, which also knows what is beyond, and taps between the curves. So the patches
+    of the two differ. Raises what `track` and `reconstruct` raise.
+    """
+    p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
+    options, far = options_of(method, degree, None, weight, solver), number("farthest", farthest, above=0.0)
+    least = SEEDS[-1] * far / FELT
+    lengths = np.clip(finite_array("reaches", reaches, (len(planes), 2)), least, far)
+    # With noise, few contacts would not be enough for curves of this length.
+    between = given("step", step) or spacing(lengths, CONTACT_COUNTS[1 if noise else 0])
+    longest = max(float(lengths.max()), between)
+    follow = following(surface, p, up, planes, step=between, noise=noise, rng=rng, tangent=tangent)
+    felt = Felt(follow(longest), p, between, None, partial=longest < far)
+
+    def fit(contours: list[Contour], by: Options) -> Reconstruction:
+        (r,) = fitted(p[None], [Given(contours, *gathered(()))], up[None], by)
+        if isinstance(r, DegenerateCurvesError):
+            raise r
+        return r
+
+    def tried(lengths: Array) -> Grown:
+        counts = np.minimum(np.rint(lengths / between).astype(np.intp), felt.whole)
+        r = fit(felt.shortened(counts), options._replace(method="bayes"))
+        spread = r.mean_height_std / (GROWN_STD * r.radius)
+        return Grown(felt, counts, 1, felt.misfits(counts, r), spread, r)
+
+    first = grown = tried(lengths)
+    for _ in range(MOST_FITS - 1 if first.doubt > 1.0 else 1):
+        shorter = between * _shorter(grown)
+        if grown.sure or shorter.max() < least:
+            break
+        try:
+            grown = tried(shorter)
+        except DegenerateCurvesError:
+            break
+    if not grown.sure and first.doubt <= 1.0:  # it is not for their length
+        grown = first
+    contours, r = felt.shortened(grown.counts), grown.result
+    if method != "bayes":
+        r = fit(contours, options)
+    found = Exploration(contours, r, grown.length, between, tuple(planes), (r.mean_height_std,))
+    return Nearby(found, _next(grown, contours))
+
+
+def reaches_of(found: Exploration) -> Array:
+    """How long the half curves of a touch near this one should be, (p, 2); see `explore_nearby`."""
+    felt = Felt(found.contours, found.result.frame.origin, found.step, None)
+    return _freed(found.step * felt.whole.astype(np.float64), found.contours)
+
+
+def _shorter(grown: Grown) -> Array:
+    """Numbers of contacts (c, 2) with fewer of the half curve that is explained worst, or of all."""
+    counts = grown.counts.astype(np.float64)
+    factor = min(max(grown.doubt, LONGER), STRETCH) if grown.doubt > 1.0 else STRETCH
+    if grown.misfits.max() <= 1.0:
+        return counts / factor
+    counts.flat[np.argmax(grown.misfits)] /= factor
+    return counts
+
+
+def _next(grown: Grown, contours: list[Contour]) -> Array:
+    """The lengths (c, 2) that the next touch should reach: a little more or less than this one, or as far."""
+    doubt = np.maximum(grown.misfits, grown.spread)
+    factors = np.where(doubt > 1.0, 1.0 / LONGER, np.where(doubt <= NO_LONGER, LONGER, 1.0))
+    if not grown.sure:
+        factors = np.minimum(factors, 1.0)
+    return _freed(factors * grown.felt.step * grown.counts, contours)
+
+
+def _freed(lengths: Array, contours: list[Contour]) -> Array:
+    """The lengths (c, 2), with the longest of them for half curves that the surface has ended."""
+    ended = [[stop not in (EXTENT, UNEXPLAINED) for stop in contour.stops or ()] for contour in contours]
+    return np.where(ended, lengths.max(), lengths)

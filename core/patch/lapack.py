@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Positive definite systems of a hundred unknowns by scipy's LAPACK, which is faster than numpy for one.
+
+The numpy and scipy of PyPI each have their own OpenBLAS with its own threads. If they are called by turns,
+these wait for each other's processors, and a touch takes twice as long, or ten times on a busy machine
+(benchmarks.threads). So everything here runs on one thread.
+"""
+
+from collections.abc import Callable
+from functools import cache, wraps
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from ..arguments import Array
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def on_one_thread(run: Callable[P, R]) -> Callable[P, R]:
+    """Decorates a function: while it runs, scipy's OpenBLAS has one thread."""
+
+    @wraps(run)
+    def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+        threads = _threads()
+        if threads is None:
+            return run(*args, **kwargs)
+        get, set_to = threads
+        before = get()
+        set_to(1)
+        try:
+            return run(*args, **kwargs)
+        finally:
+            set_to(before)
+
+    return limited
+
+
+@cache
+def _threads() -> tuple[Any, Any] | None:
+    """The functions that get and set the threads of scipy's own OpenBLAS, or None if it has none."""
+    import ctypes
+    from pathlib import Path
+
+    import scipy.linalg.lapack  # This loads the library, if there is one.
+
+    home = Path(scipy.__file__).parent
+    for path in (*home.parent.glob("scipy.libs/*openblas*"), *home.glob(".dylibs/*openblas*")):
+        library = ctypes.CDLL(str(path))
+        return library.scipy_openblas_get_num_threads, library.scipy_openblas_set_num_threads
+    return None
+
+
+@on_one_thread
+def cholesky(matrix: Array) -> Array:
+    """The lower triangular factor of a matrix (m, m), which is used up."""
+    from scipy.linalg.lapack import dpotrf
+
+    factor, failed = dpotrf(matrix.T, lower=0, clean=1, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    lower: Array = factor.T
+    return lower
+
+
+@on_one_thread
+def cholesky_in_place(matrix: Array) -> Array:
+    """The diagonal (m,) of a triangular factor, which overwrites the upper triangle of the matrix (m, m)."""
+    from scipy.linalg.lapack import dpotrf
+
+    dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    return matrix.reshape(-1)[:: len(matrix) + 1]
+
+
+@on_one_thread
+def solved_definite(matrix: Array, right: Array) -> Array:
+    """matrix^-1 @ right (m,), for a positive definite matrix (m, m), whose lower triangle is used up."""
+    from scipy.linalg.lapack import dposv
+
+    _, found, failed = dposv(matrix.T, right, lower=0, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    solution: Array = found
+    return solution
+
+
+@on_one_thread
+def inverse_definite(matrix: Array) -> Array:
+    """The inverse of a positive definite matrix (m, m), whose lower triangle is used up."""
+    from scipy.linalg.lapack import dpotri
+
+    upper: Array = dpotri(cholesky(matrix).T, lower=0, overwrite_c=1)[0]
+    upper += upper.T
+    upper.flat[:: len(upper) + 1] *= 0.5
+    return upper
+
+
+@on_one_thread
+def solved(factor: Array, right: Array, transposed: bool = False) -> Array:
+    """factor^-1 @ right, or factor'^-1 @ right, for a lower triangular matrix (m, m)."""
+    from scipy.linalg.lapack import dtrtrs
+
+    found: Array = dtrtrs(factor.T, right, lower=0, trans=0 if transposed else 1)[0]
+    return found

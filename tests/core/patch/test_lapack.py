@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Systems solved by LAPACK against numpy's, and the one thread that they run on."""
+
+import numpy as np
+import pytest
+
+from core.patch import lapack
+
+MATRIX = np.cov(np.random.default_rng(1).normal(size=(12, 40)))
+RIGHT = np.arange(12.0)
+
+
+def test_agrees_with_numpy():
+    lower = np.linalg.cholesky(MATRIX)
+    np.testing.assert_allclose(lapack.cholesky(MATRIX.copy()), lower, atol=1e-14)
+    np.testing.assert_allclose(lapack.cholesky_in_place(MATRIX.copy()), lower.diagonal(), atol=1e-14)
+    np.testing.assert_allclose(lapack.solved(lower, RIGHT), np.linalg.solve(lower, RIGHT))
+    np.testing.assert_allclose(lapack.solved(lower, RIGHT, transposed=True), np.linalg.solve(lower.T, RIGHT))
+    np.testing.assert_allclose(lapack.solved_definite(MATRIX.copy(), RIGHT), np.linalg.solve(MATRIX, RIGHT))
+    np.testing.assert_allclose(lapack.inverse_definite(MATRIX.copy()), np.linalg.inv(MATRIX))
+
+
+@pytest.mark.parametrize("run", [lapack.cholesky, lapack.inverse_definite])
+def test_refuses_what_is_not_positive_definite(run):
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        run(-np.eye(3))
+
+
+def test_one_thread_during_a_call_and_as_many_as_before_afterwards():
+    # pip's scipy, which releases ship, has an OpenBLAS of its own; were it renamed, nothing else would tell.
+    get, set_to = lapack._threads()
+    before = get()
+    set_to(2)
+    try:
+        assert lapack.on_one_thread(get)() == 1
+        assert get() == 2
+        with pytest.raises(np.linalg.LinAlgError):
+            lapack.cholesky(-np.eye(3))
+        assert get() == 2
+    finally:
+        set_to(before)
