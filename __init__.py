@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tactile Patch: Blender's entry. The add-on is imported on enabling, so that `core` can do without it."""
+"""Tactile Patch, as Blender finds it. The add-on is imported when enabled, so `core` works without it."""
 
 
 def register():
@@ -18,7 +18,7 @@ def unregister():
 def reconstruction_of(obj):
     """The core.Reconstruction of a patch, or of its probe or contours, in the world, where the patch is now.
 
-    Raises ValueError, with a sentence, where there is none.
+    Raises ValueError, with a sentence, if there is none.
     """
     from .tactile_addon.probes import probe
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What knows Blender: surfaces to touch, probes, operators, panel, handles, patches and command line."""
+"""All that uses Blender: surfaces to touch, probes, operators, panels, handles, patches, the command line."""
 
 from pathlib import Path
 
@@ -42,7 +42,7 @@ MENUS = (
     *report_operator.MENUS,
 )
 _commands, _drawings = [], []
-TOP = str(Path(__file__).resolve().parents[1])  # where presets/ is
+TOP = str(Path(__file__).resolve().parents[1])  # It holds presets/.
 
 
 def register():

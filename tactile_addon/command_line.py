@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -c tactile reconstruct|fit|object|join|map|table FILE`: patches and more from the shell."""
+"""The words of `blender -c tactile reconstruct|fit|object|join|map|table FILE`."""
 
 import argparse
 import sys
@@ -27,7 +27,7 @@ VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
 
 def main(args):
-    """Blender's entry of the command; `args` is what follows its name. Returns the exit code."""
+    """Blender calls this for the command with the words that follow its name; returns the exit code."""
     sys.stdout.reconfigure(line_buffering=True)
     parser = _parser()
     options = parser.parse_args([f" {a}" if _is_number(a) else a for a in args])
@@ -95,7 +95,7 @@ def _add_fit(command):
 
 
 def _add_contacts(add, help):
-    """What was measured, and on which side."""
+    """Adds the options of measured contacts."""
     add("files", nargs="+", type=Path, metavar="FILE", help=help)
     add("--unit", choices=list(contact_file.UNIT_METERS), help="unit of the numbers (the file's)")
     add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
@@ -138,7 +138,7 @@ def _add_verify(add):
 
 
 def _add_inputs(add):
-    """What to touch, and how."""
+    """Adds the options of what to touch, and how."""
     _add_target(add)
     degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
     add("--azimuths", **degrees, help="three to six plane directions (0 60 120)")
@@ -163,7 +163,7 @@ def _add_sensor(add):
 
 
 def _add_method(add):
-    """How to fit, and what to write."""
+    """Adds the options of how to fit, and what to write."""
     add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (bayes)")
     help = "degree of the polynomial (auto: the lowest that describes what the contacts show)"
     add("--degree", type=str.strip, choices=["auto", *"23456"], help=help)
@@ -182,7 +182,7 @@ def _add_output(add, help):
 
 
 def _is_number(text):
-    """argparse takes -1e-3 for an option; a leading space tells it otherwise."""
+    """Whether a word is a number: argparse would take -1e-3 for an option, unless a space precedes it."""
     try:
         float(text)
     except ValueError:
@@ -191,8 +191,8 @@ def _is_number(text):
 
 
 def _sentence(error):
-    """An operator's error without the words Blender puts around it."""
+    """The message of an operator's error, without the words that Blender adds."""
     words = str(error).strip()
-    if isinstance(error, RuntimeError):  # there may be more than one report
+    if isinstance(error, RuntimeError):  # There may be several reports.
         words = words.partition("\n")[0].removeprefix("Error: ")
     return " ".join(words.split())

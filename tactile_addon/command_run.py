@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the command does: opens files, runs the operator, saves, and writes the report."""
+"""What the command does: it opens files, runs the operator, saves, and writes the report."""
 
 import csv
 import io
@@ -29,9 +29,9 @@ class Misuse(ValueError):
 
 
 class Command(NamedTuple):
-    """The operator behind a command, where what it makes keeps its report, and what puts that in words.
+    """The operator of a command, the property in which the result keeps its report, and what words that.
 
-    more : arguments of the operator that are no options
+    more : arguments of the operator that are not options
     """
 
     operator: str
@@ -50,14 +50,14 @@ COMMANDS = {
     ),
     "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
 }
-# What the operators take as it is given.
+# The operators take these options unchanged.
 PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
 PLAIN |= {"edge", "most", "tolerance", "unit", "point", "flip", "radius"}
-# Operators would take the nearest number they can have for others.
+# Operators would replace negative numbers by 0.
 NEVER_NEGATIVE = ("radius", "noise", "normal_std", "seed")
 
 
-# What --output may be.
+# The endings that --output may have.
 PATCH_FILES = (".blend", ".ply", ".json")
 MESH_FILES = (".blend", ".ply")
 KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
@@ -65,7 +65,7 @@ KINDS |= dict.fromkeys(("object", "join", "map"), MESH_FILES)
 
 
 def _require_numbers(options):
-    """Ends the command where a number is one that no operator can have."""
+    """Raises Misuse for numbers that operators cannot have."""
     for name in NEVER_NEGATIVE:
         value = vars(options).get(name)
         if value is not None and not 0.0 <= value < math.inf:
@@ -73,7 +73,7 @@ def _require_numbers(options):
 
 
 def _arguments(options):
-    """What was given on the command line as the operator's arguments."""
+    """The operator's arguments from the options."""
     _require_numbers(options)
     given = {name: value for name, value in vars(options).items() if name in PLAIN and value is not None}
     if options.degree is not None:
@@ -99,7 +99,7 @@ def _arguments(options):
 
 
 def run(options):
-    """Opens the file, runs the operator, saves; returns the report."""
+    """Opens the file, runs the operator, saves, and returns the report."""
     if "files" in options and options.verify is not None and options.onto is None:
         raise Misuse("--verify: expected --onto MESH too, the mesh to compare with")
     _require_outputs(options)
@@ -111,7 +111,7 @@ def run(options):
     before = set(bpy.data.objects)
     command = COMMANDS[options.command]
     getattr(bpy.ops.tactile, command.operator)(**arguments, **command.more)
-    # Its name may be another's, and it is not active where the scene was saved in edit mode.
+    # It cannot be found by name, and it is not active if the scene was saved in edit mode.
     (made,) = (obj for obj in set(bpy.data.objects) - before if command.record in obj)
     if command.record == patch_record.RECORD:
         _compare(made, options)
@@ -129,7 +129,7 @@ def run(options):
 
 
 def _require_outputs(options):
-    """Ends the command where a file to write is one to read, or cannot be one, before anything is done."""
+    """Raises Misuse, before anything is done, if a file to write is also read or cannot be a file."""
     given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify", "report")}
     outputs = {name: Path(path) for name, path in given.items() if path not in (None, "-")}
     scene = bpy.data.filepath and Path(bpy.data.filepath)
@@ -154,7 +154,7 @@ def _require_outputs(options):
 
 
 def _compare(patch, options):
-    """The patch with the mesh that was touched, or with the one that it is put onto."""
+    """Compares the patch with the mesh that was touched, or with the one onto which it is put."""
     target = None if "files" in options else bpy.data.objects[patch[patch_record.RECORD]["source"]]
     if options.onto is not None:
         target = mesh_file.add(options.onto)
@@ -164,7 +164,7 @@ def _compare(patch, options):
 
 
 def _open_contacts(options):
-    """The files as arguments; where no .blend is open, in an empty scene of their unit, so numbers stay."""
+    """The files as arguments. If no .blend is open, an empty scene gets their unit, so that numbers stay."""
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
         unit = measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit
@@ -185,7 +185,7 @@ def _open_contacts(options):
 
 
 def _save(path, made):
-    """The scene; where the path says so, the map or patch alone: .ply with its attributes, or .json."""
+    """Saves the scene, or by the path's ending the patch or map alone: .ply with attributes, or .json."""
     kind = path.suffix.lower()
     if kind == ".json":
         contact_file.write_patch(path, patch_record.reconstruction_of(made))
@@ -196,14 +196,14 @@ def _save(path, made):
 
 
 def _write_table(path):
-    """What the patches of the scene have found; returns how many there are."""
+    """Writes the table of the scene's patches, and returns their number."""
     patches = patch_table.patches_of(bpy.context.view_layer.objects)
     patch_table.write(path, patches, bpy.context.scene)
     return len(patches)
 
 
 def _default_target():
-    """The name of the only mesh of the scene, where nothing else is active."""
+    """The name of the scene's only mesh, if nothing else is active."""
     if bpy.context.view_layer.objects.active is not None:
         return ""
     meshes = [obj.name for obj in bpy.context.scene.objects if obj.type == "MESH"]

@@ -155,6 +155,9 @@ def test_samples_run(page, empty, command, folder):
     scope, out = names(page), None
     for kind, code in PAGES[page]:
         if kind == "python":
+            # The lines of a shell before it leave a scene in the unit of their file.
+            empty.context.scene.unit_settings.system = "METRIC"
+            empty.context.scene.unit_settings.scale_length = 1.0
             exec(compile(code, f"{page}, a sample", "exec"), scope)
         elif kind == "sh":
             out = "".join(run_shell(empty, command, line) or "" for line in commands(code))

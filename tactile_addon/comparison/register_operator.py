@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A patch whose place is unknown, put onto a mesh: the operator, and what it does."""
+"""The operator that puts a patch whose place is unknown onto a mesh, and the search behind it."""
 
 import threading
 from time import perf_counter
@@ -20,13 +20,13 @@ from ..touch.wording import registration_summary
 from .verify_operator import chosen_mesh
 
 POSES = 5
-HURRY = 0.02  # seconds between two looks at whether it is done
+HURRY = 0.02  # After so many seconds it is checked again whether the search is done.
 
 
 class Search:
-    """The search for where on a mesh object a patch belongs, in another thread: it knows nothing of Blender.
+    """The search for the place of a patch on a mesh object, in another thread, which does not use Blender.
 
-    poses : a list, once `wait` says that it is done; raises ValueError, with a sentence, where there are none
+    poses : a list, once `wait` says that it is done; raises ValueError, with a sentence, if there are none
     """
 
     def __init__(self, patch, target, depsgraph):
@@ -50,29 +50,29 @@ class Search:
             self._error = error
 
     def wait(self, seconds=None):
-        """Waits so long, or to the end; whether it is done."""
+        """Waits for some seconds, or to the end, and returns whether the search is done."""
         self._thread.join(seconds)
         return not self._thread.is_alive()
 
     def steps(self):
-        """Waits to the end; a generator, between whose steps a window may draw."""
+        """Waits to the end, as a generator between whose steps a window may draw."""
         while not self.wait(HURRY):
             yield
 
     @property
     def seconds(self):
-        """How long it has been searching."""
+        """How long the search has taken so far."""
         return perf_counter() - self._begun
 
     @property
     def poses(self):
-        """The core.Poses that were found; raises the error with which the search ended."""
+        """The core.Poses that were found. Raises the error with which the search has ended."""
         if self._error is not None:
             raise self._error
         return self._found
 
     def put(self, pose):
-        """Moves the patch to one of the poses, from where it was; its `registration`, a dict."""
+        """Moves the patch to one of the poses, and returns its `registration`, a dict."""
         if pose > len(self.poses):
             raise ValueError(f'There are {len(self.poses)} poses on "{self.target}": choose one of them')
         chosen, matrix, patch = self.poses[pose - 1], np.eye(4), bpy.data.objects.get(self.patch)
@@ -95,8 +95,8 @@ def register_patch(patch, target, depsgraph, pose=1):
 
     pose : 1 for the best place, up to POSES for others
 
-    Its record has what was found as `registration`, which is returned as a dict. Raises ValueError, with
-    a sentence and nothing changed, where that cannot be done.
+    The patch's record gets what was found as `registration`, which is returned as a dict. Raises ValueError
+    with a sentence, and changes nothing, if that cannot be done.
     """
     search = Search(patch, target, depsgraph)
     search.wait()

@@ -7,7 +7,7 @@ import bpy
 from ..touch import units
 from ..touch.wording import SPREAD
 
-# What core.verify finds, in the order of a table.
+# The results of core.verify, in the order of a table.
 VERIFIED = (
     *("vertices", *(f"vertex_distance_{key}" for key in SPREAD)),
     *("contacts", *(f"contact_distance_{key}" for key in SPREAD), "fit_error"),
@@ -17,7 +17,7 @@ VERIFIED = (
 
 
 def verification_summary(record):
-    """Whether a verification gives reason to doubt, and what it has found, in a sentence."""
+    """Whether a verification gives reason to doubt, and a sentence on what it has found."""
     found = record["verification"]
     name, vertices, percent = found["target"], found["vertices"], 100.0 * found["overlap"]
     if not (vertices or percent or found["extra_points"]):
@@ -38,7 +38,7 @@ def verification_summary(record):
 
 
 def verification_columns(report):
-    """(heading, value) of the row of a patch; the value is empty where there is none."""
+    """(heading, value) of the columns in a patch's row; a value that is not known is empty."""
     found = report["verification"]
     lengths = [key for key in VERIFIED if "distance" in key or "error" in key]
     return [
@@ -49,7 +49,7 @@ def verification_columns(report):
 
 
 def verification_table(found, unit):
-    """Rows of a label and what was found for the mesh and for the contacts, lengths without unit."""
+    """Rows of a label and the values for the mesh and for the contacts; lengths are without unit."""
     symbol, bare = units.symbol(1, unit), ("", unit[1])
 
     def lengths(key):
@@ -64,7 +64,7 @@ def verification_table(found, unit):
 
 
 def verification_rows(found, unit):
-    """(label, value) of what else a verification found."""
+    """(label, value) of everything else that a verification has found."""
     return [
         ("Error on Curves", _length(found, "fit_error", unit)),
         (f"Error on {found['extra_contours']} More", _length(found, "extra_fit_error", unit)),

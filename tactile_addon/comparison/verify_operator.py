@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A patch, where it is now, against any mesh: the operator, and what it does."""
+"""The operator that compares a patch, where it is now, with any mesh, and the work behind it."""
 
 import bpy
 import numpy as np
@@ -16,15 +16,15 @@ from ..touch.surface import MeshSurface
 from ..touch.touch_report import judgment
 from .verification_wording import verification_summary
 
-VERTICES_AT_ONCE = 2000  # vertices that are looked at in one step
+VERTICES_AT_ONCE = 2000  # A step looks at so many vertices.
 
 
 class Verification:
     """The comparison of a patch object with a mesh object, in steps; nothing is changed before `write`.
 
-    done, count : how many of the vertices near the patch have been looked at, and how many there are
+    done, count : numbers of the vertices near the patch that were looked at, and of all
 
-    Raises ValueError, with a sentence, where that cannot be done.
+    Raises ValueError, with a sentence, if they cannot be compared.
     """
 
     def __init__(self, patch, target):
@@ -35,13 +35,13 @@ class Verification:
         self._surface, self._found, self.done, self.count = None, {}, 0, 0
 
     def look(self, depsgraph):
-        """Has the steps go on in the scene as it is now. Raises ValueError where it is another by now."""
+        """Lets the steps go on in the scene as it is now. Raises ValueError if patch or mesh have changed."""
         patch, target = self._objects()
         if _inputs(patch, target) != self._given:
             raise ValueError(
                 f'"{self.patch}" or "{self.target}" was changed while it was verified: start again'
             )
-        # Blender frees what it has evaluated when it evaluates again.
+        # When Blender evaluates again, it frees what it has evaluated before.
         self._surface = MeshSurface(target, depsgraph, sound=self._surface is not None)
 
     def ray_cast(self, *ray):
@@ -49,7 +49,7 @@ class Verification:
         return self._surface.ray_cast(*ray)
 
     def steps(self):
-        """Does all of it; a generator, which yields each few hundredths of a second."""
+        """Does everything, as a generator that yields every few hundredths of a second."""
         r = self._r
         _, vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
         self.count, seen = len(vertices), [np.empty((0, 3))]
@@ -65,7 +65,7 @@ class Verification:
             yield
 
     def write(self):
-        """Gives the patch what was found: its deviations, and `verification` in its record."""
+        """Writes what was found to the patch: its deviations, and `verification` in its record."""
         (patch, _), r, surface = self._objects(), self._r, self._surface
         record = patch[patch_record.RECORD]
         points, normals = _vertices(patch.data, r, r.radius / record["radius"])
@@ -80,7 +80,7 @@ class Verification:
         return record.to_dict()
 
     def _objects(self):
-        """Patch and target. Raises ValueError where they are no longer there."""
+        """The patch and the target. Raises ValueError if they are no longer there."""
         found = {obj.session_uid: obj for obj in bpy.data.objects}
         if self._patch not in found or self._target not in found:
             raise ValueError(f'"{self.patch}" or "{self.target}" was deleted while it was verified')
@@ -88,9 +88,9 @@ class Verification:
 
 
 def verify_patch(patch, target, depsgraph):
-    """Compares the patch object with the mesh object `target`; its record has the result as `verification`.
+    """Compares the patch object with the mesh object `target`; its record gets the result as `verification`.
 
-    Raises ValueError, with a sentence and nothing changed, where that cannot be done.
+    Raises ValueError with a sentence, and changes nothing, if that cannot be done.
     """
     verification = Verification(patch, target)
     verification.look(depsgraph)
@@ -100,14 +100,14 @@ def verify_patch(patch, target, depsgraph):
 
 
 def _inputs(patch, target):
-    """What must stay while it goes on."""
+    """The properties of patch and target that must not change meanwhile."""
     return patch[patch_record.RECONSTRUCTION], *(
         tuple(map(tuple, obj.matrix_world)) for obj in (patch, target)
     )
 
 
 def _vertices(mesh, r, scale):
-    """Points and unit normals of the patch's vertices, in its frame, and so many times the mesh's size."""
+    """Points and unit normals of the patch's vertices, in its frame and scaled by `scale`."""
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.attributes["position"].data.foreach_get("vector", points.ravel())
     points = scale * points.astype(float)
@@ -165,9 +165,9 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
 
 
 def chosen_mesh(context, patch):
-    """The name of the one selected mesh, or of the patch's own choice, or of what it was touched on, if any.
+    """The name of the selected mesh, or of the patch's own target, or of the mesh it was touched on.
 
-    Raises ValueError where there is none.
+    Raises ValueError if there is none, or if several meshes are selected.
     """
     selected = context.view_layer.objects.selected
     names = [obj.name for obj in selected if obj.type == "MESH" and not probe.is_result(obj)]

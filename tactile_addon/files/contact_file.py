@@ -17,17 +17,17 @@ from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
 FILE_VERSION = 2
 TITLE = "# Tactile Patch contacts, version "
-UNIT_METERS = dict(units.METERS.values())  # meters in each unit
+UNIT_METERS = dict(units.METERS.values())  # The length of each unit in meters.
 VECTOR_KEYS, DEVIATION_KEYS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
 COLUMNS = ("curve", "time", *POINT_COLUMNS, *NORMAL_COLUMNS)
-STROKE = "stroke"  # the name of a curve that runs beside the reference point begins with it
+STROKE = "stroke"  # The names of curves that run beside the reference point begin with this.
 
 
 def read(path):
-    """The Contacts of a .csv or .ply file; numbers as they are.
+    """The Contacts of a .csv or .ply file, with numbers as they are.
 
-    The contacts of each curve, by time where that is given, each once. Raises OSError where there is no
-    such file, ValueError with line and column where it holds no contacts.
+    The contacts of each curve are sorted by time, if that is given, and each is there once. Raises OSError if
+    there is no such file, and ValueError with line and column if it holds no contacts.
     """
     path = Path(path)
     if not path.is_file():
@@ -43,7 +43,7 @@ def read(path):
 
 
 def contacts_of(r):
-    """The Contacts that a reconstruction was fitted to: a fit of them gives the same again."""
+    """The Contacts that a reconstruction was fitted to; fitting them gives the same reconstruction."""
     noise, (origin, normal) = r.noise * r.radius, (r.frame.origin, r.frame.axes[:, 2])
     contours = [replace(contour, noise=noise) for contour in r.contours]
     strokes = (core.Contour(r.strokes, noise=noise),) if len(r.strokes) else ()
@@ -51,10 +51,10 @@ def contacts_of(r):
 
 
 def write(path, contacts):
-    """Contacts as CSV; what reads it finds the same numbers.
+    """Writes Contacts as CSV, such that `read` finds the same numbers.
 
-    Normals are there where a contour has some. Comments say what else a fit takes: the reference point,
-    the outward direction, and the deviations of contacts and of normals, of all contours or of each.
+    Contours that have normals are written with them. Comments say what else a fit takes: the reference point,
+    the outward direction, and the deviations of contacts and of normals, for all contours or for each.
     """
     contours, unit, point, outward, strokes = contacts
     labels = [str(number) for number in range(1, len(contours) + 1)]
@@ -86,7 +86,7 @@ def write(path, contacts):
 
 
 def write_patch(path, r):
-    """A reconstruction as JSON; core.from_dict reads it."""
+    """Writes a reconstruction as JSON, which core.from_dict reads."""
     whole_file.write_text(path, json.dumps(core.to_dict(r), allow_nan=False) + "\n")
 
 
@@ -117,7 +117,7 @@ def _read_csv(name, path):
 
 
 def _with(name, contour, key, std):
-    """The contour with that deviation; of normals only where it has some."""
+    """The contour with this deviation; with one of normals only if it has normals."""
     if key == "normal_std" and contour.normals is None:
         return contour
     try:
@@ -127,7 +127,7 @@ def _with(name, contour, key, std):
 
 
 def _told(name, text):
-    """What the comments of a file of ours say besides its contacts, by key; of others nothing."""
+    """What the comments of a file that `write` has written say, by key; nothing for other files."""
     if not text.startswith(TITLE):
         return {}
     told, start, number = {}, 0, 1
@@ -148,7 +148,7 @@ def _told(name, text):
 
 
 def _deviation(at, word):
-    """A number of 0 or more; None for "-"."""
+    """The number of 0 or more in a word, or None for "-"."""
     std = None if word == "-" else contact_rows.number_of(at, word, LARGEST)
     if std is not None and std < 0.0:
         raise ValueError(f"{at}: expected a number of 0 or more, got {word[:40]}")
@@ -164,7 +164,7 @@ def _require_version(at, version):
 
 
 def _text(name, path):
-    """All of a text file, with lines that end as they do here."""
+    """The whole text of a file, with line ends as in Python."""
     data = path.read_bytes()
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", errors="replace")
@@ -179,7 +179,7 @@ def _text(name, path):
 
 
 def _columns(at, header):
-    """How many there are, {column: its place}, and the unit of the coordinates."""
+    """The number of columns, the place of each known one by name, and the unit of the coordinates."""
     columns, found = {}, {}
     for i, title in enumerate(header):
         key, bracketed, suffix = _parts(title.lower())
@@ -212,7 +212,7 @@ def _shown(header):
 
 
 def _parts(title):
-    """A column's name, and its unit as in "x [mm]" or as in "x_mm"; empty where it is none of these."""
+    """A column's name, and its unit as in "x [mm]" or "x_mm", or ""."""
     place = next((i for i, letter in enumerate(title) if letter in "[(_"), len(title))
     name, mark, rest = title[:place], title[place : place + 1], title[place + 1 :]
     if mark == "_":

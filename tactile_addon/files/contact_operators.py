@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured contours in: File > Import, and files dropped into a viewport."""
+"""The import of measured contours: File > Import, and files that are dropped into a viewport."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows of contacts as arrays: many at once, and one by one where something is to be said of one."""
+"""Rows of contacts as arrays: many at once, or one by one to say what is wrong with which."""
 
 import csv
 import math
@@ -12,12 +12,12 @@ from ... import core
 from ...core.arguments import LARGEST
 
 POINT_COLUMNS, NORMAL_COLUMNS = ("x", "y", "z"), ("nx", "ny", "nz")
-LETTERS_AT_ONCE = 1 << 16  # letters that are looked at together
-MIX = np.array([1.0, math.pi, math.e])  # makes one number of a point, which few others share
+LETTERS_AT_ONCE = 1 << 16  # So many letters are read together.
+MIX = np.array([1.0, math.pi, math.e])  # The product with a point is a number that few other points share.
 
 
 class Contacts(NamedTuple):
-    """What a file holds: contours and strokes, its unit or "", the point and outward direction or None."""
+    """What a file holds: contours, strokes, its unit or "", the point and the outward direction or None."""
 
     contours: list
     unit: str
@@ -27,7 +27,7 @@ class Contacts(NamedTuple):
 
 
 def blocks(text, start=0, number=1):
-    """(place, line number, some lines in one string) from that place on, but for what is empty."""
+    """(place, line number, some lines in one string) from a place of the text on, without empty blocks."""
     while start < len(text):
         end = text.find("\n", start + LETTERS_AT_ONCE) + 1 or len(text)
         block = text[start:end]
@@ -38,7 +38,7 @@ def blocks(text, start=0, number=1):
 
 
 def header_of(text):
-    """The first line that says something, its number, and the place of the next; None without one."""
+    """The first line that is neither empty nor a comment, its number, and the place of the next; or None."""
     for start, number, block in blocks(text):
         for line in block.split("\n"):
             if _says(line):
@@ -54,22 +54,22 @@ def _says(line):
 
 
 class Rows:
-    """The rows of a table as they are added; `contours` makes curves of all of them.
+    """The rows of a table, which are added in blocks; `contours` makes curves of all of them.
 
-    columns : the place of each column that counts
+    columns : the places of the known columns, by name
     """
 
     def __init__(self, name, separator, width, columns):
         self._name, self._separator, self._width, self._columns = name, separator, width, columns
         self._keys = [key for key in (*POINT_COLUMNS, *NORMAL_COLUMNS, "time") if key in columns]
-        self._curves, self._measured = {}, {}  # curves by their labels, and whether they have normals
+        self._curves, self._measured = {}, {}  # The curves by their labels, and whether they have normals.
         self._numbers, self._labels = [np.empty((0, len(self._keys)))], [np.empty(0, dtype=np.intp)]
 
     def add(self, number, block):
-        """Lines, the first of that number. Raises ValueError with line and column where one is no contact."""
+        """Adds lines from this number on. Raises ValueError with line and column if one is no contact."""
         try:
             labels, numbers = self._together(block)
-        except (ValueError, csv.Error):  # a blank or short row, a missing normal, or something to refuse
+        except (ValueError, csv.Error):  # A row is blank, short, without a normal, or wrong.
             labels, numbers = self._one_by_one(number, block)
         ids = [self._curves.setdefault(label, len(self._curves)) for label in labels]
         self._labels.append(np.array(ids, dtype=np.intp))
@@ -77,11 +77,11 @@ class Rows:
 
     @property
     def labels(self):
-        """Names of the curves, in the order of `contours`."""
+        """The names of the curves, in the order of `contours`."""
         return list(self._curves)
 
     def contours(self):
-        """The contours of all rows, in the order of `labels`. Raises ValueError where there are none."""
+        """The contours of all rows, in the order of `labels`. Raises ValueError if there are none."""
         numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
         if not len(numbers):
             raise ValueError(f"{self._name}: expected contacts below the header, got none")
@@ -96,7 +96,7 @@ class Rows:
         )
 
     def _together(self, block):
-        """Labels, and numbers (n, k), of rows that are all as most are. Raises ValueError elsewhere."""
+        """The labels and numbers (n, k) of rows without any exception. Raises ValueError for other rows."""
         lines = filter(_says if "#" in block else str.strip, block.split("\n"))
         if '"' in block:
             rows = [next(csv.reader([line], delimiter=self._separator)) for line in lines]
@@ -151,12 +151,13 @@ class Rows:
 
 
 def contours(name, labels, points, normals, times, titles):
-    """One a label 0, 1, ..., which `titles` names: its contacts, by time where there is one, each once.
+    """A contour for each label 0, 1, ..., with its contacts sorted by time, if there is one, each once.
 
-    normals : (n, 3), NaN all along a curve without any; None for none at all
+    normals : (n, 3), NaN along curves without any; None if there are none at all
+    titles : the name of each label
     """
     order = np.argsort(labels, kind="stable") if times is None else np.lexsort((times, labels))
-    # A sensor at rest writes one contact many times: it is no more certain for that.
+    # A sensor at rest writes one contact many times, which makes it no more certain.
     order = order[_first(labels[order], points[order])]
     found = []
     for rows in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
@@ -170,10 +171,10 @@ def contours(name, labels, points, normals, times, titles):
 
 
 def _first(labels, points):
-    """Which rows are the first of that label and point."""
+    """A mask of the rows that are the first with their label and point."""
     first = np.ones(len(labels), dtype=bool)
     mixed = np.sort(points @ MIX)
-    if (mixed[1:] == mixed[:-1]).any():  # Two separators that are alike mix nothing.
+    if (mixed[1:] == mixed[:-1]).any():  # Rows with equal numbers may have the same point.
         keys = labels, *points.T
         like = np.lexsort(keys)
         first[like[1:]] = np.any([key[like[1:]] != key[like[:-1]] for key in keys], axis=0)
@@ -181,7 +182,7 @@ def _first(labels, points):
 
 
 def fields_of(at, line, separator):
-    """The fields of a line, without spaces around them. Raises ValueError, which names the place `at`."""
+    """The fields of a line, without spaces around them. Raises ValueError that names the place `at`."""
     try:
         (fields,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
     except csv.Error:
@@ -190,8 +191,8 @@ def fields_of(at, line, separator):
 
 
 def numbers_of(texts):
-    """Numbers of many words, decimal commas or not. Raises ValueError where one is none."""
-    if "_" in "".join(texts):  # which Python would overlook
+    """The numbers of many words, with decimal points or commas. Raises ValueError if one is no number."""
+    if "_" in "".join(texts):  # Python would ignore it.
         raise ValueError
     try:
         numbers = np.fromiter(map(float, texts), float, len(texts))
@@ -204,7 +205,7 @@ def numbers_of(texts):
 
 
 def number_of(at, text, largest=math.inf):
-    """The number of one word, which is `at` that place. Raises ValueError for none, or beyond +-`largest`."""
+    """The number of a word. Raises ValueError that names the place `at` for none, or beyond +-`largest`."""
     try:
         (value,) = numbers_of([text])
     except ValueError:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches out: File > Export."""
+"""The export of patches: File > Export."""
 
 from pathlib import Path
 
@@ -9,34 +9,43 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..probes import probe
-from ..probes.operators import has_patch, report_error
+from ..probes.operators import report_error
 from ..scene import patch_record
 from . import contact_file, patch_table
 
 
-class _PatchExport(ExportHelper):
-    """Mixed into what writes the active patch, which may be active by its probe or contours."""
+class ObjectExport(ExportHelper):
+    """For operators that write what is active to inherit: a patch, by itself, its probe or its contours."""
+
+    hint = "Select a patch, its probe or its contours first"
+
+    @staticmethod
+    def written(context):
+        """The object to write, or None."""
+        return probe.patch_near(context.view_layer.objects.active)
 
     @classmethod
     def poll(cls, context):
-        return has_patch(cls, context, "Select a patch, its probe or its contours first")
+        if cls.written(context) is None:
+            cls.poll_message_set(cls.hint)
+            return False
+        return True
 
     def invoke(self, context, event):
         if not self.filepath:
-            patch = probe.patch_near(context.view_layer.objects.active)
-            self.filepath = bpy.path.clean_name(patch.name) + self.filename_ext
+            self.filepath = bpy.path.clean_name(self.written(context).name) + self.filename_ext
         return super().invoke(context, event)
 
     def execute(self, context):
         try:
-            self.write(probe.patch_near(context.view_layer.objects.active))
+            self.write(self.written(context))
         except (OSError, ValueError) as error:
             return report_error(self, error)
         self.report({"INFO"}, f'Wrote "{Path(self.filepath).name}"')
         return {"FINISHED"}
 
 
-class TACTILE_OT_export_contacts(_PatchExport, bpy.types.Operator):
+class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
     """Write the contacts of the active patch as CSV, in the scene's units"""
 
     bl_idname = "tactile.export_contacts"
@@ -49,7 +58,7 @@ class TACTILE_OT_export_contacts(_PatchExport, bpy.types.Operator):
         contact_file.write(self.filepath, contact_file.contacts_of(r))
 
 
-class TACTILE_OT_export_patch(_PatchExport, bpy.types.Operator):
+class TACTILE_OT_export_patch(ObjectExport, bpy.types.Operator):
     """Write the active patch as JSON: polynomial, frame, domain, covariance; as core.from_dict reads it"""
 
     bl_idname = "tactile.export_patch"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measured contacts, from files to a patch or a whole surface and its report, with no scene changed."""
+"""Measured contacts from files, as a patch or a whole surface with a report; nothing in the scene changes."""
 
 import math
 from dataclasses import replace
@@ -16,17 +16,18 @@ from ..touch.touch_report import measures, reconstruction_report, suggestion_rep
 from ..whole_object.whole_surface import WholeSurface
 from . import contact_file
 
-FLAT = 0.02  # Least |k1 + k2| in unit radius: a surface with less bulges to no side.
+FLAT = 0.02  # A surface whose |k1 + k2| is less, in unit radius, bulges to no side.
 
 
 def read(paths, unit, meters, whole=False):
-    """The contact_file.Contacts of files whose curves belong together, in a world of so many meters a unit.
+    """The contact_file.Contacts of files whose curves belong together.
 
-    unit : of the numbers, as in contact_file.UNIT_METERS; "FILE" for what each file names; "NONE" to take
-        them as they are, as those of a file that names none are taken.
-    whole : whether they are of one object and not of one patch, so that each may have a point of its own
+    unit : of the numbers, as in contact_file.UNIT_METERS; "FILE" for the unit that each file names; "NONE" to
+        take numbers as they are, as is done for a file that names no unit
+    meters : length of the world's unit in meters
+    whole : whether they belong to one object and not to one patch, so that each may have its own point
 
-    Raises ValueError where files name different reference points, and what contact_file.read raises.
+    Raises ValueError if files name different reference points, and what contact_file.read raises.
     """
     contours, strokes, points, directions = [], [], [], []
     found = "" if unit in ("FILE", "NONE") else unit
@@ -34,7 +35,7 @@ def read(paths, unit, meters, whole=False):
         curves, named, point, outward, beside = contact_file.read(path)
         named = {"FILE": named, "NONE": ""}.get(unit, unit)
         factor = contact_file.UNIT_METERS[named] / meters if named else 1.0
-        # 1 / 0.1 and the like are not exact: a file in the world's unit stays as it is.
+        # Quotients such as 1 / 0.1 are not exact, but a file in the world's unit must stay as it is.
         factor = 1.0 if math.isclose(factor, 1.0, rel_tol=1e-6) else factor
         contours += [_scaled(curve, factor) for curve in curves]
         strokes += [_scaled(stroke, factor) for stroke in beside]
@@ -44,7 +45,7 @@ def read(paths, unit, meters, whole=False):
     if not whole and any(not np.allclose(point, points[0], rtol=1e-12, atol=0.0) for point in points):
         raise ValueError("The files name different reference points: import them one by one")
     if any(np.dot(direction, directions[0]) <= 0.0 for direction in directions):
-        directions = []  # they are of other sides of one object
+        directions = []  # They belong to different sides of the object.
     point, outward = (given[0] if given else None for given in (points, directions))
     return contact_file.Contacts(contours, found, point, outward, tuple(strokes))
 
@@ -52,16 +53,16 @@ def read(paths, unit, meters, whole=False):
 class MeasuredObject:
     """Measured contacts that are covered with patches and joined to a surface, step by step.
 
-    share : of the work, that is done
+    share : share of the work that is done
     whole : the WholeSurface, once the steps are done
     """
 
     def __init__(self, contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
         """Prepares contact_file.Contacts.
 
-        outward : on the outer side of all contacts; None for the normals that were measured, or for that of
+        outward : direction to the outer side of all contacts; None for the measured normals, or for that of
             the files; `flip` takes the other side
-        tolerance, noise : in the contours' unit; 0 for a choice by core.atlas_of, and for those of the files
+        tolerance, noise : in the contours' unit; 0 has core.atlas_of choose, or the files
 
         Raises ValueError with a sentence for the user.
         """
@@ -84,7 +85,7 @@ class MeasuredObject:
         self._tolerance, self._noise, self.share = tolerance, noise, 0.0
 
     def steps(self):
-        """Does all of it; a generator. Raises ValueError with a sentence for the user."""
+        """Does everything, as a generator. Raises ValueError with a sentence for the user."""
         steps = core.cover_contacts(
             self._felt,
             outward=self._outward,
@@ -103,9 +104,9 @@ class MeasuredObject:
             yield
 
     def report(self):
-        """What there is to say, a dict of plain values."""
+        """What was found, as a dict of plain values."""
         found = {"contacts": sum(len(contour.points) for contour in self._felt), **self.whole.report()}
-        if found["status"] == "ok":  # nobody has looked for places where the object goes on
+        if found["status"] == "ok":  # Nobody has looked for places where the object goes on.
             found |= {"message": "The patches reach the tolerance wherever there are contacts."}
         return found | {"tolerance": self._tolerance, "noise": self._noise}
 
@@ -130,15 +131,15 @@ def fit(
 ):
     """The patch that contact_file.Contacts show, as a Touched without a surface.
 
-    point : where the curves meet, exact; None for that of the file, or core.common_point. From strokes alone
-        a place among them; None for that of the file, or their mean
-    all_strokes : whether curves are strokes, too
-    radius : from strokes alone, of the contacts that are used; 0 for all
-    outward : None for that of the file or the mean of the normals, or where there are none for the side to
-        which the surface bulges, +z where it is flat; `flip` takes the other
-    noise, normal_std : in the contours' unit and in radians; 0 for those of the file. Where it has none
-        either, normals are not fitted
-    options : what else core.reconstruct takes
+    point : where the curves meet, exactly; None for the point of the file, or core.common_point. For strokes
+        alone, a place among them; None for the point of the file, or their mean
+    all_strokes : whether curves count as strokes, too
+    radius : for strokes alone, contacts within this distance are used; 0 for all
+    outward : None for the direction of the file or the mean of the normals. Without any, it is the side to
+        which the surface bulges, or +z if it is flat; `flip` takes the other side
+    noise, normal_std : in the contours' unit and in radians; 0 for those of the file. If the file has no
+        normal_std either, normals are not fitted
+    options : other arguments of core.reconstruct
 
     Raises ValueError with a sentence for the user.
     """
@@ -178,7 +179,7 @@ def _fit(source, contacts, point, outward, flip, normal_std, options):
 
 
 def _report(result, method):
-    """What the fit has found, as a report of a touch has it."""
+    """What a fit has found, in the form of a touch's report."""
     axes = reference_axes(result.frame.axes[:, 2])
     return {
         "method": method,
@@ -192,7 +193,7 @@ def _report(result, method):
 
 
 def _mean_normal(contours):
-    """The mean of all normals that were measured; +z without any."""
+    """The mean of all measured normals, or +z if there are none."""
     normals = [contour.normals for contour in contours if contour.normals is not None]
     mean = np.sum(np.vstack(normals), axis=0) if normals else np.zeros(3)
     return mean if mean.any() else np.array([0.0, 0.0, 1.0])

@@ -9,21 +9,21 @@ import numpy as np
 
 from . import ply_contacts, whole_file
 
-HEADER = 1 << 16  # bytes in which that of a .ply comes to its end
+HEADER = 1 << 16  # The header of a .ply ends within so many bytes.
 INCOMPLETE = "Blender has not written all of it"
 
 
 def open_file(path):
-    """Makes the file the scene: opens a .blend, imports a mesh into an empty one, coordinates as they are."""
+    """Makes a file the scene: opens a .blend, or imports a mesh into an empty scene, unchanged."""
     if path.suffix.lower() == ".blend" and path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
     else:
         add(path, empty=True)
-        bpy.context.scene.unit_settings.system = "NONE"  # nobody knows what the numbers of such a file are in
+        bpy.context.scene.unit_settings.system = "NONE"  # Such a file does not name its unit.
 
 
 def add(path, empty=False):
-    """Adds the mesh of a .ply, .stl or .obj file to the scene, or to an empty one; returns its object.
+    """Adds the mesh of a .ply, .stl or .obj file to the scene, or to an empty one, and returns its object.
 
     Raises OSError with a sentence for the user.
     """
@@ -46,7 +46,7 @@ def add(path, empty=False):
     if kind == ".ply" and not _has_header(path):
         raise OSError(unreadable)
     try:
-        # Importers ask for a window, which is not the current one after `blender -b`.
+        # Importers ask for a window, and after `blender -b` none is current.
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
             imports[kind]()
     except RuntimeError as error:
@@ -58,15 +58,15 @@ def add(path, empty=False):
 
 
 def _has_header(path):
-    """Whether the header of a .ply file comes to its end; where it does not, the importer ends Blender."""
+    """Whether the header of a .ply file has an end; without one the importer would end Blender."""
     with path.open("rb") as file:
         return b"end_header" in file.read(HEADER)
 
 
 def write(path, obj):
-    """The mesh of an object without modifiers, with its attributes, as .ply.
+    """Writes the mesh of an object without modifiers, with its attributes, as .ply.
 
-    Raises OSError, as save_scene does, with a sentence and the old file as it was.
+    Raises OSError with a sentence, as save_scene does; the old file is then as it was.
     """
     with whole_file.replacing(path) as temporary:
         window = bpy.context.window_manager.windows[0]
@@ -76,26 +76,26 @@ def write(path, obj):
                 export_selected_objects=True,
                 apply_modifiers=False,
                 export_attributes=True,
-                export_uv=False,  # whose seams would split vertices
+                export_uv=False,  # Seams would split vertices.
             )
-        # On a full disk the exporter says that all is well.
+        # On a full disk the exporter reports success.
         if temporary.stat().st_size < _size_of_ply(temporary, obj.data):
             raise OSError(INCOMPLETE)
 
 
 def save_scene(path):
-    """The open scene as .blend."""
+    """Writes the open scene as .blend."""
     with whole_file.replacing(path) as temporary:
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
-        except RuntimeError as error:  # Blender says of a full disk that there is no such file.
+        except RuntimeError as error:  # If the disk is full, Blender says that there is no such file.
             raise OSError(INCOMPLETE) from error
-        if not _is_whole_blend(temporary):  # Blender 5.2 says of a full disk that all is well
+        if not _is_whole_blend(temporary):  # On a full disk Blender 5.2 reports success.
             raise OSError(INCOMPLETE)
 
 
 def _is_whole_blend(path):
-    """Whether the file ends as one: compressed with the magic number of its frames' table, else with ENDB."""
+    """Whether a file ends as a .blend does: with the magic number of its table of frames, or with ENDB."""
     with path.open("rb") as file:
         start = file.read(4)
         file.seek(max(0, path.stat().st_size - 64))
@@ -104,7 +104,7 @@ def _is_whole_blend(path):
 
 
 def _size_of_ply(path, mesh):
-    """How many bytes its header promises, of the faces of `mesh`; more than any file has without one."""
+    """The size that the header of a .ply with the faces of `mesh` promises; huge without a header."""
     with path.open("rb") as file:
         head, end, _ = file.read(HEADER).partition(b"end_header\n")
     if not end:

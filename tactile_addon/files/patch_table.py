@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What several patches have found as one table, a row each, to be read by spreadsheets and scripts."""
+"""The results of several patches as one table with a row each, for spreadsheets and scripts."""
 
 import csv
 import io
@@ -9,7 +9,7 @@ from ..probes import probe
 from ..touch import units
 from . import whole_file
 
-# Keys of the report, and the power of length each is measured in.
+# Keys of the report, and the power of length in the unit of each.
 NUMBER_POWERS = {
     **dict.fromkeys(("k1", "k1_std", "k2", "k2_std"), -1),
     **dict.fromkeys(("gaussian_curvature", "gaussian_curvature_std"), -2),
@@ -29,9 +29,9 @@ def patches_of(objects):
 
 
 def write(path, patches, scene):
-    """A .csv with a header that names the unit, and a row for each patch; empty where something is not known.
+    """Writes a .csv with a header that names the unit, and a row for each patch; unknown fields are empty.
 
-    Raises ValueError where there are none.
+    Raises ValueError if there are no patches.
     """
     if not patches:
         raise ValueError("There is no patch to export: pick a reference point first")
@@ -46,7 +46,7 @@ def write(path, patches, scene):
 
 
 def _row(patch, record, unit):
-    """A dict of headings and values."""
+    """The row of a patch as a dict of headings and values."""
     owner = probe.probe_of(patch)
     numbers = {_heading("xyz"[i], 1, unit): x / unit[1] for i, x in enumerate(record["frame"]["origin"])}
     numbers |= dict(zip(("nx", "ny", "nz"), record["frame"]["normal"], strict=True))

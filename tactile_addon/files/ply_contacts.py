@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contacts of a .ply file: its vertices, with normals, curves and times where it has them.
+"""The contacts of a .ply file: its vertices, with normals, curves and times if it has them.
 
-Blender's own import keeps these attributes too, but in single precision, and takes NaN and words for 0.
+Blender's own import keeps these attributes, too, but in single precision, and reads NaN and words as 0.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from ...core.arguments import LARGEST
 from . import contact_rows
 from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
-PLY_ROWS = 1000  # rows of a .ply that are read together
+PLY_ROWS = 1000  # So many rows of a .ply are read together.
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
@@ -26,10 +26,10 @@ PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">
 
 
 def read(name, path):
-    """The Contacts of a file. Raises ValueError, with its name and place, for what is none."""
+    """The Contacts of a file. Raises ValueError, with its name and the place, if it holds none."""
     table = _vertices(name, path.read_bytes())
     points = np.column_stack([table[key] for key in POINT_COLUMNS])
-    wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN is nowhere
+    wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN counts as wild.
     if wild.any():
         at = f"{name}, contact {np.argmax(wild) + 1}"
         raise ValueError(f"{at}: expected finite coordinates up to {LARGEST:g}, got others")
@@ -38,13 +38,13 @@ def read(name, path):
     )
     labels, titles = _in_order(table.get("curve", np.ones(len(points))))
     contours = contact_rows.contours(name, labels, points, normals, table.get("time"), titles)
-    if not {"curve", "time"} & set(table):  # bare points, in no order
+    if not {"curve", "time"} & set(table):  # These are bare points without an order.
         return Contacts([], "", strokes=tuple(contours))
     return Contacts(contours, "")
 
 
 def _vertices(name, data):
-    """The values of each property of the vertices, by its name."""
+    """The values of the vertices' properties, by name."""
     end = data.find(b"end_header")
     lines = [line.split() for line in data[: max(end, 0)].decode("latin-1").splitlines()]
     order = PLY_ORDERS.get(lines[1][1]) if len(lines) > 1 and len(lines[1]) > 1 else None
@@ -65,7 +65,7 @@ def _vertices(name, data):
 
 
 def _in_order(labels):
-    """Numbers from 0 in the order in which the labels first appear, and which label each stands for."""
+    """Numbers from 0 in the order in which labels first appear, and the label of each number."""
     titles, first, places = np.unique(labels, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -74,7 +74,7 @@ def _in_order(labels):
 
 
 def _ply_vertices(name, lines, order):
-    """(fields, how many) of the rows before the vertices; how many vertices there are, and their fields."""
+    """(fields, number) of the rows before the vertices, the number of vertices, and their fields."""
     elements = []
     for line in lines[2:]:
         try:
@@ -100,7 +100,7 @@ def _ply_vertices(name, lines, order):
 
 
 def _ply_rows(name, first, lines, fields):
-    """The values of lines of text, the first of them the file's line `first`."""
+    """The values of lines of text, of which the first is line `first` of the file."""
     rows = np.empty(len(lines), [(key, "f8") for key, _ in fields])
     for start in range(0, len(lines), PLY_ROWS):
         words = [line.decode("latin-1").split() for line in lines[start : start + PLY_ROWS]]
@@ -115,7 +115,7 @@ def _ply_rows(name, first, lines, fields):
 
 
 def _refuse_ply_row(name, first, words, fields):
-    """Raises ValueError for the first row that is none."""
+    """Raises ValueError for the first row that cannot be read."""
     for number, row in enumerate(words, first):
         at = f"{name}, line {number}"
         if len(row) != len(fields):

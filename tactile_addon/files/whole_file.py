@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files are written whole or not at all: beside the old one, which they then replace."""
+"""Files that are written completely or not at all: beside the old file, which the new one then replaces."""
 
 import os
 import secrets
@@ -11,15 +11,15 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path):
-    """The path of a file that takes the place of `path` once it is written, that is at the end of the block.
+    """The path of a file that replaces `path` once it is written, at the end of the block.
 
-    Raises OSError, with a sentence, where that fails: the old file is then as it was, and nothing is
-    beside it.
+    Raises OSError, with a sentence, if that fails. The old file is then as it was, and nothing is beside it.
     """
-    require_file(path)
+    if Path(path).exists() and not Path(path).is_file():
+        raise OSError(f'"{path}" is not a file that can be replaced: choose another name')
     try:
-        target = Path(path).resolve()  # A link stands for what it points to.
-    except RuntimeError as error:  # links that point to each other
+        target = Path(path).resolve()  # A link stays, and its target is replaced.
+    except RuntimeError as error:  # Links point to each other.
         raise OSError(f'cannot write "{Path(path).name}" ({error}): choose another place') from error
     temporary = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}{target.suffix[:40]}")
     try:
@@ -40,12 +40,6 @@ def replacing(path):
 
 
 def write_text(path, text):
-    """The text in UTF-8, lines ended as they are, as the file `path`."""
+    """Writes a text in UTF-8, with line ends as they are, as the file `path`."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.write(text)
-
-
-def require_file(path):
-    """Raises OSError for a folder, a device or a pipe, in whose place there can be no file."""
-    if Path(path).exists() and not Path(path).is_file():
-        raise OSError(f'"{path}" is not a file that can be replaced: choose another name')

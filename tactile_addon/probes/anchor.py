@@ -3,7 +3,7 @@
 """Where a probe and its patch are on their target: a target that moves as a whole is not touched again.
 
 A probe that is a child of its target has the world's coordinates for its own, which Blender's Parent does
-not do: so it stays where it is when the target is deleted, and is not sheared where the target is.
+not do. So it stays where it is when the target is deleted, and is not sheared with the target.
 """
 
 import math
@@ -14,13 +14,13 @@ from mathutils import Matrix, Vector
 
 from ..scene import patch_record
 
-BASE = "tactile_base"  # a patch's custom property: its target's matrix and its own when it was touched
-SEAT = 20  # numbers: the place in the target, directions there, and the target's own scale and shear
-CLOSE = 1e-5  # is no change of a number, nor of a length as a share of the extent: matrices are float32
+BASE = "tactile_base"  # A patch's custom property: its target's matrix and its own when it was touched.
+SEAT = 20  # So many numbers tell the place in the target, directions there, and the target's scale and shear.
+CLOSE = 1e-5  # A smaller change of a number, or of a length as a share of the extent, is rounding of float32.
 
 
 def attach(probe, target):
-    """Makes the probe a child of its target, where it is; unless the target depends on the probe."""
+    """Makes the probe a child of its target without moving it, unless the target depends on the probe."""
     above = target
     while above is not None:
         if above == probe:
@@ -32,25 +32,25 @@ def attach(probe, target):
 
 
 def detach(probe):
-    """Leaves the probe where it is, without a parent."""
+    """Takes the probe's parent away without moving the probe."""
     place = probe.matrix_world.copy()
     probe.parent = None
     probe.matrix_world = probe.matrix_basis = place
 
 
 def is_attached(probe):
-    """Whether it goes where its target goes, as its child."""
+    """Whether the probe is a child of its target, so that it goes where the target goes."""
     target = probe.tactile_probe.target
     return target is not None and probe.parent == target and probe.parent_type == "OBJECT"
 
 
 def can_have_children(probe):
-    """Whether any can be placed; not under a scale of nothing, nor one beyond all numbers."""
+    """Whether children of an object can be placed: not if its scale is 0 or not finite."""
     return all(0.0 < abs(scale) < math.inf for scale in probe.matrix_world.to_scale())
 
 
 def put(probe, matrix):
-    """Puts the probe there in the world."""
+    """Puts the probe at a matrix of the world."""
     if is_attached(probe):
         patch_record.place(probe, matrix)
     else:
@@ -58,7 +58,7 @@ def put(probe, matrix):
 
 
 def is_carried(probe):
-    """Whether its target has carried it away from its own coordinates, until a gesture has ended."""
+    """Whether the target has carried the probe away from its own coordinates, as during a gesture."""
     if not is_attached(probe) or probe.constraints or probe.animation_data:
         return False
     own, there = np.array(probe.matrix_basis), np.array(probe.matrix_world)
@@ -67,11 +67,11 @@ def is_carried(probe):
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def settle(probe, extent):
-    """Makes the world's coordinates the probe's own, without the target's scale and shear."""
+    """Makes the world's coordinates the probe's own again, without the target's scale and shear."""
     if not is_carried(probe):
         return
     to_world = np.array(probe.tactile_probe.target.matrix_world, dtype=float)
-    # The place is where it is seated: from where it is, it would creep by rounding.
+    # The place follows from the seat. If it followed from the probe's own place, it would creep by rounding.
     at, x, z = (to_world[:3, :3] @ np.reshape(seat(probe, extent)[:9], (3, 3)).T).T
     if not np.isfinite([at, x, z]).all():
         return
@@ -85,9 +85,9 @@ def settle(probe, extent):
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def seat(probe, extent):
-    """Where the probe is on its target, SEAT numbers: the same wherever both are moved or turned together.
+    """Where the probe is on its target, SEAT numbers that stay the same if both are moved or turned together.
 
-    They are those that it keeps, unless it is no longer there.
+    They are those that the probe keeps, as long as it is still there.
     """
     settings, target = probe.tactile_probe, probe.tactile_probe.target
     above = np.eye(4).ravel().tolist() if target is None else _numbers(target.matrix_world)
@@ -96,14 +96,14 @@ def seat(probe, extent):
     to_world, place = np.reshape([above, own], (2, 4, 4))
     rounding = np.finfo(np.float32).eps * np.abs([to_world[:3, 3], place[:3, 3]]).max()
     off = np.linalg.norm(to_world[:3, :3] @ (now[:3] - kept[:3]))
-    is_turned = not np.abs(now[3:] - kept[3:]).max() <= CLOSE  # of NaN too
+    is_turned = not np.abs(now[3:] - kept[3:]).max() <= CLOSE  # NaN counts as turned.
     is_there = off <= CLOSE * extent + 8.0 * rounding and not is_turned
     return kept.tolist() if is_there else now.tolist()
 
 
-@lru_cache(maxsize=16)  # It is asked for some times in a row, each time something has changed.
+@lru_cache(maxsize=16)  # It is asked for several times in a row whenever something has changed.
 def _seat(*matrices):
-    """SEAT numbers of the world matrices of a target and a probe, 16 each; NaN where the target is flat."""
+    """SEAT numbers from the world matrices of a target and a probe, 16 each; NaN if the target is flat."""
     to_world, place = np.reshape(matrices, (2, 4, 4))
     linear = to_world[:3, :3]
     shape, size, volume = linear.T @ linear, np.linalg.norm(linear), np.linalg.det(linear)
@@ -116,33 +116,28 @@ def _seat(*matrices):
 
 
 def keep(probe, patch):
-    """Keeps where the target of the probe is, with a patch that was touched just now."""
+    """Keeps where the probe's target is in a patch that was touched just now."""
     target = probe.tactile_probe.target
     axes, origin = patch_record.touched_frame(patch)
     patch[BASE] = [*_numbers(target.matrix_world), *_numbers(patch_record.matrix_of(axes, origin))]
 
 
-def let_go(patch):
-    """The target of the probe is another now, which does not carry a patch of the one before."""
-    patch.pop(BASE, None)
-
-
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
 def carry(probe, patch):
-    """Has the patch's record say that the patch was moved with its target, where that was moved since.
+    """Moves the patch in its record as its target was moved since.
 
-    Not where the probe has been left behind, as one that is not the target's child.
+    It does nothing if the probe was left behind because it is no child of the target.
     """
     target, report, base = probe.tactile_probe.target, patch_record.report_of(patch), patch.get(BASE)
     if target is None or report is None or base is None:
         return
-    if report["source"] != target.name:  # it was renamed
+    if report["source"] != target.name:  # It was renamed.
         report["source"] = target.name
     if not is_attached(probe) and seat(probe, report.get("extent", 0.0)) != list(probe.tactile_probe.seat):
         return
     before, frame = np.reshape(base, (2, 4, 4))
     now = np.array(target.matrix_world, dtype=float)
-    if not (np.isfinite(now).all() and np.isfinite(before).all()):  # beyond single precision
+    if not (np.isfinite(now).all() and np.isfinite(before).all()):  # They are beyond single precision.
         return
     try:
         motion = now @ np.linalg.inv(before)

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live probes: what looks after every change whether a patch is still that of its probe's inputs.
+"""Live probes: handlers that check after every change whether a patch is still that of its probe's inputs.
 
-A depsgraph handler, for Blender has no callback for an object that moves. In a window it does the quick
-part at once, and a timer what is dear, once the gesture has ended; without a window all of it at once.
+This takes a depsgraph handler, because Blender has no callback for an object that moves. In a window it does
+the quick part at once, and a timer does the slow part once the gesture has ended. Without a window all is
+done at once.
 """
 
 import math
@@ -16,33 +17,35 @@ from bpy.app.handlers import persistent
 from ..scene import undo
 from ..scene.family import remembered
 from ..scene.viewports import has_gesture
+from ..touch.settings import something_happened
 from . import anchor, deleted
 from .probe import forget_targets, is_free, is_probe, probe_of, record_of, targets
 from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
 
-SETTLE = 0.25  # seconds without a change after which a gesture counts as ended
-EVENT_SLICE = 0.2  # seconds of work between two events, in a window
-CHEAP = 0.05  # seconds that a touch may take to be made in every frame of an animation
+SETTLE = 0.25  # A gesture counts as ended after so many seconds without a change.
+EVENT_SLICE = 0.2  # In a window, work between two events takes so many seconds.
+CHEAP = 0.05  # A touch that takes no more seconds is made in every frame of an animation.
 
-_unsure = True  # whether any patch may be another than its inputs ask for, as after undo
-_seen = None  # the scene and view layer that were looked at last
+_unsure = True  # Whether any patch may differ from what its inputs ask for, as after undo.
+_seen = None  # The scene and view layer that were looked at last.
 
 
 @persistent
 def on_depsgraph_update(scene, depsgraph):
-    """Brings the patches of outdated live probes up to date; nothing happens where no input has changed."""
+    """Brings the patches of outdated live probes up to date. If no input has changed, nothing happens."""
     _bring_up_to_date(depsgraph, math.inf)
 
 
 @persistent
 def on_frame_change(scene, depsgraph):
-    """Brings patches up to date in another frame, where it takes no longer than playback has time for."""
+    """Brings patches up to date in another frame, unless that takes longer than playback has time for."""
     _bring_up_to_date(depsgraph, CHEAP)
 
 
 def _bring_up_to_date(depsgraph, dearest):
-    """dearest : seconds that a touch may take now, by those of the last; the others say "outdated"."""
+    """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
     global _unsure
+    something_happened()
     if not (targets() or deleted.has_contours() or _unsure):
         return
     if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
@@ -57,7 +60,7 @@ def _bring_up_to_date(depsgraph, dearest):
         if not concerned:
             return
         reshaped = {u.id.original: None for u in depsgraph.updates if u.is_updated_geometry}
-        if unsure:  # edited where no handler was told, as while the extension was off
+        if unsure:  # It may have been edited when no handler was told, as while the extension was off.
             reshaped |= {probe.tactile_probe.target: None for probe in concerned}
         end = perf_counter() + EVENT_SLICE
         for probe in filter(is_free, concerned):
@@ -66,13 +69,13 @@ def _bring_up_to_date(depsgraph, dearest):
 
 
 def _seconds(probe):
-    """What its last touch took, without what is filled in once a gesture has ended."""
+    """How long the probe's last touch took, without what is filled in once a gesture has ended."""
     record = record_of(probe)
     return 0.0 if record is None else sum(record["seconds"].get(key, 0.0) for key in ("prepare", "touch"))
 
 
 def _look_at(probe, depsgraph, reshaped, in_time):
-    """Brings one up to date; where there is no time for that now, once the gesture has ended."""
+    """Brings a probe up to date, or notes it for the end of the gesture if there is no time now."""
     settings = probe.tactile_probe
     deleted.relink(probe)
     deleted.forget_target(probe)
@@ -89,7 +92,7 @@ def _look_at(probe, depsgraph, reshaped, in_time):
 
 @persistent
 def on_blend_import(imported):
-    """Has a probe that was appended without its patch touch again; a linked one is its own file's."""
+    """Makes a probe that was appended without its patch touch again; a linked one belongs to its own file."""
     on_other_data()
     for item in imported.import_items:
         if isinstance(item.id, bpy.types.Object) and is_probe(item.id) and item.id.library is None:
@@ -98,23 +101,23 @@ def on_blend_import(imported):
 
 @persistent
 def on_other_data(*_):
-    """After a file was opened, or undo: any probe may be there, and any patch may be another."""
+    """Notes that after undo, or when a file was opened, any probe may be there and any patch may differ."""
     global _unsure
     forget_targets()
     _unsure = True
-    if not bpy.app.background:  # nothing may be updated by itself
+    if not bpy.app.background:  # There may be no update otherwise.
         _settle_soon()
 
 
 def _has_come_or_gone(depsgraph):
-    """Whether some object may have: its scene and collections are updated then."""
+    """Whether an object may have come or gone, because its scene and collections are updated then."""
     return any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in depsgraph.updates)
 
 
 def _concerned(depsgraph):
-    """The probes that something has happened to: to them, their patch or target, or to what is there.
+    """The probes to which something has happened: to them, to their patch or target, or to what is there.
 
-    Also whether anything may have happened to any of them, as after undo, or in a scene not seen before.
+    Also returns whether anything may have happened to any of them, as after undo or in a new scene.
     """
     global _unsure, _seen
     layer = depsgraph.scene.session_uid, depsgraph.view_layer.name
@@ -122,8 +125,8 @@ def _concerned(depsgraph):
     updated = {u.id.original for u in updates if u.is_updated_geometry or u.is_updated_transform}
     objects = [datablock for datablock in updated if isinstance(datablock, bpy.types.Object)]
     owners = {probe_of(obj) for obj in objects} - {None}
-    # Where an object comes or goes, all others are among the updates too, with none of these two; and so
-    # is one that gets another name.
+    # When an object comes or goes, all others are among the updates, too, but with neither of these two
+    # flags. So is an object that is renamed.
     named = {u.id.name for u in updates if isinstance(u.id, bpy.types.Object)}
     scene = unsure or _has_come_or_gone(depsgraph)
     if not (scene or owners or len(named) > len(objects) or any(o.session_uid in known for o in objects)):
@@ -132,7 +135,7 @@ def _concerned(depsgraph):
     there = set(depsgraph.view_layer.objects)
     found = [obj for obj in there if is_probe(obj)]
     if scene and not found:
-        forget_targets()  # the last one may have been deleted
+        forget_targets()  # The last one may have been deleted.
     concerned = [
         obj
         for obj in sorted(found, key=lambda probe: probe.name)
@@ -149,7 +152,7 @@ def _name_of(target):
 
 
 def is_pending(probe):
-    """Whether what is dear is still to be filled in."""
+    """Whether the slow part of a probe's patch is still to be filled in."""
     record = record_of(probe)
     return record is not None and not probe.tactile_probe.message and not record["is_verified"]
 
@@ -161,7 +164,7 @@ def _settle_soon():
 
 
 def _settle():
-    """Completes what the gesture has left, once it has ended, some at a time; a timer."""
+    """Completes the patches of a gesture once it has ended, some at a time; Blender calls it as a timer."""
     if not targets():
         return None
     if bpy.app.is_job_running("RENDER") or has_gesture():
@@ -187,13 +190,13 @@ def _settle():
 
 @persistent
 def before_undo(*_):
-    """Has undo free what is in no step of it, and nothing point there."""
+    """Takes out what no undo step has, so that nothing points to what undo frees."""
     undo.take_out()
 
 
 @persistent
 def after_undo(*_):
-    """Puts back what is there all the same, and has all probes looked at."""
+    """Puts back what is still there, and makes the handlers look at all probes."""
     undo.put_back()
     on_other_data()
 
@@ -220,5 +223,5 @@ def unregister():
     for timer in filter(bpy.app.timers.is_registered, (_settle, deleted.remove)):
         bpy.app.timers.unregister(timer)
     for name, handler in HANDLERS.items():
-        with suppress(ValueError):  # another script may have taken it away
+        with suppress(ValueError):  # Another script may have removed it.
             getattr(bpy.app.handlers, name).remove(handler)

@@ -10,16 +10,16 @@ from ..touch.settings import silent
 from . import anchor
 from .probe import DIGEST, is_result
 
-LATER = 0.25  # seconds until another look at whether a gesture has ended
-_deleted = set()  # session_uids of targets
-_owners = {}  # those of contours, and of the patches they were seen with last: undo may bring them back
+LATER = 0.25  # After so many seconds it is checked again whether a gesture has ended.
+_deleted = set()  # The session_uids of deleted targets.
+_owners = {}  # By those of contours, those of their last patches: undo may bring these back.
 
 
 def forget_target(probe):
-    """A target that was deleted lives on as long as the probe points to it: lets go, so that it is gone.
+    """Clears a probe's target if it was deleted, because it lives on as long as the probe points to it.
 
-    The step of undo was stored before, and undo takes back only what differs between two steps: so which one
-    it was is kept, for `relink`.
+    The undo step was stored before, and undo takes back only what differs between two steps. So the probe
+    keeps which target it was, for `relink`.
     """
     settings = probe.tactile_probe
     target = settings.target
@@ -28,11 +28,11 @@ def forget_target(probe):
     if not target.is_editable or target.override_library is not None:
         _follow(probe, target)
         return
-    # One that has never been touched is a script's, which may be about to put it into the scene.
+    # If it was never touched, a script may be about to put it into the scene.
     if not settings.digest:
         return
     settings.lost = f"{target.session_uid} {int(anchor.is_attached(probe))} {target.name}"
-    if anchor.is_attached(probe):  # to an object that is in no scene any more
+    if anchor.is_attached(probe):  # The object is in no scene any more.
         anchor.detach(probe)
     settings.property_unset("target")
     if not target.users:
@@ -41,9 +41,10 @@ def forget_target(probe):
 
 
 def _follow(probe, target):
-    """A library's object is not deleted by being in no scene of this file: its override may be, or its own.
+    """Follows a library's object, which is not deleted if it is in no scene of this file.
 
-    The override takes the place of the object it is of, unless it was made for the probe's sake alone.
+    Its override may be in a scene, or it may be in one of its own file. The override takes the place of the
+    object, unless it was made for the probe's sake alone.
     """
     if target.override_library is not None:
         there = [target.override_library.reference]
@@ -61,14 +62,14 @@ def _follow(probe, target):
 
 
 def _remove_soon():
-    """Has `remove` called later: a handler may not delete what is being evaluated."""
-    # Without a window no timer runs, and one that is left keeps Blender's module from ending.
+    """Calls `remove` later, because a handler may not delete what is being evaluated."""
+    # Without a window no timer runs, and a registered one keeps Blender's module from ending.
     if not bpy.app.background and not bpy.app.timers.is_registered(remove):
         bpy.app.timers.register(remove)
 
 
 def relink(probe):
-    """Has the probe point again to the target that it lost, where undo has brought that back."""
+    """Makes the probe point again to the target that it lost, if undo has brought that back."""
     settings = probe.tactile_probe
     if settings.target is not None or not settings.lost:
         return
@@ -82,12 +83,12 @@ def relink(probe):
 
 
 def has_contours():
-    """Whether contours were seen that may lose their patch."""
+    """Whether any contours were seen that may lose their patch."""
     return bool(_owners)
 
 
 def look_for_contours():
-    """Has the contours go whose patch was deleted: without its coordinates they mean nothing."""
+    """Deletes contours whose patch was deleted, because without its coordinates they mean nothing."""
     there = {obj.session_uid: obj for obj in bpy.data.objects}
     for number, obj in there.items():
         if patch_record.CONTOURS in obj and obj.parent is not None:
@@ -97,13 +98,13 @@ def look_for_contours():
 
 
 def _is_left(obj, there):
-    """Whether it is contours whose patch is no longer there, but was."""
+    """Whether an object is contours whose patch was deleted."""
     owner = _owners.get(obj.session_uid)
     return owner is not None and owner not in there and obj.parent is None and obj.is_editable
 
 
 def _is_data(datablock):
-    """Whether it is an object or the like; scenes and windows see by themselves that one is gone."""
+    """Whether a datablock is an object or the like; scenes and windows drop a deleted one by themselves."""
     kinds = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
     return not isinstance(datablock, kinds)
 
@@ -113,13 +114,13 @@ def _unused_meshes():
 
 
 def remove():
-    """Takes away what was deleted, and what nothing is left of but a datablock that nobody uses; a timer."""
+    """Removes the datablocks of what was deleted if nobody uses them; Blender calls it as a timer."""
     if has_gesture():
         return LATER
     there = {obj.session_uid: obj for obj in bpy.data.objects}
     gone = [there[number] for number in _deleted if number in there and not there[number].users]
-    # Children and modifiers point to an object without being its users, and undo may leave them as they are:
-    # it would bring back the object, and not these links.
+    # Children and modifiers point to an object without being its users. Undo may leave them as they are, and
+    # would then bring back the object, but not these links.
     pointing = bpy.data.user_map(subset=gone) if gone else {}
     gone = [obj for obj in gone if not any(map(_is_data, pointing.get(obj, ())))]
     left = [obj for obj in there.values() if _is_left(obj, there) and is_result(obj)]

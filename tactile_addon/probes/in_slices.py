@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What takes longer than a redraw may: done in slices between a window's events, with progress and Esc."""
+"""Long work that is done in slices between a window's events, with progress and Esc."""
 
 import sys
 from time import perf_counter
@@ -11,18 +11,19 @@ from bpy.props import BoolProperty
 from ..touch.settings import UNSAVED
 from .operators import report_error, target_object
 
-FIRST_SLICE = 0.2  # seconds of work before a window is told that there is more
-TIMER_SLICE = 0.03  # seconds of work between two events
-SAY = 1.0  # seconds between two lines of progress where there is no window
-NEXT = 0.01  # seconds from one slice to the next
+# These are seconds.
+FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
+TIMER_SLICE = 0.03  # Work between two events takes so long.
+NEXT = 0.01  # The next slice begins after this time.
+SAY = 1.0  # Without a window, a line of progress is printed each time.
 
 
 class InSlices:
-    """Mixed into operators whose work is a generator.
+    """For operators whose work is a generator to inherit.
 
-    Each has `_begin(context)`, which sets `_steps`; `_check(context)`, called before each slice, as the scene
-    may have changed; `_done()`, words and the share that is done, or None; and `_finish(context)`. All but
-    `_done` may raise ValueError, with a sentence for the user.
+    Each has `_begin(context)`, which sets `_steps`; `_check(context)`, called before each slice, because the
+    scene may have changed; `_done()`, which gives words and the share that is done, or None; and
+    `_finish(context)`. All but `_done` may raise ValueError, with a sentence for the user.
     """
 
     progress: BoolProperty(
@@ -31,10 +32,10 @@ class InSlices:
         options={"HIDDEN", *UNSAVED},
     )
 
-    _timer = None  # while it is running in a window
-    _in_window = False  # whether a dialog has been agreed to, after which it goes on in slices
-    stop = "Stop"  # what Esc does
-    meanwhile = {"RUNNING_MODAL"}  # what becomes of all other events
+    _timer = None  # There is one while it runs in a window.
+    _in_window = False  # Whether a dialog was confirmed, after which it goes on in slices.
+    stop = "Stop"  # What Esc does.
+    meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
 
     def invoke(self, context, event):
         try:
@@ -46,7 +47,7 @@ class InSlices:
         return self._go_on(context)
 
     def _ask(self, context):
-        """A dialog before it begins, which names the mesh to touch."""
+        """Asks in a dialog that names the mesh to touch before it begins."""
         if bpy.app.background:
             return self.execute(context)
         self._in_window = True
@@ -72,7 +73,7 @@ class InSlices:
             return report_error(self, error)
 
     def _go_on(self, context):
-        """Has the window do the steps."""
+        """Makes the window do the steps."""
         self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
         context.workspace.status_text_set(_status(self.stop, *self._done()))
         context.window_manager.modal_handler_add(self)
@@ -94,16 +95,16 @@ class InSlices:
             return report_error(self, error)
 
     def _advance(self, context, seconds):
-        """Works so long; whether all is done then."""
+        """Works for some seconds, and returns whether all is done then."""
         self._check(context)
         end = perf_counter() + seconds
         if any(perf_counter() > end for _ in self._steps):
             return False
-        # What finishes it has a slice of its own: the last step and the new object may be long together.
+        # `_finish` has a slice of its own, because the last step and the new object may take long together.
         return self._timer is None or perf_counter() < end - 0.5 * seconds
 
     def _check(self, context):
-        """Nothing that happens meanwhile matters."""
+        """Accepts whatever happens meanwhile, unless an operator overrides it."""
 
     def _stopped(self, context):
         self._leave(context)
@@ -111,21 +112,21 @@ class InSlices:
         return {"CANCELLED"}
 
     def _leave(self, context):
-        """Takes away all that shows that it is going on."""
+        """Removes everything that shows that it is going on."""
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             context.workspace.status_text_set(None)
             self._timer = None
 
     def cancel(self, context):
-        """Blender's, where it ends the operator itself: by a dialog, a new file or a closed window."""
+        """Blender calls it when it ends the operator itself: by a dialog, a new file or a closed window."""
         if self._timer is not None:
             self._leave(context)
             print(f"{self.bl_label}: stopped because the file or the window was closed", file=sys.stderr)
 
 
 def _status(stop, words, share=None):
-    """What draws the status bar meanwhile; it may outlive the operator by a redraw."""
+    """The function that draws the status bar meanwhile; it may outlive the operator by a redraw."""
 
     def draw(header, context):
         layout = header.layout

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lengths as panels and dialogs have them: dragged, they move by the object's size, from what was found.
+"""Lengths in panels and dialogs: dragged, they start from what was found and change by the object's size.
 
-How far the mouse moves a number is a constant of Blender's property, so there is one more property for each
-power of ten, which shows and sets the length itself; a panel takes the one that suits the object.
+How fast the mouse changes a number is a constant of Blender's property. So there is one more property for
+each power of ten, which shows and sets the length itself, and a panel takes the one that suits the object.
 """
 
 import math
@@ -12,24 +12,24 @@ from inspect import get_annotations
 import bpy
 from bpy.props import FloatProperty
 
-# What a pixel is to move, of the object's size.
+# What a pixel changes a length by, as a share of the object's size.
 PACES = {
     "extent": 1.5e-3, "spacing": 5e-4, "step": 1.5e-4, "edge": 1.5e-4, "noise": 1.5e-5, "tolerance": 1.5e-5
 }  # fmt: skip
-DECADES = range(-6, 7)  # of the properties' steps
+DECADES = range(-6, 7)  # The powers of ten of the properties' steps.
 HIDDEN_UNSAVED = {"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"}
-# Blender's units of length in meters, each with the least length that is said in it.
+# Blender's units of length in meters, each with the least length that Blender shows in it.
 LENGTH_UNITS = {
     "METRIC": ((1e3, 1e3), (1.0, 1.0), (1e-2, 1e-2), (1e-3, 1e-4), (1e-6, 1e-6)),
     "IMPERIAL": ((1609.344, 1609.344), (0.3048, 0.3048), (0.0254, 0.0254), (2.54e-5, 2.54e-5)),
 }
-WHOLE = {"METRIC": 1.0, "IMPERIAL": 0.3048}  # and those for what is less than all
+WHOLE = {"METRIC": 1.0, "IMPERIAL": 0.3048}  # Lengths below all of these are shown in these units.
 
 
 def annotations(cls, found=lambda owner, name: 0.0):
-    """The properties besides the lengths of a property group or operator, by name.
+    """The additional properties for the lengths of a property group or operator, by name.
 
-    found : gives for an object and the name of a length what was found in the place of 0
+    found : function of an object and the name of a length; gives the value that was found for 0
     """
     given = {name: kind for base in reversed(cls.__mro__) for name, kind in get_annotations(base).items()}
     return {
@@ -40,13 +40,13 @@ def annotations(cls, found=lambda owner, name: 0.0):
 
 
 def dragged(cls):
-    """Decorates an operator that shows its lengths by `fields`."""
+    """Decorates an operator that shows its lengths through `fields`."""
     cls.__annotations__.update(annotations(cls))
     return cls
 
 
 def fields(size):
-    """The names of the properties that show lengths, for an object of that size, by those of the lengths."""
+    """By the names of lengths, those of the properties that show them for an object of this size."""
     size = size if 0.0 < size < math.inf else 1.0
 
     def fitting(pace):
@@ -56,9 +56,9 @@ def fields(size):
 
 
 def pace_of(decade):
-    """What a pixel moves a property of that step, in the open scene; Blender's ui_get_but_step_unit.
+    """What a pixel changes a property of this step by in the open scene, as Blender's ui_get_but_step_unit.
 
-    Blender makes it a whole unit, one that suits ten pixels, unless this is the unit of the number 1.
+    Blender makes it one unit that suits ten pixels, unless this is the unit of the number 1.
     """
     settings, step = bpy.context.scene.unit_settings, 0.01 * 10.0**decade
     if settings.system == "NONE":

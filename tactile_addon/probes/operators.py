@@ -5,11 +5,11 @@
 from contextlib import contextmanager
 
 import bpy
-from bpy.props import FloatVectorProperty
 
 from ..scene import patch_object, patch_record
 from ..touch.settings import (
     LOCATION,
+    OUTWARD,
     TARGET,
     UNSAVED,
     TouchSettings,
@@ -33,12 +33,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
 
     target: TARGET
     location: LOCATION
-    outward: FloatVectorProperty(
-        name="Outward",
-        subtype="XYZ",
-        description="The outward direction there; if not set, the surface's own",
-        options=UNSAVED,
-    )
+    outward: OUTWARD
     tolerance: length_property(
         "Tolerance",
         "Add planes until the height is accurate to this or no plane would help; if not set, add none",
@@ -48,7 +43,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if context.area is not None and not is_in_object_mode(cls, context, "Patches are fitted"):
-            return False  # a script may leave any mode alone
+            return False  # Scripts, which have no area, need not leave a mode.
         return has_target(cls, context)
 
     def execute(self, context):
@@ -77,7 +72,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "target")
-        # Where they are not set, the cursor and the surface decide: zeros would say otherwise.
+        # If they are not set, the cursor and the surface decide, which zeros would prevent.
         for name in filter(self.properties.is_property_set, ("location", "outward")):
             layout.prop(self, name)
         shown = fields_of(context, self.target)
@@ -87,13 +82,13 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
 
 
 def report_error(operator, error):
-    """Has an operator say what is wrong, and end."""
+    """Lets an operator report what is wrong, and returns what ends it."""
     operator.report({"ERROR"}, sentence(error))
     return {"CANCELLED"}
 
 
 def target_object(context, name):
-    """The object to touch: by name, or the active one, or what the active patch, map or surface is of."""
+    """The object to touch: by name, or the active one, or that of the active patch, map or whole object."""
     obj = context.view_layer.objects.active
     record, found = record_of(obj) or patch_record.touched_record(obj), probe_of(obj)
     if not name and found is not None and found.tactile_probe.target is not None:
@@ -112,7 +107,7 @@ def target_object(context, name):
 
 
 def fields_of(context, name):
-    """The properties by which an operator shows lengths, for what it touches: see number_fields.fields."""
+    """The properties by which an operator shows lengths for the object it touches, see number_fields."""
     try:
         return fields(max(target_object(context, name).dimensions))
     except ValueError:
@@ -121,7 +116,7 @@ def fields_of(context, name):
 
 @contextmanager
 def waiting(context):
-    """Shows in a window that it takes a while: the first touch of a large mesh builds a tree of its faces."""
+    """Shows in a window that it takes a while, as the first touch of a large mesh, which builds a tree."""
     if bpy.app.background or context.window is None:
         yield
         return
@@ -133,7 +128,7 @@ def waiting(context):
 
 
 def is_in_object_mode(operator, context, what):
-    """Whether the mode is Object Mode; the operator's poll says so where it is not."""
+    """Whether the mode is Object Mode; if it is not, the operator's poll says so."""
     if context.mode == "OBJECT":
         return True
     operator.poll_message_set(f"{what} in Object Mode: leave this mode first")
@@ -141,8 +136,8 @@ def is_in_object_mode(operator, context, what):
 
 
 def has_target(operator, context):
-    """Whether the active object of a viewport can be touched, or leads to one that can; poll says why not."""
-    if context.area is None or context.area.type != "VIEW_3D":  # a script may name one
+    """Whether the active object of a viewport can be touched or leads to one that can; poll says why not."""
+    if context.area is None or context.area.type != "VIEW_3D":  # A script may name one.
         return True
     try:
         obj = target_object(context, "")
@@ -155,7 +150,7 @@ def has_target(operator, context):
 
 
 def has_patch(operator, context, hint):
-    """Whether the active object is a patch, its probe or its contours; the operator's poll gives the hint."""
+    """Whether the active object is a patch, its probe or its contours; if not, the poll gives a hint."""
     found = patch_near(context.view_layer.objects.active) is not None
     if not found:
         operator.poll_message_set(hint)
@@ -163,7 +158,7 @@ def has_patch(operator, context, hint):
 
 
 def is_unlocked(operator, context):
-    """Whether the probe or patch near the active object can be changed; the operator's poll says why not."""
+    """Whether the active object's probe or patch can be changed; the operator's poll says why not."""
     lock = lock_of(context.view_layer.objects.active)
     if lock is not None:
         operator.poll_message_set(lock)
@@ -171,8 +166,8 @@ def is_unlocked(operator, context):
 
 
 def make_active(context, obj):
-    """Selects the new object alone; unless that would leave an edit mode, or its collection is excluded."""
-    context.view_layer.update()  # after `blender -b FILE -c` it would not know the new object yet
+    """Selects only the new object, unless that would leave an edit mode or its collection is excluded."""
+    context.view_layer.update()  # After `blender -b FILE -c` it would not know the new object yet.
     objects = context.view_layer.objects
     if context.mode != "OBJECT" or obj.name not in objects:
         return

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The probe: an Empty at a reference point that says how to touch there, and keeps a patch up to date.
 
-The patch is a child of its probe, so a copy of a probe has none and makes its own, and where a probe is
-deleted its patch stays as an ordinary object. Each probe keeps the digest of the inputs it was last
-touched with, and so do the datablocks made from them: undo takes back every datablock by itself, and
-where they differ afterwards change_handlers.py touches again.
+The patch is a child of its probe. So a copy of a probe has none and makes its own, and if a probe is
+deleted, its patch stays as an ordinary object. Each probe keeps the digest of the inputs it was last
+touched with, and so do the datablocks made from them. Undo restores each datablock by itself, and if
+digests differ afterward, change_handlers.py touches again.
 """
 
 import bpy
@@ -72,11 +72,11 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     lost: StringProperty(description="Data of a target that was deleted", options={"HIDDEN"})
 
 
-_targets = None  # session_uids of what there are probes on, 0 for none; None where it is to be looked up
+_targets = None  # The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
 
 
 def targets():
-    """Identifiers of what there are probes on in this file: 0 for a probe without target."""
+    """The session_uids of the targets of all probes in this file; 0 for a probe without target."""
     global _targets
     if _targets is None:
         of = (obj.tactile_probe.target for obj in bpy.data.objects if is_probe(obj))
@@ -85,7 +85,7 @@ def targets():
 
 
 def forget_targets():
-    """Has `targets` look again, where probes may have come or gone, or changed their targets."""
+    """Makes `targets` look again, because probes may have come or gone or changed their targets."""
     global _targets
     _targets = None
 
@@ -96,28 +96,28 @@ def _appointed(settings, context):
 
 
 def _chosen(settings, context):
-    """A probe that was a child of its target is one of the new target."""
-    if is_silent():  # it is the one that it was, come back, or under another roof
+    """Makes a probe that was a child of its target a child of the new target."""
+    if is_silent():  # It is the same target, which has come back or is an override now.
         forget_targets()
         return
     settings.lost, probe, record = "", settings.id_data, record_of(settings.id_data)
     before = None if record is None else bpy.data.objects.get(record["source"])
     if settings.target not in (None, before) and before is not None and probe.parent == before:
         anchor.attach(probe, settings.target)
-    settings.digest = ""  # Nothing has been felt of this one.
+    settings.digest = ""  # Nothing was felt of the new target yet.
     patch = patch_of(probe)
     if patch is not None and patch.is_editable and settings.target != before:
-        anchor.let_go(patch)
+        patch.pop(anchor.BASE, None)  # The new target does not carry it.
     _appointed(settings, context)
 
 
 def is_probe(obj):
-    """Whether an object, or None, is the Empty that keeps a patch up to date."""
+    """Whether an object (or None) is an Empty that keeps a patch up to date."""
     return obj is not None and obj.type == "EMPTY" and obj.tactile_probe.is_probe
 
 
 def is_result(obj):
-    """Whether it is a patch, the contours of one, a map or a whole object that was touched."""
+    """Whether an object is a patch, contours, a stability map or a whole object."""
     keys = patch_record.RECORD, patch_record.CONTOURS, patch_record.MAP_RECORD, patch_record.ATLAS_RECORD
     return any(key in obj for key in keys)
 
@@ -128,12 +128,12 @@ def patch_of(probe):
 
 
 def _is_patch(obj):
-    """Whether it is a patch that nobody has converted to something else than a mesh."""
+    """Whether an object is a patch that nobody has converted to something else than a mesh."""
     return patch_record.RECORD in obj and obj.type == "MESH"
 
 
 def patch_near(obj):
-    """The patch that `obj` is, or has as a probe, or is the contours of, or None."""
+    """The patch that `obj` is, or keeps as a probe, or is the contours of; or None."""
     if is_probe(obj):
         return patch_of(obj)
     if obj is not None and patch_record.CONTOURS in obj:
@@ -142,7 +142,7 @@ def patch_near(obj):
 
 
 def reconstruction_of(obj):
-    """The core.Reconstruction of the patch near `obj`, where it is now. Raises ValueError for none."""
+    """The core.Reconstruction of the patch near `obj`, where it is now. Raises ValueError without one."""
     patch = patch_near(obj)
     if patch is None:
         raise ValueError("Wanted a patch, its probe or its contours, got another object or none")
@@ -150,7 +150,7 @@ def reconstruction_of(obj):
 
 
 def probe_of(obj):
-    """The probe that `obj` is, or is the patch or the contours of, or None."""
+    """The probe that `obj` is, or is the patch or the contours of; or None."""
     if is_probe(obj):
         return obj
     patch = patch_near(obj)
@@ -164,7 +164,7 @@ def record_of(obj):
 
 
 def require_unlocked(obj):
-    """Raises ValueError where what belongs to the probe or patch near `obj` cannot be changed."""
+    """Raises ValueError if anything of the probe or patch near `obj` cannot be changed."""
     patch = patch_near(obj)
     lines = None if patch is None else patch_record.contours_of(patch)
     for each in (probe_of(obj), patch, lines):
@@ -177,7 +177,7 @@ def require_unlocked(obj):
 
 
 def lock_of(obj):
-    """Why that cannot be changed, a sentence; None where it can."""
+    """A sentence on why the probe or patch near `obj` cannot be changed, or None if it can."""
     try:
         require_unlocked(obj)
     except ValueError as error:
@@ -186,12 +186,12 @@ def lock_of(obj):
 
 
 def is_free(probe):
-    """Whether it can be kept up to date: nothing of it is a library's, and nobody edits its patch."""
+    """Whether the probe can be kept up to date: no library has any of it, and nobody edits its patch."""
     return lock_of(probe) is None
 
 
 def make(context, target):
-    """A new probe; it touches nothing before `is_probe` is set."""
+    """A new probe, which touches nothing until `is_probe` is set."""
     probe = bpy.data.objects.new(f"{target.name} Probe", None)
     probe.empty_display_type = "SINGLE_ARROW"
     patch_object.collection(context.scene).objects.link(probe)
@@ -200,14 +200,14 @@ def make(context, target):
 
 
 def _show(obj):
-    """Colors a patch by what it is set to show now; the range of what it showed is none of that."""
+    """Colors a patch by the quantity it is set to show now, without the range of the one before."""
     obj.pop(patch_record.RANGE, None)
-    if obj.is_editable and patch_record.is_colored(obj):  # else verifying and exporting it say so
+    if obj.is_editable and patch_record.is_colored(obj):  # If not, verifying and exporting say so.
         patch_object.recolor(obj)
 
 
 def _found(probe, name):
-    """What the last touch had in the place of a length that is 0."""
+    """The value that the last touch chose for a length that is 0."""
     record = record_of(probe)
     return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
 
@@ -223,7 +223,7 @@ def register():
         override=OVERRIDABLE,
         update=lambda obj, _: _show(obj),
     )
-    bpy.types.Object.tactile_target = StringProperty(  # a pointer would keep a mesh that is deleted
+    bpy.types.Object.tactile_target = StringProperty(  # A pointer would keep a deleted mesh.
         name="Target",
         description="Name of the mesh object to put the patch onto, or to compare it with",
         override=OVERRIDABLE,

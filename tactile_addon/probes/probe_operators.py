@@ -18,7 +18,7 @@ from .operators import fields_of, has_patch, is_in_object_mode, is_unlocked, rep
 
 
 class _ProbeOperator:
-    """Mixed into operators on the active probe, which may be active by its patch or contours."""
+    """For operators on the active probe, or on that of the active patch or contours, to inherit."""
 
     bl_options = {"REGISTER", "UNDO"}
 
@@ -31,14 +31,16 @@ class _ProbeOperator:
 
 
 class _PlaneOperator(_ProbeOperator):
-    """Mixed into operators that add planes."""
+    """For operators that change the number of planes to inherit; they do nothing at the `limit`."""
+
+    limit, why_not = MOST_PLANES, "A patch has six planes at most: remove one first"
 
     @classmethod
     def poll(cls, context):
         if not super().poll(context):
             return False
-        if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == MOST_PLANES:
-            cls.poll_message_set("A patch has six planes at most: remove one first")
+        if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == cls.limit:
+            cls.poll_message_set(cls.why_not)
             return False
         return True
 
@@ -76,7 +78,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         except ValueError as error:
             return report_error(self, error)
         settings = found.tactile_probe
-        settings.is_probe = False  # It must not be touched again for each of these.
+        settings.is_probe = False  # The changes below must not make it touch again each time.
         for plane in touched.report["added_planes"]:
             _add(settings, plane)
         touch_again.adopt(found, touched, depsgraph, complete=True)
@@ -91,7 +93,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
 
 
 def _add(settings, suggested):
-    """One more plane, where it is suggested, or as it was there before."""
+    """Adds one more plane, at the suggested azimuth, or with the angles it had before."""
     number = settings.plane_count
     if suggested is not None:
         settings.azimuths[number] = math.radians(suggested["azimuth"])
@@ -100,22 +102,14 @@ def _add(settings, suggested):
     settings.active_plane = number
 
 
-class TACTILE_OT_remove_plane(_ProbeOperator, bpy.types.Operator):
+class TACTILE_OT_remove_plane(_PlaneOperator, bpy.types.Operator):
     """Remove this sampling plane"""
 
     bl_idname = "tactile.remove_plane"
     bl_label = "Remove Plane"
 
+    limit, why_not = 3, "A patch needs three planes"
     plane: IntProperty(name="Plane", description="Index of the plane, from 0", min=0, max=MOST_PLANES - 1)
-
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == 3:
-            cls.poll_message_set("A patch needs three planes")
-            return False
-        return True
 
     def execute(self, context):
         found = probe.probe_of(context.view_layer.objects.active)

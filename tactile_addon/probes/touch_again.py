@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A probe touches again: what its patch follows from, whether that has changed, and the new patch."""
+"""How a probe touches again: the inputs of its patch, whether these have changed, and the new patch."""
 
 import hashlib
 
@@ -16,14 +16,14 @@ from ..touch.wording import sentence
 from . import anchor
 from .probe import DIGEST, patch_of, record_of
 
-NO_SHAPE = " 00000000"  # the checksum of a mesh that cannot be touched, as settings.shape ends
-VERTICES = 1000  # of the mesh around, compared with the patch at most; a quarter or more lies over it
+NO_SHAPE = " 00000000"  # The end of settings.shape for a mesh that cannot be touched.
+VERTICES = 1000  # At most so many vertices around are compared with the patch; a quarter or more lie over it.
 
 
 def _put(probe, touched):
-    """Puts the probe on the reference point, z outward, x to azimuth 0.
+    """Puts the probe on the reference point, with z outward and x toward azimuth 0.
 
-    One that is there already stays as it is, and so does one that constraints would take back.
+    It stays as it is if it is there already, or if constraints would take it back.
     """
     if probe.constraints:
         return
@@ -31,7 +31,7 @@ def _put(probe, touched):
     turn = Matrix(np.column_stack([e1, -across, n]).tolist())
     wanted = Matrix.LocRotScale(Vector(location), turn.to_quaternion(), None)
     old, new = np.array(probe.matrix_world.normalized()), np.array(wanted)
-    # Put there again and again, it would creep by rounding.
+    # If it were put there again and again, it would creep by rounding.
     near = 1e-5 * touched.report["extent"]
     is_there = np.allclose(old[:3, :3], new[:3, :3], atol=1e-4) and np.abs(old - new)[:3, 3].max() <= near
     if not is_there or anchor.is_carried(probe):
@@ -40,10 +40,10 @@ def _put(probe, touched):
 
 
 def update(probe, depsgraph, complete):
-    """Touches again and rewrites the probe's patch; the probe's message says why where that fails.
+    """Touches again and rewrites the probe's patch; if that fails, the probe's message says why.
 
-    complete : with what is dear, an extent that suits the surface and the distances to the mesh, and with
-        the probe put onto the surface
+    complete : whether to include what takes long, an extent that suits the surface and the distances to the
+        mesh, and to put the probe onto the surface
     """
     settings, patch = probe.tactile_probe, patch_of(probe)
     try:
@@ -60,7 +60,7 @@ def update(probe, depsgraph, complete):
 
 
 def adopt(probe, touched, depsgraph, complete):
-    """Makes the probe's patch that of `touched`; `complete` as in update."""
+    """Makes `touched` the probe's patch; `complete` as in update."""
     probe.tactile_probe.message = ""
     if complete:
         touched = completed(touched, most=VERTICES)
@@ -76,7 +76,7 @@ def adopt(probe, touched, depsgraph, complete):
 
 
 def stand_by(probe, outdated, complete):
-    """Has the patch stay where it was, and say whether it is outdated, where there is no touch now."""
+    """Keeps the patch where it was, because there is no touch now, and lets it say whether it is outdated."""
     settings, patch = probe.tactile_probe, patch_of(probe)
     if complete:
         anchor.settle(probe, _extent_of(probe))
@@ -88,7 +88,7 @@ def stand_by(probe, outdated, complete):
     patch_record.hold(patch)
     record = record_of(patch)
     if settings.message and record is not None and patch_record.VERDICT not in patch:
-        settings.message = ""  # there was no patch, and undo has brought it back
+        settings.message = ""  # There was no patch, and undo has brought it back.
     if outdated:
         patch_record.mark_stale(patch)
     elif not settings.message:
@@ -96,7 +96,7 @@ def stand_by(probe, outdated, complete):
 
 
 def _left_contours(probe):
-    """The contours of a patch that was deleted, where they are still there."""
+    """The contours of a patch that was deleted, if they are still there, or None."""
     lines = (obj for obj in bpy.data.objects if patch_record.CONTOURS in obj and obj.parent is None)
     own = (obj for obj in lines if obj.is_editable and obj.data is not None)
     touched, _ = _signed(probe.tactile_probe)
@@ -104,7 +104,7 @@ def _left_contours(probe):
 
 
 def touch_at(probe, depsgraph, complete, **more):
-    """A touch with the probe's inputs. Raises ValueError, with a sentence, where there can be none."""
+    """A touch with the probe's inputs. Raises ValueError, with a sentence, if there can be none."""
     settings, matrix, record = probe.tactile_probe, probe.matrix_world, record_of(probe)
     if settings.target is None:
         raise ValueError("the probe has no target: choose the mesh to touch")
@@ -112,14 +112,16 @@ def touch_at(probe, depsgraph, complete, **more):
         raise ValueError(
             f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
         )
-    if anchor.is_attached(probe):  # what is scaled to nothing there is so here
+    if anchor.is_attached(probe):  # If the target is scaled to 0, so is the probe.
         require_invertible(settings.target.name, np.array(settings.target.matrix_world)[:3, :3])
     if not anchor.can_have_children(probe):
         raise ValueError("the probe has a scale of 0 or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)
-    if not complete and record is not None:  # Finding out how far a patch can be trusted is dear.
-        kept = {"extent": 0.0, "step": 0.0, "degree": "auto"}
+    if not complete and record is not None:  # Choosing an extent anew takes long.
+        kept = {"step": 0.0, "degree": "auto"} if arguments["extent"] else {"degree": "auto"}
         arguments |= {name: record.get(name, own) for name, own in kept.items() if arguments[name] == own}
+        if not arguments["extent"]:
+            arguments["reaches"] = _reaches(record, len(arguments["planes"]))
         arguments["sound"] = not settings.shape.endswith(NO_SHAPE)
     return touch(
         settings.target,
@@ -132,17 +134,25 @@ def touch_at(probe, depsgraph, complete, **more):
     )
 
 
+def _reaches(record, count):
+    """How far the half curves of a touch with so many planes begin near the last one; None to begin anew."""
+    reaches, extent = record.get("reaches"), record.get("extent")
+    if np.shape(reaches) == (count, 2):
+        return [list(both) for both in reaches]
+    return None if extent is None else [[extent, extent]] * count  # a plane has come or gone
+
+
 def _is_there(target, depsgraph):
     objects = depsgraph.view_layer.objects
     named = objects.get(target.name)
-    # A library's object and its override may both be there, under one name.
+    # A library's object and its override may both be there under one name.
     return named == target or (named is not None and any(obj == target for obj in objects))
 
 
 def may_be_outdated(probe, there):
-    """Whether something it belongs to has been taken away or back, or has another name.
+    """Whether something that belongs to the probe was removed, brought back or renamed.
 
-    there : what is in the view layer
+    there : the objects in the view layer
     """
     settings, made, record = probe.tactile_probe, _made(probe), record_of(probe)
     return (
@@ -156,17 +166,17 @@ def may_be_outdated(probe, there):
 
 
 def is_outdated(probe, depsgraph):
-    """Whether its patch is another than its inputs ask for, by the probe or by what it is made of."""
+    """Whether the patch differs from what the inputs ask for, by the digests of probe and patch."""
     (touched, name), made = _signed(probe.tactile_probe), _made(probe)
     meshes = patch_object.meshes(patch_of(probe))
     if name != probe.name and (not meshes or any(mesh.users > 1 for mesh in meshes)):
-        return True  # a copy, which has no patch yet, or none of its own
+        return True  # It is a copy, which has no patch of its own yet.
     digest = _digest(probe, depsgraph, anchor.seat(probe, _extent_of(probe)))
     return any(other != digest for other in (touched, *(block.get(DIGEST) for block in made)))
 
 
 def _made(probe):
-    """The datablocks that a touch writes to."""
+    """The datablocks that a touch of the probe writes to."""
     patch = patch_of(probe)
     return [] if patch is None else [patch, *patch_object.meshes(patch)]
 
@@ -181,17 +191,17 @@ def _sign(probe, depsgraph):
 
 
 def _signed(settings):
-    """The digest of the last touch, and the name of the probe then, which a copy does not share."""
+    """The digest of the last touch together with the name of the probe, which a copy does not share."""
     digest, _, name = settings.digest.partition(" ")
     return digest, name
 
 
 def _digest(probe, depsgraph, seat):
-    """The digest of all inputs of a touch; names are none of them.
+    """The digest of all inputs of a touch, which do not include names.
 
-    seat : where it is on its target, see anchor.seat
+    seat : where the probe is on its target, see anchor.seat
 
-    The checksum of the target's vertices is dear, so it is kept, and taken anew where they may have changed.
+    The checksum of the target's vertices takes long, so it is kept until they may have changed.
     """
     settings, target = probe.tactile_probe, probe.tactile_probe.target
     inputs = [*seat, touch_arguments(settings)]
@@ -207,9 +217,9 @@ def _extent_of(probe):
 
 
 def measure_shape(settings, depsgraph, reshaped=None):
-    """Keeps the checksum of the target, taken anew where it is one of the `reshaped` objects.
+    """Keeps the checksum of the target, computed anew if the target is one of the `reshaped` objects.
 
-    reshaped : a dict, which gets the checksum of each that is asked for, so that it is taken once
+    reshaped : a dict that gets the checksum of each object that is asked for, so that it is computed once
     """
     target, reshaped = settings.target, {} if reshaped is None else reshaped
     if target is None or (settings.shape.startswith(f"{target.session_uid} ") and target not in reshaped):
@@ -218,7 +228,7 @@ def measure_shape(settings, depsgraph, reshaped=None):
     if checksum is None:
         try:
             checksum = checksum_of(target, depsgraph)
-        except ValueError:  # the touch will say what is wrong
+        except ValueError:  # The touch will say what is wrong.
             checksum = 0
         if target in reshaped:
             reshaped[target] = checksum
@@ -226,5 +236,5 @@ def measure_shape(settings, depsgraph, reshaped=None):
 
 
 def refresh(probe, context):
-    """Touches again at the end of a gesture, with all there is to know."""
+    """Touches again at the end of a gesture, completely."""
     update(probe, context.evaluated_depsgraph_get(), complete=True)

@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of a report as SVG, which needs no renderer: triangles and dots in colors, histograms, a scale."""
+"""The pictures of a report as SVG, without a renderer: colored triangles and dots, histograms, scales."""
 
 import numpy as np
 
 from ..scene.colors import shades
 
-PIXELS = 320  # of a picture, in pixels
-BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # of a histogram
+PIXELS = 320  # The width and height of a picture.
+BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # A histogram has so many bars, this wide and high at most.
 
 
 def triangles(points, corners, colors, marks=()):
-    """Triangles (m, 3) between points (n, 2) in colors (m, 3 or 4) of 0 to 1, and marks (k, 2) on them."""
+    """A picture of triangles (m, 3) between points (n, 2), in colors (m, 3 or 4), with marks (k, 2)."""
     place = _fitted(points)
     shapes = [
         f'<path d="M{_pairs(place(points[three]), "L")}Z" fill="{_hex(color)}" stroke="{_hex(color)}"/>'
@@ -22,7 +22,7 @@ def triangles(points, corners, colors, marks=()):
 
 
 def dots(points, colors):
-    """Dots at points (n, 2), later ones above earlier ones, in colors (n, 3 or 4)."""
+    """A picture of dots at points (n, 2), later ones above earlier ones, in colors (n, 3 or 4)."""
     place, radius = _fitted(points), max(2.0, 0.9 * PIXELS / np.sqrt(max(len(points), 1)))
     return _picture(
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{_hex(color)}"/>'
@@ -31,7 +31,7 @@ def dots(points, colors):
 
 
 def histogram(values, weights, limit, label):
-    """Shares of the weights (n,) by values (n,) to a limit, from 0 where none is less; ends count more."""
+    """A histogram of values (n,) with weights (n,) up to a limit; its end bars count what is beyond, too."""
     low = -limit if np.min(values) < 0.0 else 0.0
     edges = np.linspace(low, limit, BINS + 1)
     shares, _ = np.histogram(np.clip(values, low, limit), edges, weights=weights)
@@ -52,7 +52,7 @@ def histogram(values, weights, limit, label):
 
 
 def scale(limit, label, low=-1.0):
-    """The colors from `low` times the limit to it, with their values."""
+    """A picture of the colors from `low` times the limit to the limit, with their values."""
     fills = shades(np.linspace(low, 1.0, 64), 1.0)
     boxes = [
         f'<rect x="{5 * i}" y="0" width="5.5" height="12" fill="{_hex(f)}"/>' for i, f in enumerate(fills)
@@ -73,7 +73,7 @@ def _picture(shapes):
 
 
 def _fitted(points):
-    """What takes points (n, 2) to the middle of a picture, y upward."""
+    """A function that takes points (n, 2) to the middle of a picture, with y upward."""
     low, high = points.min(axis=0), points.max(axis=0)
     factor = (PIXELS - 10.0) / max((high - low).max(), 1e-300)
     return lambda at: PIXELS / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)

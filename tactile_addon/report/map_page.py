@@ -17,7 +17,7 @@ from . import page, parts, views
 def map_page(painted):
     """The page of a map object."""
     record = painted[patch_record.MAP_RECORD].to_dict()
-    unit = units.unit_of(bpy.context.scene, record["extent"])
+    unit = units.unit_of(bpy.context.scene, record["spacing"])
     sections = [
         page.verdict(map_summary(record), record["patches"] > 0 and not record["in_doubt"]),
         page.section(
@@ -32,7 +32,7 @@ def map_page(painted):
 
 
 def _legend(painted, record, unit):
-    """What the colors mean."""
+    """The legend of the colors."""
     shown = painted.tactile_map_colors
     swatches = "".join(page.swatch(color, words) for words, color in map_object.swatches(painted))
     if shown == "reason":
@@ -49,6 +49,7 @@ def _errors(mesh, record, unit):
     if not known.any():
         return []
     weights, std = np.ones(known.sum()), float(np.median(values(mesh, "height_std")[known]))
+    size = (record["extent"], "extent") if record["extent"] else (record["reach_median"], "median reach")
     words = (
         "Shares of the vertices by the error of the touch nearest to them. The last bar counts all "
         "larger errors."
@@ -57,13 +58,13 @@ def _errors(mesh, record, unit):
         page.section("Errors", parts.spread(errors[known], weights, unit, words)),
         page.section(
             "Tolerance bands",
-            parts.bands(errors[known], weights, std, unit, parts.shares_of(record["extent"], "extent")),
+            parts.bands(errors[known], weights, std, unit, parts.shares_of(*size)),
         ),
     ]
 
 
 def _screen_colors(mesh):
-    """The colors of the vertices as screens have them, (n, 4)."""
+    """The colors of the vertices in sRGB, (n, 4)."""
     attribute = mesh.attributes[map_object.MAP_COLOR]
     rgba = np.empty((len(attribute.data), 4), dtype=np.float32)
     attribute.data.foreach_get("color_srgb", rgba.ravel())

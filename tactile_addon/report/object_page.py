@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page of a whole object: its surface from three sides, and how far off is the mesh that was touched."""
+"""The page of a whole object: its surface from three sides, and how far it is off the mesh."""
 
 from ..scene import patch_record
 from ..scene.colors import shades, symmetric_range
@@ -16,7 +16,7 @@ SCALE_WORDS = {
 
 
 def object_page(obj):
-    """The page of the surface of a whole object; raises ValueError where it was edited."""
+    """The page of a whole object. Raises ValueError if it was edited."""
     patch_record.require_colored(obj)
     record = obj[patch_record.ATLAS_RECORD].to_dict()
     was_touched = "touches" in record

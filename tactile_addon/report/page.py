@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page around the parts of a report: HTML that is whole by itself."""
+"""The page around the parts of a report: HTML in a single file."""
 
 from html import escape
 
@@ -26,7 +26,7 @@ tr {{ border-bottom: 1px solid #ddd; }}
 
 
 def page(title, parts):
-    """The page; its title is plain text, its parts are HTML."""
+    """The page with a title in plain text and parts in HTML."""
     return PAGE.format(title=escape(title), body="\n".join(parts))
 
 
@@ -36,7 +36,7 @@ def section(heading, *parts):
 
 
 def verdict(words, is_good):
-    """A sentence in the color of what is good or in doubt."""
+    """A sentence in the color of good or of doubt."""
     return f'<p class="{"ok" if is_good else "doubt"}">{escape(words)}</p>'
 
 
@@ -46,19 +46,19 @@ def words(text):
 
 
 def swatch(color, text):
-    """A box of a color, parts of 0 to 1, with words beside it."""
+    """A box of a color, whose parts are from 0 to 1, with words beside it."""
     red, green, blue = (round(255.0 * part) for part in color[:3])
     style = f"border-left: 1rem solid rgb({red}, {green}, {blue}); padding-left: .5rem"
     return f'<p style="{style}">{escape(text)}</p>'
 
 
 def figure(picture, caption):
-    """A picture as SVG with a caption in plain text."""
+    """A picture in SVG with a caption in plain text."""
     return f"<figure>{picture}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 def table(rows, header=()):
-    """Rows of plain values, the first of each in bold."""
+    """A table of rows of plain values, with the first value of each in bold."""
     lines = ["".join(f"<th>{escape(name)}</th>" for name in header)] if header else []
     for first, *others in rows:
         cells = "".join(f"<td>{escape(str(value))}</td>" for value in others)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the pages of patches and maps have in common: deviations, tolerance bands, settings, versions."""
+"""What pages have in common: deviations, tolerance bands, settings and versions."""
 
 import platform
 import tomllib
@@ -13,25 +13,26 @@ from ..scene.colors import symmetric_range
 from ..touch import units
 from . import drawing, page
 
-SHARES = (0.005, 0.01, 0.02, 0.05)  # of the radius, or of the extent of a map
-NORMAL_SHARES = ((1.0, 0.68), (2.0, 0.95), (3.0, 0.997))  # and what a normal distribution has within them
+SHARES = (0.005, 0.01, 0.02, 0.05)  # The bands, as shares of the radius of a patch or the extent of a map.
+# Deviations, and a normal distribution's share within.
+NORMAL_SHARES = ((1.0, 0.68), (2.0, 0.95), (3.0, 0.997))
 LEAST_RANGE = 1e-12
 MANIFEST = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
 
 
 def spread(values, weights, unit, caption):
-    """The histogram of lengths (n,)."""
+    """The histogram of lengths (n,) with a caption."""
     limit = symmetric_range(values, LEAST_RANGE)
     return page.figure(drawing.histogram(values, weights, limit, label(1, unit)), caption)
 
 
 def shares_of(length, what):
-    """Names and lengths of bands that are shares of a length."""
+    """The names and lengths of the bands that are shares of a length."""
     return [(f"± {100.0 * share:g} % of the {what}", share * length) for share in SHARES]
 
 
 def bands(values, weights, std, unit, reaches):
-    """How much of the weights (n,) is within named lengths, and within so many standard deviations."""
+    """The shares of the weights (n,) within named lengths, and within one to three standard deviations."""
 
     def row(name, reach, due=""):
         within = weights[np.abs(values) <= reach].sum() / weights.sum()
@@ -50,7 +51,7 @@ def bands(values, weights, std, unit, reaches):
 
 
 def ending(rows, record):
-    """What was found, as rows, and how: the sections at the end of a page."""
+    """The sections at the end of a page: what was found, as rows, and how."""
     return [
         page.section("What was found", page.table(rows)),
         page.section("Settings", page.table(_settings(record))),
@@ -59,7 +60,7 @@ def ending(rows, record):
 
 
 def label(power, unit):
-    """What says a value of length^power."""
+    """A function that gives a value in length^power in words."""
     return lambda value: units.say(value, power, unit) if value else "0"
 
 
@@ -87,14 +88,14 @@ def _versions():
 
 
 def corners(mesh):
-    """The triangles of a mesh that has no other faces, (m, 3)."""
+    """The triangles (m, 3) of a mesh that has no other faces."""
     indices = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", indices)
     return indices.reshape(-1, 3)
 
 
 def vertex_areas(points, triangles):
-    """A third of the area of the triangles (m, 3) at each of points (n, 3), (n,)."""
+    """A third of the area (n,) of the triangles (m, 3) at each of points (n, 3)."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     thirds = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
     return np.bincount(triangles.ravel(), np.repeat(thirds, 3), len(points))

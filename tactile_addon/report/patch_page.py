@@ -22,7 +22,7 @@ SHOWN = (
 
 
 class Deviations(NamedTuple):
-    """Lengths (n,), signed; their weights (n,); and what they are of, in words."""
+    """Signed lengths (n,), their weights (n,), and words for what was measured."""
 
     lengths: np.ndarray
     weights: np.ndarray
@@ -30,7 +30,7 @@ class Deviations(NamedTuple):
 
 
 def patch_page(patch):
-    """The page of a patch object. Raises ValueError, with a sentence, where it was edited."""
+    """The page of a patch object. Raises ValueError, with a sentence, if it was edited."""
     r, record = patch_record.reconstruction_of(patch), patch[patch_record.RECORD].to_dict()
     unit = units.unit_of(bpy.context.scene, r.radius)
     off = _deviations(patch, r, record)
@@ -48,7 +48,7 @@ def patch_page(patch):
 
 def _pictures(patch, r, record, unit):
     points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
-    contacts = r.contacts[:, :2] * record["radius"] / r.radius  # as the object's mesh has them
+    contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
         shown = values(patch.data, attribute)
         limit = symmetric_range(shown, parts.LEAST_RANGE)

@@ -7,8 +7,8 @@ import numpy as np
 from ..scene.mesh_data import values
 from . import drawing, page
 
-MOST_DOTS = 4000  # in a picture
-DARKEST = 0.45  # of its color, that a dot has where the surface turns away
+MOST_DOTS = 4000  # A picture has at most so many dots.
+DARKEST = 0.45  # Where the surface turns away, a dot is this bright.
 # Words, the axes to the right and up, the axis of sight and its sign toward the viewer.
 VIEWS = (
     ("from the front", (0, 2), 1, -1.0),
@@ -18,7 +18,7 @@ VIEWS = (
 
 
 def three_sides(mesh, colors):
-    """Figures of the vertices that face the viewer, nearest last, in colors (n, 3 or 4) of screens."""
+    """Three figures of the vertices that face the viewer, nearest last, in sRGB colors (n, 3 or 4)."""
     points = values(mesh, "position")
     normals = np.empty_like(points, dtype=np.float32)
     mesh.vertices.foreach_get("normal", normals.ravel())
@@ -28,5 +28,6 @@ def three_sides(mesh, colors):
         facing = mixed[toward[mixed] > 0.0][:MOST_DOTS]
         order = facing[np.argsort(sign * points[facing, sight])]
         if len(order):
-            light = DARKEST + (1.0 - DARKEST) * toward[order, None]  # else a shape in pale colors is unseen
+            # Shading shows the shape where colors are pale.
+            light = DARKEST + (1.0 - DARKEST) * toward[order, None]
             yield page.figure(drawing.dots(points[order][:, axes], light * colors[order]), words)

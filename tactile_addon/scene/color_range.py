@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The range of a patch's colors where it is given, by hand or as that of several patches."""
+"""The range of a patch's colors when it is given, by hand or as the common range of several patches."""
 
 import bpy
 from bpy.props import FloatProperty
@@ -11,14 +11,14 @@ from .patch_record import POWERS, RANGE, RECORD, report_of, require_whole
 
 
 def unit_of_range(patch, scene):
-    """The power of length of what a patch shows, and the unit its legend has."""
+    """The power of length in the quantity that a patch shows, and the unit of its legend."""
     report = report_of(patch)
     unit = ("", 1.0) if report is None else units.unit_of(scene, report["radius"])
     return POWERS[patch.tactile_colors], unit
 
 
 def share(patch, patches):
-    """Gives all `patches` that show what `patch` shows the largest of their own ranges; returns how many."""
+    """Gives all `patches` that show what `patch` shows the largest of their ranges; returns how many."""
     same = [other for other in patches if other.tactile_colors == patch.tactile_colors and _is_whole(other)]
     for other in same:
         set_range(other, 0.0)
@@ -29,7 +29,7 @@ def share(patch, patches):
 
 
 def set_range(patch, limit):
-    """Gives the colors of a patch this range, in units of the world; 0 chooses it by the values."""
+    """Gives the colors of a patch this range, in units of the world; with 0 the values choose it."""
     patch[RANGE] = limit
     if limit <= 0.0:
         del patch[RANGE]
@@ -65,7 +65,7 @@ def register():
         "chooses it by the values",
         min=0.0,
         precision=4,
-        step=0.1,  # small beside what is common in a unit that suits the patch
+        step=0.1,  # It is small beside usual values in a unit that suits the patch.
         get=_get,
         set=_set,
     )

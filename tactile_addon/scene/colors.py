@@ -13,7 +13,7 @@ COLOR_STOPS = np.array([
 
 def symmetric_range(values, floor):
     """The r of a scale -r..r: the 98th percentile of |values|, so a few wild ones do not bleach the rest."""
-    sizes, at = np.abs(values), 0.98 * (len(values) - 1)  # np.percentile takes five times as long
+    sizes, at = np.abs(values), 0.98 * (len(values) - 1)  # np.percentile would take five times as long.
     before = int(at)
     sizes.partition([before, min(before + 1, len(sizes) - 1)])
     one, other = sizes[before], sizes[min(before + 1, len(sizes) - 1)]
@@ -21,7 +21,7 @@ def symmetric_range(values, floor):
 
 
 def shades(values, limit):
-    """RGBA (n, 4), as screens have it (sRGB), of values (n,) on a scale from -limit to limit."""
+    """The colors of values (n,) on a scale from -limit to limit, as sRGB with alpha, (n, 4)."""
     at = np.clip(np.asarray(values) / limit, -1.0, 1.0)
     srgb = np.column_stack(
         [np.interp(at, np.linspace(-1.0, 1.0, len(COLOR_STOPS)), stop) for stop in COLOR_STOPS.T]
@@ -30,12 +30,12 @@ def shades(values, limit):
 
 
 def diverging(values, limit):
-    """The colors as linear RGBA, as Blender stores them."""
+    """The same colors as linear RGBA, as Blender stores them."""
     return linear(shades(values, limit))
 
 
 def linear(rgba):
-    """Linear RGBA of sRGB (n, 4)."""
+    """The linear RGBA of colors in sRGB, (n, 4)."""
     rgba = np.array(rgba)
     srgb = rgba[:, :3]
     rgba[:, :3] = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The contours as a mesh, tubes and contacts; the contacts of strokes; and the rim of the patch."""
+"""A mesh that shows contours as tubes, contacts (those of strokes, too), and the rim of the patch."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -9,17 +9,17 @@ import numpy as np
 
 from .mesh_data import fill, write
 
-RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # points around a patch, and how thick its rim is beside a contour
-CONTACT = 3.6  # how far the tips of a contact are from it, beside the thickness of a contour
+RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # The rim has so many points and this share of a contour's thickness.
+CONTACT = 3.6  # The tips of a contact are so many times a contour's thickness away from it.
 CONTACT_TIPS = np.vstack([np.eye(3), -np.eye(3)])
 FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
-SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # of a square tube
+SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # The corners of a square tube.
 
 
 class _Form(NamedTuple):
-    """What is alike in all such meshes of so many contacts.
+    """What all meshes with the same numbers of contacts have in common.
 
-    before, after : of each point of a path, in the row of all paths, those that its tube runs between
+    before, after : for each point of all paths, the indices of the points between which its tube runs
     """
 
     before: np.ndarray
@@ -32,9 +32,9 @@ class _Form(NamedTuple):
 def fill_contours(mesh, touched):
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
-    Point attributes tell them apart: `contour` counts the contours and is -1 for strokes and the rim,
-    `contact` the contacts along one, and is -1 on the tubes and the rim. They show what the
-    patch keeps in its reconstruction.
+    Point attributes tell them apart: `contour` is the number of the contour, and -1 for strokes and the rim;
+    `contact` is the number of the contact along it, and -1 on tubes and the rim. All of this only shows what
+    the patch keeps in its reconstruction.
     """
     result = touched.result
     frame, thickness = result.frame, 0.009 * result.radius
@@ -43,7 +43,7 @@ def fill_contours(mesh, touched):
         _across(path) if contour.plane_normal is None else frame.axes.T @ contour.plane_normal
         for path, contour in zip(contours, result.contours, strict=True)
     ]
-    paths = [*contours, _rim(result)]  # the rim tells a flat patch from a flat face below it
+    paths = [*contours, _rim(result)]  # The rim sets a flat patch off from a flat face below it.
     form = _form(tuple(len(path) for path in paths), len(strokes))
     lengths = [len(path) for path in paths]
     sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM_THICKNESS]), lengths)
@@ -60,7 +60,7 @@ def fill_contours(mesh, touched):
 
 
 def _has_form(mesh, form):
-    """Whether the mesh is one of contours with as many contacts: then only its points change."""
+    """Whether the mesh shows contours with as many contacts, so that only its points have to change."""
     contact = mesh.attributes.get("contact")
     if contact is None or (contact.data_type, contact.domain) != ("INT", "POINT"):
         return False
@@ -72,14 +72,14 @@ def _has_form(mesh, form):
 
 
 def _rim(result):
-    """The closed path (n, 3) around a patch, in its frame."""
+    """The closed path (n, 3) around a patch, in its Darboux frame."""
     edge = result.domain.boundary(RIM_CORNERS)
     edge = np.vstack([edge, edge[:1]])
     return np.column_stack([edge, result.height(*edge.T)])
 
 
 def _across(path):
-    """A direction in the tangent plane across a path (n, 3) that is in no plane."""
+    """A direction in the tangent plane across a path (n, 3), for a contour without a sampling plane."""
     x, y, _ = path[-1] - path[0]
     return np.array([-y, x, 0.0]) / max(np.hypot(x, y), 1e-30)
 
@@ -95,7 +95,7 @@ def _tubes(paths, across, sizes, form):
 
 @lru_cache(maxsize=8)
 def _form(lengths, strokes):
-    """Form of the mesh of contours with so many contacts each, a rim, which is the last, and strokes."""
+    """The form of a mesh of paths with these lengths, the rim being the last, and of so many strokes."""
     paths = [slice(end - n, end) for n, end in zip(lengths, np.cumsum(lengths), strict=True)]
     at, felt = np.arange(sum(lengths)), lengths[:-1]
     before, after, quads = at - 1, at + 1, []

@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Children of objects: Blender looks through all objects for those of one, here through all once for many."""
+"""The children of objects. Blender looks through all objects for those of one; this looks once for many."""
 
 from contextlib import contextmanager
 
 import bpy
 
-_remembered = None  # within `remembered`, the children by their parents; empty before anybody has asked
+_remembered = None  # Within `remembered`, the children by their parents; empty until somebody asks.
 
 
 def children_of(obj):
-    """A list of the children of an object."""
+    """The list of an object's children."""
     if _remembered is None:
         return list(obj.children)
     if not _remembered:
@@ -21,14 +21,14 @@ def children_of(obj):
 
 
 def add(child):
-    """Notes a new object that has got a parent, or may have."""
+    """Notes a new object that has a parent or may have one."""
     if _remembered and child.parent is not None:
         _remembered.setdefault(child.parent, []).append(child)
 
 
 @contextmanager
 def remembered():
-    """Who is whose child is looked up once; no object may be deleted meanwhile."""
+    """Within this context, children are looked up once; no object may be deleted meanwhile."""
     global _remembered
     outer = _remembered
     _remembered = {} if outer is None else outer

@@ -19,7 +19,7 @@ ATTRIBUTE_KEYS = {
 def fill(mesh, points, triangles, attributes):
     """Gives `mesh` points (n, 3), triangles (m, 3) and point attributes (name, Blender's type, values).
 
-    Where it has these triangles already, only coordinates and values are written.
+    If it has these triangles already, only coordinates and values are written.
     """
     if not _has_triangles(mesh, len(points), triangles):
         mesh.clear_geometry()
@@ -35,8 +35,8 @@ def fill(mesh, points, triangles, attributes):
 
 
 def write(mesh, name, kind, values):
-    """Writes a point attribute; one of that name that is of another kind makes room."""
-    # No reference to an attribute may outlive the next `new`, which moves them all.
+    """Writes a point attribute, and replaces one of this name and another kind."""
+    # References to attributes must not outlive the next `new`, which moves all of them.
     attribute = mesh.attributes.get(name)
     if attribute is not None and (attribute.data_type, attribute.domain) != (kind, "POINT"):
         mesh.attributes.remove(attribute)
@@ -46,7 +46,7 @@ def write(mesh, name, kind, values):
 
 
 def values(mesh, name):
-    """Values of a point attribute, (n,) or (n, 3)."""
+    """The values of a point attribute, (n,) or (n, 3)."""
     attribute = mesh.attributes[name]
     key = ATTRIBUTE_KEYS[attribute.data_type]
     values = np.empty((len(attribute.data), 3) if key == "vector" else len(attribute.data))
@@ -55,7 +55,7 @@ def values(mesh, name):
 
 
 def own_mesh(obj):
-    """A linked copy, or the override of a library's object, shows something of its own from now on."""
+    """Gives an object a mesh of its own, if it is a linked copy or the override of a library's object."""
     shared = obj.data
     if shared.users > 1 or not shared.is_editable:
         obj.data = shared.copy()
@@ -71,11 +71,11 @@ def _has_triangles(mesh, count, triangles):
 
 
 def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0)):
-    """The material of that name, made where missing: a color attribute or one color, shown as it is."""
+    """The material of this name, made if missing, which shows a color attribute or one color as it is."""
     material = bpy.data.materials.get(name)
     if material is None:
         material = bpy.data.materials.new(name)
-        if material.node_tree is None:  # in Blender 4.5; later ones have it, and deprecate the switch
+        if material.node_tree is None:  # Blender 4.5 needs this; later ones deprecate it.
             material.use_nodes = True
         material.diffuse_color = color
         nodes, links = material.node_tree.nodes, material.node_tree.links

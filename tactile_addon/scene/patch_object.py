@@ -33,14 +33,14 @@ from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
-NORMAL, PLACE = "custom_normal", "domain_place"  # attributes: as shaded; on the unit disk, see core.Domain
-WHITE_RANGE = 1e-3  # Least range of the colors, in unit radius, so that a plane is white.
+NORMAL, PLACE = "custom_normal", "domain_place"  # Attributes: normals for shading; places on the unit disk.
+WHITE_RANGE = 1e-3  # The range of colors is no smaller, in unit radius, so that a plane is white.
 
 
 def insert(scene, touched, parent=None, lines=None):
-    """Adds the patch and its contours to `scene`, in a collection of their own; returns the patch object.
+    """Adds a patch and its contours to `scene`, in a collection of their own, and returns the patch object.
 
-    lines : contours that have lost their patch, to be those of this one
+    lines : an object of contours that has lost its patch, to be used for this one
     """
     name = touched.report["source"]
     patch = _new(scene, f"{name} Patch", emission("Tactile Curvature", attribute=COLOR))
@@ -55,7 +55,7 @@ def insert(scene, touched, parent=None, lines=None):
 
 def _new(scene, name, material):
     obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
-    obj.show_in_front = True  # it lies in the surface it describes
+    obj.show_in_front = True  # It would lie in the surface it describes.
     collection(scene).objects.link(obj)
     obj.data.materials.append(material)
     note_added(obj)
@@ -63,7 +63,7 @@ def _new(scene, name, material):
 
 
 def remove_objects(objects):
-    """Deletes objects, with what nobody else uses of them."""
+    """Deletes objects, with those of their meshes and materials that nothing else uses."""
     meshes = [obj.data for obj in objects if obj.data is not None]
     for obj in objects:
         bpy.data.objects.remove(obj)
@@ -71,7 +71,7 @@ def remove_objects(objects):
 
 
 def remove_meshes(meshes):
-    """Deletes the meshes that nobody uses, and those of their materials that nobody uses then."""
+    """Deletes the meshes that nothing uses, and those of their materials that nothing uses then."""
     meshes = [mesh for mesh in meshes if not mesh.users]
     materials = {material for mesh in meshes for material in mesh.materials if material is not None}
     bpy.data.batch_remove(meshes)
@@ -79,7 +79,7 @@ def remove_meshes(meshes):
 
 
 def rewrite(patch, touched):
-    """Makes the patch, and its contours where they are still there, those of another touch, in place."""
+    """Changes the patch, and its contours if they are still there, to those of another touch, in place."""
     lines = contours_of(patch)
     for obj in filter(None, (patch, lines)):
         own_mesh(obj)
@@ -102,27 +102,29 @@ def rewrite(patch, touched):
 
 
 def meshes(patch):
-    """Meshes of a patch object and of its contours; none for no patch."""
+    """The meshes of a patch object and of its contours; an empty list if `patch` is None."""
     objects = [] if patch is None else [patch, contours_of(patch)]
     return [obj.data for obj in objects if obj is not None]
 
 
 def recolor(patch):
-    """Colors a patch or whole object by what it is set to show, and keeps their range in its record."""
+    """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record."""
     own_mesh(patch)
     shown, mesh = patch.tactile_colors, patch.data
     shades, record = values(mesh, shown), patch[RECORD if RECORD in patch else ATLAS_RECORD]
     floor = WHITE_RANGE * record["radius"] ** POWERS[shown]
     limit = patch.get(RANGE) or colors.symmetric_range(shades, floor)
     mesh.attributes[COLOR].data.foreach_set("color", colors.diverging(shades, limit).ravel())
-    mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
+    if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
+        mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
 
 
 def collection(scene):
-    """The collection of the patches of a scene, made where there is none."""
-    # In a second scene of the file it is "Tactile Patches.001". A library's, or its override, takes no more.
+    """The collection of a scene's patches, made if there is none."""
+    # In the file's second scene it is "Tactile Patches.001". That of a library, or its override, cannot be
+    # used.
     named = (
         c
         for c in scene.collection.children_recursive
@@ -137,7 +139,7 @@ def collection(scene):
 
 
 def _fill_patch(obj, touched):
-    """The patch in the Darboux frame, with its attributes; deviations are 0 until the touch is verified."""
+    """Fills the mesh with the patch in its Darboux frame; deviations are 0 until the patch is verified."""
     result, frame, mesh = touched.result, touched.result.frame, obj.data
     points, triangles = result.mesh()
     d = result.geometry.derivatives(*points[:, :2].T)
@@ -157,9 +159,9 @@ def _fill_patch(obj, touched):
 
 
 def _follow(obj, touched):
-    """Moves the vertices that are there, each at its place in the domain, to the patch of another touch.
+    """Moves the vertices to the patch of another touch, each at its place in the domain.
 
-    Only the values that the colors show are brought up to date: a gesture shows no others.
+    Only the values that the colors show are brought up to date, because a gesture shows no others.
     """
     result, mesh = touched.result, obj.data
     plane = result.domain.points_at(values(mesh, PLACE)[:, :2])
@@ -172,5 +174,5 @@ def _follow(obj, touched):
 
 
 def _shown(name, result, points):
-    """What the colors can show at points (n, 3) of a surface, (n,); curvatures are those of (1)."""
+    """The values (n,) of the quantity `name` at points (n, 3) of a surface; curvatures are those of (1)."""
     return getattr(result if name == "height_std" else result.patch, name)(*points[:, :2].T)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a patch object keeps: its report, its reconstruction in double precision, and where it was touched."""
+"""What a patch object keeps: the report, the reconstruction in double precision, and where it was touched."""
 
 import json
 
@@ -10,16 +10,17 @@ from mathutils import Matrix
 from ... import core
 from .family import children_of
 
-RECORD = "tactile"  # the patch object's custom property that holds the report,
-RECONSTRUCTION = "tactile_reconstruction"  # and the one with core.to_dict as JSON, once a gesture has ended
-VERDICT = "tactile_verdict"  # and the one with its status and message while these say that it is outdated
+# Custom properties of objects.
+RECORD = "tactile"  # The report of a patch.
+RECONSTRUCTION = "tactile_reconstruction"  # Its core.to_dict as JSON, once a gesture has ended.
+VERDICT = "tactile_verdict"  # Its status and message, while the report says that it is outdated.
 COLOR = "curvature_color"
-RANGE = "tactile_color_range"  # the one with the range of its colors, where that is given
-MAP_RECORD = "tactile_map"  # The custom property of a painted copy that holds the report of a stability map.
-ATLAS_RECORD = "tactile_object"  # The one of a whole object that holds the report of its touches.
-GRAPH = "tactile_graph"  # and the one with its patches and their boundaries, core.Atlas.to_dict as JSON
-CONTOURS = "tactile_contours"  # the one that tells contours from other children of a patch
-# What the colors can show: attribute, name, description, and the power of length it is measured in.
+RANGE = "tactile_color_range"  # The range of its colors, if that is given.
+MAP_RECORD = "tactile_map"  # The report of a stability map.
+ATLAS_RECORD = "tactile_object"  # The report of a whole object.
+GRAPH = "tactile_graph"  # The graph of a whole object, core.Atlas.to_dict as JSON.
+CONTOURS = "tactile_contours"  # It tells contours from other children of a patch.
+# What the colors can show: attribute, name, description, and the power of length in its unit.
 QUANTITIES = [
     ("gaussian_curvature", "Gaussian Curvature", "K: red on domes and bowls, blue on saddles", -2),
     ("mean_curvature", "Mean Curvature", "H: blue where the surface bulges outward, red where inward", -1),
@@ -34,13 +35,13 @@ QUANTITIES = [
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
 ]
 POWERS = {name: power for name, _, _, power in QUANTITIES}
-# These need no mesh.
+# These need no mesh to compare with.
 QUANTITIES_OF_A_FIT = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness", "height_std")
-POSITIVE = ("curvedness", "height_std")  # never below zero: half a scale says it all
+POSITIVE = ("curvedness", "height_std")  # These are never below zero, so they need half a scale.
 
 
 def report_of(patch):
-    """The report of a patch object; None where somebody has made something else of it."""
+    """The report of a patch object, or None if somebody has made something else of it."""
     report = patch.get(RECORD)
     try:
         frame = np.array([report["frame"][name] for name in ("origin", "d1", "d2", "normal")], dtype=float)
@@ -54,7 +55,7 @@ def report_of(patch):
 
 
 def extent_of(patch):
-    """The extent in its report, which needs not be whole; 0 where there is none."""
+    """The extent in the report of a patch, which need not be complete; 0 if there is none."""
     try:
         extent = patch[RECORD]["extent"]
     except (KeyError, TypeError):
@@ -63,25 +64,25 @@ def extent_of(patch):
 
 
 def require_whole(patch):
-    """Raises ValueError where the patch object has been edited into what is none."""
+    """Raises ValueError if the patch object was edited such that it is no patch any more."""
     if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
         raise ValueError(f'"{patch.name}" was edited and is no longer a complete patch: touch again')
 
 
 def is_colored(obj):
-    """Whether it is a patch or a whole object that can show its colors, as nobody has edited it."""
+    """Whether an object is a patch or a whole object that nobody has edited, so that it can show colors."""
     is_one = ATLAS_RECORD in obj or (RECORD in obj and report_of(obj) is not None)
     return is_one and obj.type == "MESH" and _is_whole(obj.data)
 
 
 def require_colored(obj):
-    """Raises ValueError where the whole object has been edited into what is none."""
+    """Raises ValueError if the whole object was edited such that it cannot show its colors."""
     if not is_colored(obj):
         raise ValueError(f'"{obj.name}" was edited and is no longer a complete surface: touch all over again')
 
 
 def touched_record(obj):
-    """The report of touches all over an object, a map's or a whole one's; None for all else."""
+    """The report of a stability map or a whole object, or None for any other object."""
     return None if obj is None else obj.get(MAP_RECORD) or obj.get(ATLAS_RECORD)
 
 
@@ -95,12 +96,12 @@ def _is_whole(mesh):
 
 
 def mark_failed(patch, why):
-    """Has the record say that the patch is from an earlier touch, because the last one failed."""
+    """Lets the record say that the patch is from an earlier touch, because the last one failed."""
     _outdate(patch, {"message": f"This patch is from an earlier touch, because the last one failed. {why}"})
 
 
 def mark_stale(patch):
-    """Has the record say that the patch is from an earlier touch, and that nothing was felt since."""
+    """Lets the record say that the patch is from an earlier touch, and that nothing was felt since."""
     _outdate(
         patch,
         {
@@ -120,7 +121,7 @@ def _outdate(patch, verdict):
 
 
 def mark_current(patch):
-    """Has the record say again what it said before: the patch is what its probe asks for."""
+    """Lets the record say again what it said before, because the patch is what its probe asks for."""
     verdict = patch.pop(VERDICT, None)
     if verdict is not None and report_of(patch) is not None:
         patch[RECORD].update(verdict)
@@ -129,8 +130,8 @@ def mark_current(patch):
 def reconstruction_of(patch):
     """The core.Reconstruction of a patch object, in the world, where the object is now.
 
-    Unmoved it is what was fitted, to the last bit. Raises ValueError while a gesture goes on, where what the
-    object keeps was edited, and where it is no longer of its shape.
+    If the object was not moved, it is what was fitted, to the last bit. Raises ValueError during a gesture,
+    if the object's properties were edited, and if it no longer has its shape.
     """
     require_whole(patch)
     if RECONSTRUCTION not in patch:
@@ -139,7 +140,7 @@ def reconstruction_of(patch):
         r = core.from_dict(json.loads(patch[RECONSTRUCTION]))
     except (TypeError, ValueError, RecursionError) as error:
         raise ValueError(f'"{patch.name}" can no longer be read: touch again ({error})') from error
-    if is_at(patch, r.frame.axes, r.frame.origin):  # where it is, that is in double precision
+    if is_at(patch, r.frame.axes, r.frame.origin):  # It was not moved, so double precision is kept.
         return r
     placed = np.array(patch.matrix_world, dtype=float)
     try:
@@ -152,15 +153,15 @@ def reconstruction_of(patch):
 
 
 def place(obj, matrix):
-    """Puts an object at a matrix of the world, so that it stays there if its parent is deleted."""
+    """Puts an object at a matrix of the world, such that it stays there if its parent is deleted."""
     if obj.parent is not None:
         obj.matrix_parent_inverse = obj.parent.matrix_world.inverted_safe()
-    obj.matrix_world = matrix  # known before the next evaluation
+    obj.matrix_world = matrix  # This makes it known before the next evaluation.
     obj.matrix_basis = matrix
 
 
 def hold(patch):
-    """Puts the patch back where it was touched, if its probe has moved on or anybody has moved it.
+    """Puts the patch back where it was touched, if its probe or somebody has moved it.
 
     A patch that constraints or an animation would move again stays where it is.
     """
@@ -173,7 +174,7 @@ def hold(patch):
 
 
 def _place_contours(lines):
-    """Puts contours where their patch is, in whose coordinates they are."""
+    """Puts contours where their patch is, because they are in its coordinates."""
     if lines is None or lines.constraints or lines.animation_data:
         return
     if lines.matrix_basis != Matrix() or lines.matrix_parent_inverse != Matrix():
@@ -181,13 +182,13 @@ def _place_contours(lines):
 
 
 def touched_frame(patch):
-    """Where the patch was touched: axes as columns, and origin."""
+    """The frame in which the patch was touched: axes as columns, and origin."""
     frame = patch[RECORD]["frame"]
     return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
 
 
 def move_record(patch, axes, origin):
-    """Has the record say that the patch was touched at another place, where it is no longer at that one."""
+    """Lets the record say that the patch was touched at this frame, unless it says so already."""
     report, (before, at) = patch[RECORD], touched_frame(patch)
     if np.array_equal(axes, before) and np.array_equal(origin, at):
         return
@@ -202,7 +203,7 @@ def move_record(patch, axes, origin):
 
 
 def is_at(patch, axes, origin):
-    """Whether the patch object is at a frame of the world, but for rounding."""
+    """Whether the patch object is at a frame of the world, except for rounding."""
     near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
     return np.allclose(patch.matrix_world, matrix_of(axes, origin), **near)
 

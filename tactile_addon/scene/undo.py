@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What handlers and timers add to the scene after an undo step was stored, and that is in no step.
+"""What handlers and timers have added to the scene after an undo step was stored, so that no step has it.
 
-Undo keeps in memory each datablock that two steps have in common, with its pointers, and frees what is
-not in the step that it goes to. A collection that holds a patch made by a handler would then point to
-freed memory. So all of that is unlinked before undo, and linked again afterward if it is still there.
+Undo keeps each datablock that two steps have in common, with its pointers, and frees what is not in the step
+that it goes to. A collection that holds a patch made by a handler would then point to freed memory. So all
+that was added is unlinked before undo, and linked again afterward if it is still there.
 """
 
 from contextlib import contextmanager
@@ -12,14 +12,14 @@ from contextlib import contextmanager
 import bpy
 
 _is_late = False
-_added = set()  # session_uids of objects and collections that were added
-_replaced = {}  # session_uids of meshes, by those of the copies that have taken their place
-_links = []  # what was taken out: a function that puts it back, and session_uids
+_added = set()  # The session_uids of objects and collections that were added.
+_replaced = {}  # The session_uids of meshes, by those of the copies that have taken their places.
+_links = []  # Links that were taken out: a function that puts one back, and session_uids.
 
 
 @contextmanager
 def after_step():
-    """What is added within may be in no step of undo."""
+    """Within this context, what is added may be in no undo step."""
     global _is_late
     outer, _is_late = _is_late, True
     try:
@@ -29,19 +29,19 @@ def after_step():
 
 
 def note_added(datablock):
-    """Notes a new object or collection that is linked to what was there before."""
+    """Notes a new object or collection that is linked to something that was there before."""
     if _is_late:
         _added.add(datablock.session_uid)
 
 
 def note_copied(obj, mesh):
-    """Notes an object that got a copy of `mesh` in its place."""
+    """Notes an object that got a copy of `mesh` instead of it."""
     if _is_late:
         _replaced[obj.data.session_uid] = mesh.session_uid
 
 
 def take_out():
-    """Unlinks what was added; to be called before undo and redo."""
+    """Unlinks what was added. It must be called before undo and redo."""
     _links.clear()
     if not (_added or _replaced):
         return
@@ -70,7 +70,7 @@ def _give_back_meshes():
 
 
 def put_back():
-    """Links again what is still there; to be called after undo and redo, and in another file."""
+    """Links again what is still there. It must be called after undo and redo, and in another file."""
     for function, *numbers in reversed(_links):
         function(*numbers)
     _links.clear()
@@ -111,6 +111,6 @@ def _found(datablocks, number):
 
 
 def _collections():
-    """All collections by their session_uids, and each scene's own by that of the scene."""
+    """All collections by their session_uids, and the scenes' own collections by those of the scenes."""
     found = {collection.session_uid: collection for collection in bpy.data.collections}
     return found | {scene.session_uid: scene.collection for scene in bpy.data.scenes}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether viewports show the colors of vertices, making them do so, and whether anything is dragged."""
+"""Whether viewports show the colors of vertices, how to make them do so, and whether anything is dragged."""
 
 import bpy
 
@@ -14,16 +14,16 @@ def shows_colors(space):
 
 
 def has_gesture():
-    """Whether something is being dragged in some window: it keeps pointers to what it drags."""
+    """Whether something is being dragged in any window, which then keeps pointers to it."""
     windows = bpy.context.window_manager.windows
     names = [operator.bl_idname for window in windows for operator in window.modal_operators]
     return any(name.startswith(GESTURES) or "_move" in name for name in names)
 
 
 def show_colors(chosen=None):
-    """Has a viewport draw the colors of vertices in Solid shading, and all others that nobody has set.
+    """Makes a viewport, and all that nobody has set otherwise, draw the colors of vertices in Solid shading.
 
-    A file that is made without a window has viewports too, in which it is opened.
+    A file that is made without a window also has viewports, in which it will be opened.
     """
     areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
     for shading in (area.spaces.active.shading for area in areas):

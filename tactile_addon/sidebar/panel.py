@@ -65,7 +65,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         layout.prop(settings, "target")
         record = probe.record_of(found)
         chosen = found_values(record, context.scene)
-        fields = {}  # The override of a library's probe keeps numbers, not ways to show them.
+        fields = {}  # The override of a library's probe keeps numbers, but not the properties that show them.
         if found.override_library is None:
             fields = number_fields.fields(_size_of(settings.target, record))
         draw_chosen(layout, settings, "extent", chosen, fields)
@@ -122,14 +122,14 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             return
         unit = units.unit_of(context.scene, record["radius"])
         is_outdated = record["status"] == "outdated"
-        if not (is_outdated and failed):  # what has failed stands above already
+        if not (is_outdated and failed):  # The failure stands above already.
             draw_sentence(context, layout, verdict(record, unit), ICONS.get(record["status"], "ERROR"))
         if is_outdated and found is not None:
             layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_range(layout, patch)
         _draw_shown(layout, found, patch)
-        if is_outdated:  # of these numbers
+        if is_outdated:  # These numbers are outdated.
             layout.label(text="Last Touch")
         draw_rows(context, layout, main_rows(record, unit), active=not is_outdated)
         _draw_details(context, layout, record, unit)
@@ -151,7 +151,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         record = obj[patch_record.ATLAS_RECORD]
-        if "touches" in record:  # measured contacts have no mesh to touch
+        if "touches" in record:  # Measured contacts have no mesh to touch.
             row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")
             row.new = True
         draw_sentence(context, layout, record["message"], ICONS.get(record["status"], "ERROR"))
@@ -179,7 +179,7 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
 
 
 def _draw_details(context, layout, record, unit):
-    """What the fit says of itself, and all other numbers, folded away."""
+    """Draws what the fit says of itself, and all other numbers, folded away."""
     header, body = layout.panel("TACTILE_PT_why", default_closed=True)
     header.label(text="Reasons")
     if body:
@@ -191,14 +191,14 @@ def _draw_details(context, layout, record, unit):
 
 
 def _draw_colors(context, layout, obj, name):
-    """What the colors show, and a button where the viewport does not show them."""
+    """Draws what the colors show, and a button if the viewport does not show them."""
     layout.prop(obj, name)
     if not shows_colors(context.space_data):
         layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
 
 
 def _draw_range(layout, patch):
-    """Where the colors end, and a button for one range on all patches."""
+    """Draws where the colors end, and a button for one range on all patches."""
     row = layout.row(align=True)
     row.use_property_split = False
     row.prop(patch, "tactile_range", text="Range" if patch_record.RANGE in patch else "Range (Auto)")
@@ -206,7 +206,7 @@ def _draw_range(layout, patch):
 
 
 def _draw_shown(layout, found, patch):
-    """What is drawn with a patch, and may hide it."""
+    """Draws the switches of what is shown with a patch and may hide it."""
     lines = patch_record.contours_of(patch)
     row = layout.row(align=True)
     row.use_property_split = False
@@ -217,7 +217,7 @@ def _draw_shown(layout, found, patch):
 
 
 def _draw_comparison(context, layout, record, unit):
-    """Where the patch was put on a mesh, and how far it is off one, as far as either is known."""
+    """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
     if "registration" in record:
         draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")
     if "verification" not in record:

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The numbers that the sidebar says of a patch: those that matter, and all others."""
+"""The numbers that the sidebar shows of a patch: those that matter most, and all others."""
 
 from ..touch import units
 
 FLAT_DEVIATIONS = 2.0  # A curvature within so many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
-ZERO = 1e-6  # of a number in unit radius
+ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
 
 
 def main_rows(record, unit):
@@ -24,7 +24,7 @@ def main_rows(record, unit):
 
 
 def other_rows(record, unit):
-    """(label, value) of the rest."""
+    """(label, value) of everything else."""
     rows = [
         *_radii(record, unit),
         ("K Gaussian", _measured(record, "gaussian_curvature", -2, unit)),
@@ -52,7 +52,7 @@ def plane_rows(record, unit):
 
 
 def found_values(record, scene):
-    """What the last touch had in the place of numbers that are left to the surface, in words by name."""
+    """The values that the last touch chose for numbers left to the surface, in words and by name."""
     if record is None or record["status"] == "outdated" or "step" not in record:
         return {}
     unit = units.unit_of(scene, record["radius"])
@@ -69,12 +69,12 @@ def _measured(record, key, power, unit):
 
 
 def _value(record, key, power):
-    # What is left of nothing in single precision is none.
+    # In single precision a little is left of 0.
     return record[key] if abs(record[key]) > ZERO * record["radius"] ** power else 0.0
 
 
 def _radii(record, unit):
-    """Rows of the radii 1 / kappa, with their deviations, as far as the curvatures are known not to be 0."""
+    """Rows of the radii 1 / kappa, with their deviations, if the curvatures are known not to be 0."""
     for number in (1, 2):
         k, std = record[f"k{number}"], record[f"k{number}_std"]
         if abs(k) > FLAT_DEVIATIONS * std and abs(k) * record["radius"] > FLATTEST:

@@ -50,7 +50,7 @@ MENUS = (("VIEW3D_MT_object", _draw_in_object), ("VIEW3D_MT_mesh_add", _draw_in_
 
 
 def manual_map():
-    """The pages that come with the extension, one per section, for Online Manual in context menus."""
+    """The extension's manual pages, one for each section, for Online Manual in context menus."""
     folder = Path(__file__).resolve().parents[2] / "manual"
     pages = {
         "bpy.ops.tactile.pick": "the-first-patch.html",
@@ -67,7 +67,7 @@ def manual_map():
 
 
 def _move_tab(preferences, context):
-    """Panels learn their tab when they are registered."""
+    """Registers the panels again, because they learn their tab only then."""
     for panel in PANELS:
         bpy.utils.unregister_class(panel)
         panel.bl_category = preferences.tab or TAB
@@ -75,7 +75,7 @@ def _move_tab(preferences, context):
 
 
 def restore_tab():
-    """Puts the panels where the preferences have them, if the extension has any."""
+    """Puts the panels into the tab of the preferences, if the extension has preferences."""
     addon = bpy.context.preferences.addons.get(TactilePreferences.bl_idname)
     if addon is not None and addon.preferences.tab != TAB:
         _move_tab(addon.preferences, bpy.context)

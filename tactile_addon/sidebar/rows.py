@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the sidebar draws rows of numbers, which say what they are below the mouse, and sentences."""
+"""How the sidebar draws sentences, and rows of numbers that have tooltips."""
 
 import re
 import textwrap
@@ -11,8 +11,9 @@ from bpy.props import StringProperty
 
 from ..viewport.overlay import FONT
 
-TEXT = 11.0  # the size of the font in panels,
-LETTER, PADDING = 6.5, 12.0  # the width of a letter, about, and what is free around a text: pixels at scale 1
+TEXT = 11.0  # The font's size in panels.
+# About the width of a letter, and what is free around a text, in pixels at scale 1.
+LETTER, PADDING = 6.5, 12.0
 
 TIPS = {
     "κ1": "The smaller principal curvature at the point; below 0 the surface bulges outward",
@@ -51,7 +52,7 @@ TIPS = {
 
 
 def tip_of(label):
-    """What a row's label means; empty where that goes without saying."""
+    """What a row's label means, or "" if that goes without saying."""
     return TIPS.get(re.sub(r"(?<= )\d+", "…", label), "")
 
 
@@ -67,7 +68,7 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        """What the number is; Blender shows it below the mouse."""
+        """The tooltip that Blender shows for the number."""
         return ". ".join(filter(None, (tip_of(properties.label), "Click to copy it")))
 
     def execute(self, context):
@@ -76,9 +77,9 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
 
 
 def draw_rows(context, layout, rows, active=True):
-    """Labels and values side by side, gray where they are not active; a heading has no value.
+    """Draws labels and values side by side, gray if they are not active; a heading has no value.
 
-    A value that has no room there stands below its label.
+    A value that has no room beside its label stands below it.
     """
     longest = max((len(label) for label, value in rows if value), default=0)
     share = min(max((longest + 3) / _letters(context), 0.34), 0.66)
@@ -111,5 +112,5 @@ def draw_sentence(context, layout, sentence, icon):
 
 
 def _letters(context):
-    """How many stand beside each other in the sidebar, about."""
+    """About how many letters fit into a line of the sidebar."""
     return context.region.width / (LETTER * context.preferences.system.ui_scale) - 8.0

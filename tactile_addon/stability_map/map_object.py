@@ -16,11 +16,14 @@ from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
 
 MAP_COLOR = "stability_color"
 SHADES = 256
-SHOWN_ABOVE = 5e-3  # of the object's size; 20000 clip starts away, as a scan in mm is, less flickers
-# What the colors can show: attribute, name, description, and the power of length it is measured in.
+# The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
+# starts away, as a scan in mm is.
+SHOWN_ABOVE = 5e-3
+# What the colors can show: attribute, name, description, and the power of length in its unit.
 MAP_QUANTITIES = [
     ("error", "Error", "Mean distance in height between patch and mesh", 1),
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
+    ("reach", "Reach", "How far the longest half curve goes: the extent, where that is automatic", 1),
     (
         "condition_number",
         "Condition Number",
@@ -30,10 +33,10 @@ MAP_QUANTITIES = [
     ("blind_share", "Blind Share", "Share of the coefficients that are invisible to the planes", 0),
     ("reason", "Reason", "Whether there is a patch, and why there is none", 0),
 ]
-LOGARITHMIC = ("condition_number",)  # on a scale from 1
+LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
 MAP_POWERS = {name: power for name, _, _, power in MAP_QUANTITIES}
 REFUSED = (0.27, 0.27, 0.27, 1.0)
-# Colors of the reasons, sRGB, are Okabe and Ito's, which color-blind readers can tell apart.
+# The colors of the reasons, in sRGB, are Okabe and Ito's, which color-blind readers can tell apart.
 REASON_COLORS = np.array([
     (0.93, 0.93, 0.93, 1.0), (0.94, 0.89, 0.26, 1.0), (0.84, 0.37, 0.0, 1.0),
     (0.0, 0.45, 0.70, 1.0), (0.0, 0.62, 0.45, 1.0), REFUSED,
@@ -41,16 +44,17 @@ REASON_COLORS = np.array([
 
 
 def insert(context, obj, touched):
-    """Adds a painted copy of `obj`, whose touches are `touched`, to the scene; returns it."""
+    """Adds a copy of `obj`, painted by the StabilityMap `touched`, to the scene, and returns it."""
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = obj.evaluated_get(depsgraph)
     mesh = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
     painted = bpy.data.objects.new(f"{obj.name} Stability", mesh)
     mesh.name = painted.name
     painted.matrix_world = obj.matrix_world
-    # Under a parent the target may be sheared, which an object of its own cannot be.
+    # Under a parent the target may be sheared, which an object without one cannot be.
     mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
-    # It lies in the mesh it describes: shown a little above it, but not in front, as the patches are in it.
+    # It would lie in the mesh it describes, so it is shown a little above it. It is not shown in front,
+    # because patches that lie in it are.
     above = painted.modifiers.new("Above the Mesh", "DISPLACE")
     above.mid_level, above.strength = 0.0, SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
     _paint(mesh, touched)
@@ -64,11 +68,11 @@ def insert(context, obj, touched):
 
 
 def _paint(mesh, touched):
-    """Every vertex gets the values of the touch that is nearest."""
+    """Gives each vertex the values of the nearest touch."""
     attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in MEASURES]
     attributes.append(("reason", "INT", touched.reason))
     for name in (*MEASURES, "reason", MAP_COLOR):
-        if name in mesh.attributes:  # The source may have one of that name, of whatever type.
+        if name in mesh.attributes:  # The source may have one of this name and another type.
             mesh.attributes.remove(mesh.attributes[name])
     for name, kind, values in attributes:
         mesh.attributes.new(name, kind, "POINT").data.foreach_set("value", values[touched.nearest])
@@ -77,14 +81,14 @@ def _paint(mesh, touched):
 
 
 def recolor(painted):
-    """Colors the map by what it is set to show, and keeps the range in its record."""
+    """Colors the map by the quantity that it is set to show, and keeps the range in its record."""
     shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
     values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == "reason" else np.float32)
     mesh.attributes[shown].data.foreach_get("value", values)
     if shown == "reason":
         rgba, limit = colors.linear(REASON_COLORS)[values], len(REASON_KEYS) - 1.0
     else:
-        limit = _limit(shown, values[values != NOTHING], record["extent"])
+        limit = _limit(shown, values[values != NOTHING], record["spacing"])
         table = colors.diverging(np.arange(SHADES), SHADES - 1)
         table = np.vstack([table, colors.linear([REFUSED])])
         share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
@@ -96,16 +100,16 @@ def recolor(painted):
     record["color_limit"] = limit
 
 
-def _limit(shown, values, extent):
+def _limit(shown, values, spacing):
     """The end of the colors' range."""
     if shown == "blind_share":
         return 1.0
-    floor = 10.0 if shown in LOGARITHMIC else patch_object.WHITE_RANGE * extent
+    floor = 10.0 if shown in LOGARITHMIC else patch_object.WHITE_RANGE * spacing
     return colors.symmetric_range(values, floor) if len(values) else floor
 
 
 def swatches(painted):
-    """(name, sRGB color) of what is not on the scale: the reasons that occur, or that there is no patch."""
+    """(name, sRGB color) of all that is not on the scale: reasons that occur, or that there is no patch."""
     record = painted[patch_record.MAP_RECORD]
     counts = {"patch": record["patches"] - record["in_doubt"], "doubt": record["in_doubt"]}
     counts |= record["refused"].to_dict()
@@ -117,7 +121,7 @@ def swatches(painted):
 
 
 def inputs_of(painted):
-    """What a map was touched with, as TouchSettings has it: a probe with it finds what the map shows."""
+    """The settings that a map was touched with, by name: with them a probe finds what the map shows."""
     record = painted[patch_record.MAP_RECORD].to_dict()
     angles = np.radians(record["planes"] + [[0.0, 0.0]] * (MOST_PLANES - len(record["planes"])))
     names = ("extent", "step", "noise", "seed", "method", "solver")

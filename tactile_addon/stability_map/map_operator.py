@@ -40,11 +40,13 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
 
     target: TARGET
     spacing: length_property(
-        "Spacing", "Distance between the points that are touched; 0 uses a quarter of the extent"
+        "Spacing",
+        "Distance between the points that are touched; 0 uses a quarter of the extent, or a 32nd of the "
+        "object's size where the extent is automatic",
     )
 
     stop = "Stop and Keep"
-    meanwhile = {"PASS_THROUGH"}  # a detached mesh is touched
+    meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
 
     @classmethod
     def poll(cls, context):
@@ -66,11 +68,11 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         self._steps = self._map.steps()
 
     def _stopped(self, context):
-        """Esc ends it with what there is so far."""
+        """Keeps the touches so far when Esc is pressed."""
         if not self._map.done:
             self._leave(context)
             return {"CANCELLED"}
-        self._steps = self._map.spread()  # the rest is done as before
+        self._steps = self._map.spread()
         return {"RUNNING_MODAL"}
 
     def _done(self):
@@ -89,7 +91,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         return {"FINISHED"}
 
     def _about(self, context):
-        """What is going to be touched, and at how many points; or why not."""
+        """A sentence on what will be touched at how many points, or on why it cannot be touched."""
         try:
             target = target_object(context, self.target)
             depsgraph = context.evaluated_depsgraph_get()

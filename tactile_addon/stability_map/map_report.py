@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is said of a stability map, in the panel and in the shell."""
+"""What the panel and the shell say of a stability map."""
 
 import bpy
 
@@ -11,34 +11,35 @@ from .stability import REASONS
 
 
 def map_readable(record):
-    """Lines of label and value; lengths in the unit of the scene or file."""
+    """Lines of label and value, with lengths in the unit of the scene or file."""
     return table(map_table_rows(record))
 
 
 def map_table_rows(record):
-    """(label, value) of all that a map has to say."""
+    """(label, value) of everything there is to say of a map."""
     refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
     unit = units.unit_of(bpy.context.scene, record["spacing"])
-    lengths = ("spacing", "extent", "step")
+    names = ("spacing", "extent", "step")
+    lengths = [units.say(record[name], 1, unit) if record[name] else "auto" for name in names]
     return [
         ("touched", f"{record['source']}, at {record['touched']} of {record['points']} points"),
         ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
         ("refused", refused),
         ("fit", f"{record['method']}, degree {record['degree']}"),
-        (", ".join(lengths), ", ".join(units.say(record[name], 1, unit) for name in lengths)),
+        (", ".join(names), ", ".join(lengths)),
         *((f"median {name}", value) for name, _, value in _medians(record, unit)),
     ]
 
 
 def map_summary(record):
-    """What a stability map has found, in a sentence."""
+    """A sentence on what a stability map has found."""
     words = [f"{record['patches']} patches at {record['touched']} points, {record['in_doubt']} in doubt"]
     words += [f"{count} refused by {key}" for key, count in record["refused"].items() if count]
     return "; ".join(words)
 
 
 def map_rows(record, unit):
-    """(label, value) of how many patches a stability map has, and why not more."""
+    """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
     names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
     return [
         ("Points", str(record["touched"])),
@@ -56,7 +57,7 @@ def median_rows(record, unit):
 
 
 def _medians(record, unit):
-    """(attribute, title, value) of each that is known."""
+    """(attribute, title, value) of each median that is known."""
     for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:
             yield name, title, units.say(record[f"{name}_median"], power, unit)

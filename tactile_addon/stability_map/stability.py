@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Touches all over an object, step by step, with nothing changed in the scene: what a stability map shows."""
+"""Touches all over an object for a stability map, step by step; nothing in the scene changes."""
 
 from collections import Counter
 from statistics import median
@@ -10,15 +10,16 @@ import numpy as np
 from ... import core
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
-from ..touch.touch_object import LEAST_STEPS, require_fine, require_lengths
+from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
 from ..touch.units import length
 
-EXTENT_SHARE = 1.0 / 8.0  # Share of the object's size, where no extent is given.
-SPACING_SHARE = 1.0 / 4.0  # Share of the extent, where no spacing is given.
-BATCH = 20  # touches that are fitted at once: in a hundredth of a second
-NEAREST_AT_ONCE = 10_000  # vertices that are given their nearest touch at once
-NOTHING = -1.0  # where there is no patch, in the place of each quantity
-# What the attribute `reason` counts: key, name, and the stop of a curve that it follows from.
+EXTENT_SHARE = 1.0 / 8.0  # This share of the object's size stands for an extent that touches choose.
+SPACING_SHARE = 1.0 / 4.0  # The default spacing, as a share of the extent.
+BATCH = 20  # So many touches are fitted at once, in some hundredths of a second.
+GROWING_BATCH = 8  # Touches that choose their extent are fewer, because their fits have more contacts.
+NEAREST_AT_ONCE = 10_000  # So many vertices get their nearest touch at once.
+NOTHING = -1.0  # Each quantity has this value where there is no patch.
+# The values of the attribute `reason`: key, name, and the stop of a curve that it follows from.
 REASONS = [
     ("patch", "Patch", None),
     ("doubt", "In Doubt", None),
@@ -29,13 +30,13 @@ REASONS = [
 ]
 REASON_KEYS = [key for key, _, _ in REASONS]
 STOP_CODES = {stop: code for code, (_, _, stop) in enumerate(REASONS) if stop}
-MEASURES = ("error", "height_std", "condition_number", "blind_share")
+MEASURES = ("error", "height_std", "reach", "condition_number", "blind_share")
 
 
 def expected_count(obj, depsgraph, extent, spacing):
-    """How many points of an object are touched, about; inputs are 0 as in StabilityMap.
+    """About how many points of an object are touched; `extent` and `spacing` may be 0 as in StabilityMap.
 
-    Raises ValueError, with a sentence, for what cannot be touched.
+    Raises ValueError, with a sentence, for an object that cannot be touched.
     """
     evaluated, linear, _ = evaluated_object(obj, depsgraph)
     extent = extent or EXTENT_SHARE * size_of(evaluated, linear)
@@ -46,35 +47,38 @@ def expected_count(obj, depsgraph, extent, spacing):
 
 
 class StabilityMap:
-    """Touches of an evaluated mesh at vertices thinned to an even spacing.
+    """Touches of an evaluated mesh at vertices that are spaced evenly.
 
-    chosen : indices of the vertices to touch, in random order; done : how many have been touched
-    error, height_std, condition_number, blind_share, reason : (n,), of the touches
-    nearest : (vertices,), the touch that is nearest to each, once the steps are done
+    chosen : indices of the n vertices to touch, in random order
+    done : how many of these have been touched
+    error, height_std, reach, condition_number, blind_share, reason : (n,), what was found by each touch
+    nearest : index of the touch that is nearest to each vertex of the mesh, once the steps are done
     """
 
     def __init__(self, obj, depsgraph, planes, *, spacing, extent, step, noise, seed, **fit):
-        """`spacing`, `extent` and `step` are 0 for a choice by the object's size; `fit` as in touch().
+        """If `spacing`, `extent` or `step` is 0, the touches choose it; `fit` is that of touch().
 
-        Raises ValueError, with a sentence, for what cannot be touched, and for inputs no touch can do with.
+        Raises ValueError, with a sentence, if the object cannot be touched, or no touch could succeed.
         """
-        import scipy.spatial  # noqa: F401  # takes half a second once: not between two redraws
+        import scipy.spatial  # noqa: F401  # The import takes half a second, too long between redraws.
 
         self.surface = DetachedMesh(obj, depsgraph)
-        if not spacing >= 0.0:  # NaN is none
+        if not spacing >= 0.0:  # NaN fails every comparison, so it is refused, too.
             raise ValueError(f"The spacing is a length of 0 or more, got {length(spacing)}")
-        self.extent = extent or EXTENT_SHARE * self.surface.size
-        self.step = step or self.extent / LEAST_STEPS
-        require_lengths(obj.name, self.surface.size, self.extent, self.step, noise)
-        self.spacing = spacing or SPACING_SHARE * self.extent
-        require_fine(self.surface.spacing, self.step)
+        usual = extent or EXTENT_SHARE * self.surface.size
+        # Touches of one extent have one step.
+        self.extent, self.step = extent, step or extent / LEAST_STEPS
+        self._glance = {"extent": usual, "step": step or usual / LEAST_STEPS}
+        require_lengths(obj.name, self.surface.size, **self._glance, noise=noise)
+        self.spacing = spacing or SPACING_SHARE * usual
+        require_fine(self.surface.spacing, self._glance["step"])
         self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
         self._rng = np.random.default_rng(seed)
-        _rehearse(planes, self.extent, self.step, fit)
+        _rehearse(planes, fit, **self._glance)
         self.chosen, self.done = [], 0
 
     def steps(self):
-        """Does all of it; a generator, which yields each few hundredths of a second."""
+        """Does everything, as a generator that yields every few hundredths of a second."""
         surface = self.surface
         candidates = np.flatnonzero(surface.has_face)
         for index in core.spaced(surface.points[candidates], self.spacing, self._rng):
@@ -85,7 +89,8 @@ class StabilityMap:
         for name in MEASURES:
             setattr(self, name, np.full(count, NOTHING))
         self.reason = np.full(count, REASON_KEYS.index("nothing"), dtype=np.int32)
-        size = BATCH if self.fit["method"] == "bayes" else 1
+        batch = BATCH if self.extent else GROWING_BATCH
+        size = batch if self.fit["method"] == "bayes" else 1
         for start in range(0, count, size):
             end = min(start + size, count)
             yield from self._touch(range(start, end))
@@ -93,7 +98,7 @@ class StabilityMap:
         yield from self.spread()
 
     def spread(self):
-        """Finds for each vertex the nearest of the touches that are done; a generator as well."""
+        """Finds the nearest of the touches that are done for each vertex, as a generator like `steps`."""
         from scipy.spatial import cKDTree
 
         points = self.surface.points
@@ -106,61 +111,50 @@ class StabilityMap:
             yield
 
     def _touch(self, numbers):
-        """The touches of these numbers."""
-        touched = []
-        for number in numbers:
-            contours = self._track(self.chosen[number])
-            ended = contours and _ended(contours, self.surface.points[self.chosen[number]])
-            if ended:
-                self.reason[number] = _reason_of(ended)
-            elif contours:
-                touched.append((number, contours))
-            yield
-        if not touched:
-            return
-        chosen = [self.chosen[number] for number, _ in touched]
-        found = core.reconstruct_many(
-            self.surface.points[chosen],
-            [contours for _, contours in touched],
-            outward=self.surface.normals[chosen],
+        """Makes the touches with these numbers, as a generator like `steps`."""
+        surface, chosen = self.surface, [self.chosen[number] for number in numbers]
+        found = yield from core.exploring_many(
+            surface,
+            surface.points[chosen],
+            surface.normals[chosen],
+            self.planes,
+            farthest=FARTHEST_SHARE * surface.size,
+            extent=self.extent or "auto",
+            step=self.step or "auto",
+            noise=self.noise,
+            rng=self._rng,
             **self.fit,
         )
-        patches = iter(core.with_height_stds([r for r in found if isinstance(r, core.Reconstruction)]))
-        yield
-        for (number, contours), result in zip(touched, found, strict=True):
-            if isinstance(result, core.Reconstruction):
-                self._note(number, next(patches))
+        for number, vertex, touch in zip(numbers, chosen, found, strict=True):
+            if isinstance(touch, ValueError):
+                self.reason[number] = self._why_none(vertex)
+            elif ended := _ended(touch.contours, surface.points[vertex]):
+                self.reason[number] = _reason_of(ended)
             else:
-                shortest = min(contours, key=lambda contour: len(contour.points))
-                self.reason[number] = _reason_of(shortest.stops)
+                self._note(number, touch)
             yield
 
-    def _track(self, vertex):
-        surface = self.surface
+    def _why_none(self, vertex):
+        """The code of the reason why there is no touch at a vertex."""
+        surface, point = self.surface, self.surface.points[vertex]
         try:
-            return core.track(
-                surface,
-                surface.points[vertex],
-                surface.normals[vertex],
-                self.planes,
-                extent=self.extent,
-                step=self.step,
-                noise=self.noise,
-                rng=self._rng,
-            )
-        except ValueError:  # the numbers are in order, so it is the surface: a face of no area
-            return None
+            contours = core.track(surface, point, surface.normals[vertex], self.planes, **self._glance)
+        except ValueError:  # The settings are valid, so a face there has no area.
+            return REASON_KEYS.index("nothing")
+        shortest = min(contours, key=lambda contour: len(contour.points))
+        return _reason_of(_ended(contours, point) or shortest.stops)
 
-    def _note(self, number, result):
+    def _note(self, number, touch):
+        result = touch.result
         self.reason[number] = REASON_KEYS.index("patch" if result.status == "ok" else "doubt")
         off = core.height_error(result, self.surface)
         self.error[number] = NOTHING if off is None else off
-        self.height_std[number] = result.mean_height_std
+        self.height_std[number], self.reach[number] = result.mean_height_std, touch.extent
         self.condition_number[number] = result.condition_number
         self.blind_share[number] = result.blind_share
 
     def report(self):
-        """What there is to say, a dict of plain values; medians are of the patches."""
+        """What was found, as a dict of plain values; medians are over the patches."""
         reasons = Counter(self.reason[: self.done].tolist())
         counts = {key: reasons[code] for code, key in enumerate(REASON_KEYS)}
         report = {
@@ -182,34 +176,34 @@ class StabilityMap:
 
 
 def _ended(contours, point):
-    """Why curves do not go on to both sides of the point: it is on a crease or an edge."""
+    """The stops of curves that end at the point already, which is then on a crease or an edge."""
     return [
         stop
         for contour in contours
         for end, stop in zip((0, -1), contour.stops, strict=True)
-        if stop != core.EXTENT and np.array_equal(contour.points[end], point)
+        if stop in STOP_CODES and np.array_equal(contour.points[end], point)
     ]
 
 
 def _reason_of(stops):
-    """The code of the commonest of these; curves that go on, but have no tangent plane, are on a crease."""
+    """The code of the most frequent stop. Curves that go on, but have no tangent plane, are on a crease."""
     counts = Counter(stop for stop in stops if stop in STOP_CODES)
     return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
 
 
 class _Plane:
-    """An ideal surface."""
+    """The plane z = 0 as a surface."""
 
     def ray_cast(self, origin, direction, distance):
-        """What core asks of a Surface."""
+        """The point and the normal where a ray meets the plane, or None, as core asks of a Surface."""
         if direction[2] == 0.0 or not 0.0 <= -origin[2] / direction[2] <= distance:
             return None
         gone = -origin[2] / direction[2]
         return tuple(a + gone * b for a, b in zip(origin, direction, strict=True)), (0.0, 0.0, 1.0)
 
 
-def _rehearse(planes, extent, step, fit):
-    """Raises ValueError for inputs that cannot even rebuild a plane: all touches would be refused."""
+def _rehearse(planes, fit, extent, step):
+    """Raises ValueError for settings that cannot even rebuild a plane: all touches would be refused."""
     origin, up = np.zeros(3), (0.0, 0.0, 1.0)
     core.reconstruct(
         origin, core.track(_Plane(), origin, up, planes, extent=extent, step=step), outward=up, **fit

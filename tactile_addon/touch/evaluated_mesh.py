@@ -7,18 +7,18 @@ import zlib
 
 import numpy as np
 
-SHORT_SHARE = 0.05  # Share of the reach within which a patch has its mesh, mostly.
-FARTHEST_VERTEX = 1e15  # A mesh may reach no farther: squared distances must be numbers in single precision.
+SHORT_SHARE = 0.05  # In most cases the mesh is within this share of the reach.
+FARTHEST_VERTEX = 1e15  # Vertices are no farther away, so that single precision can hold squared distances.
 
 
 def checksum_of(obj, depsgraph):
-    """Another number for another shape of the evaluated mesh in the object's coordinates.
+    """A checksum of the shape of the evaluated mesh in the object's coordinates.
 
-    Raises ValueError, with a sentence, where the object cannot be touched.
+    Raises ValueError, with a sentence, if the object cannot be touched.
     """
     evaluated, _, _ = evaluated_object(obj, depsgraph)
     co = coordinates(obj.name, evaluated)
-    try:  # a ray that leaves from beyond all needs an evaluated mesh, but no tree of its faces
+    try:  # This ray starts beyond everything, so it needs an evaluated mesh, but no tree of its faces.
         evaluated.ray_cast((1e18, 0.0, 0.0), (1.0, 0.0, 0.0), distance=1e-30, depsgraph=depsgraph)
     except RuntimeError as error:
         raise disabled(obj) from error
@@ -26,7 +26,7 @@ def checksum_of(obj, depsgraph):
 
 
 def is_disabled(obj):
-    """Whether it is disabled in viewports, yet perhaps evaluated, as somebody's parent."""
+    """Whether an object is disabled in viewports. As the parent of another it may still be evaluated."""
     return obj.hide_viewport or (
         bool(obj.users_collection) and all(found.hide_viewport for found in obj.users_collection)
     )
@@ -42,7 +42,7 @@ def disabled(obj):
 def evaluated_object(obj, depsgraph):
     """The evaluated object and its transform: linear part and origin.
 
-    Raises ValueError, with a sentence, where it cannot be touched; but for disabled objects.
+    Raises ValueError, with a sentence, if it cannot be touched for another reason than that it is disabled.
     """
     if obj.type != "MESH":
         raise ValueError(f'"{obj.name}" is not a mesh: select a mesh object, or convert this one')
@@ -61,32 +61,32 @@ def evaluated_object(obj, depsgraph):
 
 
 def coordinates(name, evaluated):
-    """Coordinates of all vertices of an evaluated object, in it, (n, 3) float32.
+    """The coordinates of all vertices in an evaluated object, (n, 3) float32.
 
-    Raises ValueError, with a sentence, where they are not all at a place that can be touched.
+    Raises ValueError, with a sentence, if any is at a place that cannot be touched.
     """
     co, matrix = _coordinates(evaluated.data), np.array(evaluated.matrix_world, dtype=float)
-    largest = max(float(co.max()), -float(co.min()))  # both NaN where one vertex is
+    largest = max(float(co.max()), -float(co.min()))  # If any is NaN, both are.
     if not math.isfinite(largest):
         raise ValueError(
             f'"{name}" has vertices whose coordinates are not finite: delete them, or correct its modifiers'
         )
     reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
-    if not reach <= FARTHEST_VERTEX:  # NaN is nowhere
+    if not reach <= FARTHEST_VERTEX:  # NaN fails every comparison, so it is refused, too.
         raise ValueError(f'"{name}" reaches farther than {FARTHEST_VERTEX:g} from the origin: scale it down')
     return co
 
 
 def size_of(evaluated, linear):
-    """The longest edge of the bounding box, in the world."""
+    """The longest edge of the object's bounding box, in the world."""
     edges = np.ptp(np.array(evaluated.bound_box), axis=0)
     return float((edges * np.linalg.norm(linear, axis=0)).max())
 
 
 def _coordinates(mesh):
-    """Coordinates of all vertices, (n, 3) float32; the attribute, where there is one, is 30 times faster."""
+    """The coordinates of all vertices, (n, 3) float32. If the attribute is there, it is 30 times as fast."""
     co = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    position = mesh.attributes.get("position")  # none in edit mode
+    position = mesh.attributes.get("position")  # There is none in edit mode.
     if position is None:
         mesh.vertices.foreach_get("co", co.ravel())
     else:
@@ -95,22 +95,22 @@ def _coordinates(mesh):
 
 
 def require_invertible(name, linear):
-    """Raises ValueError, with a sentence, where the linear part (3, 3) of a transform has no inverse."""
+    """Raises ValueError, with a sentence, if the linear part (3, 3) of a transform has no inverse."""
     lengths = np.linalg.norm(linear, axis=0)
     if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
         raise ValueError(f'"{name}" has a scale of 0 in some direction: give it another scale')
 
 
 class PlacedMesh:
-    """A mesh that is touched in other axes than its own: rays into it, what they find out of it.
+    """A mesh that is touched in other axes than its own: it transforms rays, and what they find.
 
-    The transform runs in Python floats: mathutils rounds to float32, which far from the world's
-    origin is coarser than the mesh, and a numpy call would cost more than the cast.
+    The transform is computed in Python floats. mathutils rounds to float32, which far from the world's
+    origin is coarser than the mesh, and a numpy call would take longer than the ray.
 
     linear, origin : (3, 3) and (3,), the transform
-    cast : as ray_cast, in the mesh's own coordinates; its point is None where it meets nothing
+    cast : like ray_cast, in the mesh's own coordinates; its point is None if the ray meets nothing
 
-    What inherits it has `_nearest`: the (point, normal) nearest to a point, in the mesh's own coordinates.
+    Subclasses have `_nearest`, which gives the (point, normal) nearest to a point, in the mesh's coordinates.
     """
 
     def __init__(self, linear, origin, cast):
@@ -119,7 +119,7 @@ class PlacedMesh:
         self._rows, self._inverse_rows, self._normal_rows, self._at = (
             array.tolist() for array in (linear, self._inverse, self._inverse.T, origin)
         )
-        # Scans mostly are neither moved, turned nor scaled.
+        # Most scans are neither moved nor turned nor scaled.
         self._is_in_place = np.array_equal(linear, np.eye(3)) and not origin.any()
 
     def ray_cast(self, origin, direction, distance):
@@ -131,7 +131,7 @@ class PlacedMesh:
         local = product(back, *direction)
         start = product(back, origin[0] - x, origin[1] - y, origin[2] - z)
         point, normal = self._cast(start, local, distance * math.hypot(*local))
-        # A face of no area has no normal, and nothing of it can be felt.
+        # A face without area has no normal and cannot be felt.
         if point is None or not any(normal):
             return None
         return self._to_world(point), self._normal_to_world(normal)
@@ -139,24 +139,41 @@ class PlacedMesh:
     def deviations(self, points, normals, reach):
         """Signed distances (n,) of world points to the mesh, positive outside it.
 
-        Measured along the unit normals (n, 3): from outside where the mesh is near, otherwise either way, up
-        to `reach`; to the nearest point of the mesh where they meet nothing, as over a hole.
+        They are measured along the unit normals (n, 3): from outside if the mesh is near, otherwise in both
+        directions up to `reach`. If both meet nothing, as over a hole, the nearest point of the mesh counts.
         """
-        pairs = zip(points.tolist(), normals.tolist(), strict=True)
-        return np.array([self._deviation(point, normal, reach) for point, normal in pairs])
+        short = SHORT_SHARE * reach  # A long ray that meets nothing takes long.
+        starts, downs = points + short * normals, -normals
+        rays = list(zip(starts.tolist(), downs.tolist(), strict=True))
+        hits = [self.ray_cast(start, down, 2.0 * short) for start, down in rays]
+        return np.array(
+            [
+                self._deviation(points[i], normals[i], reach)
+                if hit is None
+                else math.dist(rays[i][0], hit[0]) - short
+                for i, hit in enumerate(hits)
+            ]
+        )
 
     def _deviation(self, point, normal, reach):
-        short = SHORT_SHARE * reach  # A long ray that meets nothing is dear.
-        start, down = [p + short * v for p, v in zip(point, normal, strict=True)], [-v for v in normal]
-        hit = self.ray_cast(start, down, 2.0 * short)
-        if hit is not None:
-            return math.dist(start, hit[0]) - short
+        """The signed distance of a point that the mesh is not near to along the normal."""
+        point, normal, down = point.tolist(), normal.tolist(), (-normal).tolist()
         hits = [(sign, self.ray_cast(point, way, reach)) for sign, way in ((-1.0, normal), (1.0, down))]
         found = [sign * math.dist(point, hit[0]) for sign, hit in hits if hit is not None]
         if found:
             return min(found, key=abs)
         foot = self._to_world(self._nearest(self._to_local(point))[0])
         return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
+
+    def _foot(self, near, location):
+        """The point nearest to the world point `near` as the mesh measures, its normal, its distance."""
+        point, normal = self._nearest(self._to_local(near))
+        if point is None:
+            raise ValueError("The location is too far away to be measured: set it on the surface")
+        if not any(normal):
+            raise ValueError("The location is on a face of no area: move it, or dissolve degenerate faces")
+        point = self._to_world(point)
+        return point, self._normal_to_world(normal), math.dist(location, point)
 
     def _to_world(self, point):
         x, y, z = product(self._rows, *point)
@@ -166,7 +183,7 @@ class PlacedMesh:
         return self._inverse @ np.subtract(point, self._origin)
 
     def _normal_to_world(self, normal):
-        """The normal by the inverse transpose: outward stays outward under any scale, a mirroring one too."""
+        """The normal by the inverse transpose: it stays outward under any scale, even one that mirrors."""
         x, y, z = product(self._normal_rows, *normal)
         length = math.hypot(x, y, z)
         return x / length, y / length, z / length

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The inputs of a touch, as the operators and the probes have them."""
+"""The settings of a touch, which operators and probes have in common."""
 
 import math
 from contextlib import contextmanager
@@ -18,11 +18,7 @@ METHODS = [
         "Fit all coefficients and the frame together, and say what the contacts leave open; the "
         "most accurate",
     ),
-    (
-        "tagc",
-        "Total Curvature",
-        "The paper's fit: stay close to the contacts and fold as little as possible",
-    ),
+    ("tagc", "Total Curvature", "The paper's fit: stay close to the contacts and fold as little as possible"),
     (
         "quadratic-variation",
         "Quadratic Variation",
@@ -38,7 +34,7 @@ SOLVERS = [
     ("fast", "Fast", "Newton's method"),
     ("descent", "Steepest Descent", "The paper's minimization: slower, for comparison"),
 ]
-AUTO = {  # literals, to be translated
+AUTO = {  # These are literals, so that they can be translated.
     "extent": "Extent (Auto)",
     "step": "Step (Auto)",
     "degree": "Degree (Auto)",
@@ -47,16 +43,14 @@ AUTO = {  # literals, to be translated
     "edge": "Edge Length (Auto)",
 }
 MOST_PLANES = 6
-STEEPEST = math.radians(60)  # Greatest tilt by mouse.
-OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # what the override of a library's probe keeps as its own
-
-
-_is_silent = False
+STEEPEST = math.radians(60)  # The mouse tilts planes by no more.
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # The override of a library's probe keeps these as its own.
+_is_silent = False  # Whether settings change within `silent`.
 
 
 @contextmanager
 def silent():
-    """What is set within is looked at by nothing, as in a handler, which looks at it itself."""
+    """Within this context, no handler looks at settings that change: the caller does it."""
     global _is_silent
     _is_silent = True
     try:
@@ -66,18 +60,32 @@ def silent():
 
 
 def is_silent():
-    """Whether settings change within `silent`, where nothing answers."""
+    """Whether settings change within `silent`."""
     return _is_silent
 
 
+_answered = None  # These settings of a probe were looked at last, and nothing has happened since.
+
+
 def changed(settings, context):
-    """Has the handler look at a probe at once, so that the patch is part of the same undo step."""
-    if not _is_silent and isinstance(settings.id_data, Object) and settings.is_probe:
+    """Makes the handler look at a probe at once, so that the patch is part of the same undo step."""
+    global _answered
+    if _is_silent or not isinstance(settings.id_data, Object) or not settings.is_probe:
+        return
+    now = repr((settings.id_data, settings.target, settings.live, touch_arguments(settings)))
+    if now != _answered:  # Blender calls this twice for a number of an array.
         settings.id_data.update_tag()
         context.view_layer.update()
+        _answered = now
 
 
-KEPT = {"update": changed, "override": OVERRIDABLE}  # what a probe's properties have beside an operator's
+def something_happened():
+    """Makes the next setting be looked at even if it is as it was."""
+    global _answered
+    _answered = None
+
+
+KEPT = {"update": changed, "override": OVERRIDABLE}  # A probe's properties need these, an operator's do not.
 UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
 TARGET = StringProperty(
     name="Target",
@@ -92,8 +100,16 @@ LOCATION = FloatVectorProperty(
 )
 
 
+OUTWARD = FloatVectorProperty(
+    name="Outward",
+    subtype="XYZ",
+    description="The direction to touch from; if not set, the surface's own normal",
+    options=UNSAVED,
+)
+
+
 def length_property(name, description, **more):
-    """A length of 0 or more, in units of the scene."""
+    """A property for a length of 0 or more, shown in the unit of the scene."""
     return FloatProperty(name=name, description=description, subtype="DISTANCE", soft_min=0.0, **more)
 
 
@@ -101,14 +117,9 @@ NOISE = length_property("Noise", "Standard deviation of the simulated sensor", p
 
 
 class FitSettings:
-    """Mixed into operators and property groups."""
+    """The settings of a fit, for operators and property groups to inherit."""
 
-    method: EnumProperty(
-        name="Method",
-        description="How to fit the patch",
-        items=METHODS,
-        **KEPT,
-    )
+    method: EnumProperty(name="Method", description="How to fit the patch", items=METHODS, **KEPT)
     degree: IntProperty(
         name="Degree",
         description="Degree of the polynomial, 2 to 6; 0 chooses the lowest that describes what the "
@@ -127,16 +138,11 @@ class FitSettings:
         soft_max=1e5,
         **KEPT,
     )
-    solver: EnumProperty(
-        name="Solver",
-        description="How to minimize the curvature",
-        items=SOLVERS,
-        **KEPT,
-    )
+    solver: EnumProperty(name="Solver", description="How to minimize the curvature", items=SOLVERS, **KEPT)
 
 
 class TouchSettings(FitSettings):
-    """FitSettings with the planes, lengths and noise of a touch: in units of the world, and in radians."""
+    """The settings of a touch: those of the fit, planes, lengths in units of the world, angles in radians."""
 
     plane_count: IntProperty(
         name="Planes",
@@ -165,8 +171,7 @@ class TouchSettings(FitSettings):
     )
     extent: length_property(
         "Extent",
-        "Distance to feel on either side of the point; 0 goes as far as a patch can be trusted, in "
-        "a map an eighth of the object's size",
+        "Distance to feel on either side of the point; 0 goes as far as a patch can be trusted",
         **KEPT,
     )
     step: length_property(
@@ -174,10 +179,7 @@ class TouchSettings(FitSettings):
     )
     noise: NOISE
     seed: IntProperty(
-        name="Seed",
-        description="Seed of the noise: the same seed gives the same contacts",
-        min=0,
-        **KEPT,
+        name="Seed", description="Seed of the noise: the same seed gives the same contacts", min=0, **KEPT
     )
 
 
@@ -185,7 +187,7 @@ NAMES = (*TouchSettings.__annotations__, *FitSettings.__annotations__)
 
 
 def touch_arguments(settings):
-    """What touch() takes of `settings`, an operator or a probe's."""
+    """The arguments for touch() from the settings of an operator or a probe."""
     count = settings.plane_count
     pairs = zip(settings.azimuths[:count], settings.tilts[:count], strict=True)
     return {
@@ -198,25 +200,25 @@ def touch_arguments(settings):
 
 
 def draw_chosen(layout, settings, name, found=None, fields=None):
-    """A number that the surface chooses where it is 0, which the label says, with what it has `found`.
+    """Draws a number that the surface chooses if it is 0, which the label says with the value it has `found`.
 
-    fields : other properties by which lengths are shown, by name, with what was found for their value
+    fields : by the name of a length, the property that shows it, with the value that was found
     """
     shown = (fields or {}).get(name, name)
     if getattr(settings, name):
         layout.prop(settings, shown)
-    elif shown != name:  # its value is what was found
+    elif shown != name:  # Its value is the one that was found.
         layout.prop(settings, shown, text=AUTO[name])
     elif found and found.get(name):
         row = layout.row()
-        row.use_property_split = False  # for the label, which takes the width it needs
+        row.use_property_split = False  # The label takes the width it needs.
         row.prop(settings, name, text=f"{iface(AUTO[name])} {found[name]}", translate=False)
     else:
         layout.prop(settings, name, text=AUTO[name])
 
 
 def draw_sensor(layout, settings, found=None, fields=None):
-    """The rows of the step and the noise; `found` and `fields` as in draw_chosen."""
+    """Draws the rows of step and noise; `found` and `fields` as in draw_chosen."""
     draw_chosen(layout, settings, "step", found, fields)
     layout.prop(settings, (fields or {}).get("noise", "noise"))
     if settings.noise:
@@ -224,7 +226,7 @@ def draw_sensor(layout, settings, found=None, fields=None):
 
 
 def draw_solver(layout, settings, found=None, fields=None):
-    """The rows of the method, and of what it has; `found` and `fields` as in draw_chosen."""
+    """Draws the rows of the method and of its options; `found` and `fields` as in draw_chosen."""
     layout.prop(settings, "method")
     draw_chosen(layout, settings, "degree", found, fields)
     if settings.method in ("tagc", "quadratic-variation"):
@@ -232,7 +234,7 @@ def draw_solver(layout, settings, found=None, fields=None):
 
 
 def draw_all(layout, settings, fields=None):
-    """Everything, with nothing folded away, as Adjust Last Operation has it; `fields` as in draw_chosen."""
+    """Draws all settings, as Adjust Last Operation has them; `fields` as in draw_chosen."""
     draw_chosen(layout, settings, "extent", fields=fields)
     layout.prop(settings, "plane_count")
     for i in range(settings.plane_count):

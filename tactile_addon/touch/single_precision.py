@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's meshes, attributes and places are of single precision, whatever was measured."""
+"""Whether a patch fits into single precision, which Blender's meshes, attributes and places have."""
 
 import numpy as np
 
-# Lengths whose squares, and those of their inverses, are numbers in single precision.
+# The squares of lengths between these, and of their inverses, are numbers in single precision.
 LARGEST_SINGLE, SMALLEST_SINGLE = 1e15, 1e-15
 
 

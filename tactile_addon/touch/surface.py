@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh object of the scene as a surface to touch: as it evaluates, in world coordinates."""
+"""A mesh object of the scene as a surface to touch: as Blender evaluates it, in world coordinates."""
 
 import math
 from functools import cached_property
@@ -9,19 +9,19 @@ import numpy as np
 
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 
-MANY = 8  # times as many vertices as are wanted, that are looked at before all of them are
-WALK = 8  # steps at most to the nearest point of a stretched object; two or three are the rule
+MANY = 8  # So many times as many vertices as are wanted are looked at first, before all are.
+WALK = 8  # The way to the nearest point of a stretched object has at most so many steps; mostly two or three.
 
 
 class MeshSurface(PlacedMesh):
-    """The evaluated mesh of an object; core.track touches it through `ray_cast`.
+    """The evaluated mesh of an object, which core.track touches through `ray_cast`.
 
-    sound : whether all its vertices are known to be at finite places, which takes time to see
+    sound : whether all its vertices are known to be at finite places, which takes time to check
     size : the longest edge of its bounding box, in the world
     """
 
     def __init__(self, obj, depsgraph, sound=False):
-        """Raises ValueError, with a sentence, where `obj` cannot be touched."""
+        """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         try:
             evaluated, linear, origin = evaluated_object(obj, depsgraph)
             if not sound:
@@ -44,20 +44,20 @@ class MeshSurface(PlacedMesh):
         return coordinates(self._object.name, self._object)
 
     def vertices_near(self, point, radius, most=None):
-        """Indices, world coordinates and normals of any length of vertices within `radius` of a world point.
+        """Indices, world coordinates and normals (any length) of vertices within `radius` of a world point.
 
-        Where these are more than `most`, only each second, third, ... of them.
+        If these are more than `most`, only each second, third, ... of them is returned.
         """
-        # A sphere of the world is an ellipsoid in the object: its longest axis bounds it.
+        # A sphere in the world is an ellipsoid in the object, which its longest axis bounds.
         reach = radius * np.linalg.norm(self._inverse, ord=2)
         at, few = self._to_local(point).astype(np.float32), len(self._co) // (MANY * (most or len(self._co)))
-        for stride in dict.fromkeys((max(few, 1), 1)):  # of all only where some of them are not enough
+        for stride in dict.fromkeys((max(few, 1), 1)):  # All are asked only if some are not enough.
             local = self._co[::stride] - at
             near = stride * np.flatnonzero(np.einsum("ij,ij->i", local, local) <= reach**2)
             if most is not None and len(near) >= most:
                 near = near[:: math.ceil(len(near) / most)]
                 break
-        # All of them: one by one, a few thousand take longer than a million.
+        # These are all normals, because one by one a few thousand take longer than a million at once.
         normals = np.empty_like(self._co)
         self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
         return (
@@ -67,7 +67,7 @@ class MeshSurface(PlacedMesh):
         )
 
     def triangles(self):
-        """Vertices (n, 3) in the world, and triangles (m, 3), counterclockwise from outside."""
+        """The vertices (n, 3) in the world, and triangles (m, 3), counterclockwise from outside."""
         self._mesh.calc_loop_triangles()
         faces = np.empty((len(self._mesh.loop_triangles), 3), dtype=np.int32)
         self._mesh.loop_triangles.foreach_get("vertices", faces.ravel())
@@ -80,14 +80,14 @@ class MeshSurface(PlacedMesh):
         gram = self._linear.T @ self._linear
         stretched = not np.allclose(gram, gram[0, 0] * np.eye(3), rtol=0.0, atol=1e-4 * gram[0, 0])
         if stretched and found[2] > 1e-3 * self.size:
-            # Nearest within a stretched object may be on another sheet than nearest in the world.
+            # In a stretched object, the nearest point may be on another sheet than in the world.
             offsets = self._co @ self._linear.T - np.subtract(location, self._origin)
             nearest = self._co[np.argmin(np.einsum("ij,ij->i", offsets, offsets))]
             found = min(found, self._walk(self._to_world(nearest.tolist()), location), key=lambda f: f[2])
         return found
 
     def _walk(self, start, location):
-        """The way downhill to the nearest point, from the one nearest to `start` as the object measures.
+        """The nearest point, downhill from the one that is nearest to `start` as the object measures.
 
         Each step goes to the foot of the perpendicular on the face found, as long as that is nearer.
         """
@@ -101,16 +101,8 @@ class MeshSurface(PlacedMesh):
             found = ahead
         return found
 
-    def _foot(self, near, location):
-        """The point nearest, as the object measures, to the world point `near`; its normal, its distance."""
-        point, normal = self._nearest(self._to_local(near))
-        if not any(normal):
-            raise ValueError("The location is on a face of no area: move it, or dissolve degenerate faces")
-        point = self._to_world(point)
-        return point, self._normal_to_world(normal), math.dist(location, point)
-
     def spacing(self, point):
-        """How far apart neighboring float32 numbers are at a world point, in the world and in the mesh."""
+        """The distance of neighboring float32 numbers at a world point, in the world and in the mesh."""
         scale = np.linalg.norm(self._linear, axis=0).max()
         world, local = (
             np.spacing(np.abs(p).astype(np.float32)).max() for p in (point, self._to_local(point))
@@ -124,7 +116,7 @@ class MeshSurface(PlacedMesh):
         return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max())
 
     def _nearest(self, local):
-        """(point, normal) in object coordinates."""
+        """The nearest (point, normal) in object coordinates."""
         found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
         if not found:
             raise ValueError("The location is too far away to be measured: set it on the surface")

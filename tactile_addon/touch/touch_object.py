@@ -23,20 +23,17 @@ from .touch_report import (
 )
 from .units import length
 
-FARTHEST_SHARE = 1.0 / 2.0  # Share of the object's size: a half contour that ends by itself is no longer.
-AWAY = 1.0 / 8.0  # Share of it that the location may be off the surface where no extent is given.
-FINEST_STEP = 1.0 / 128.0  # Share of it: the step where neither is given.
-LEAST_STEPS = 12  # Least steps of a half contour, where no step is given.
-LARGE_FACET = 4.0  # Steps: the finger feels facets that are longer, and creases between them.
-STEP_ROUNDING = 1.0 / 20.0  # Share of a step: contacts that are rounded by more say nothing about curvature.
+FARTHEST_SHARE = 1.0 / 2.0  # A half contour is at most this share of the object's size long.
+AWAY = 1.0 / 8.0  # Without an extent, the location may be this share of the size off the surface.
+FINEST_STEP = 1.0 / 128.0  # The step is this share of the size if neither step nor extent is given.
+LEAST_STEPS = 12  # Without a step, a half contour has at least so many.
+LARGE_FACET = 4.0  # The finger feels facets that are longer than so many steps, and creases between them.
+STEP_ROUNDING = 1.0 / 20.0  # Contacts that are rounded by more of a step say nothing about curvature.
 
 
 @dataclass(frozen=True, eq=False)
 class Touched:
-    """What a touch gave; `report` is a dict of plain values.
-
-    surface : None where the contours were measured elsewhere
-    """
+    """The outcome of a touch: no surface if contours were measured elsewhere, a report of plain values."""
 
     surface: MeshSurface | None
     result: core.Reconstruction
@@ -57,19 +54,21 @@ def touch(
     step,
     noise,
     seed,
+    reaches=None,
     sound=False,
     **fit,
 ):
     """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
 
-    location : world coordinates, projected onto the object
-    tolerance : mean deviation of the height that is good enough, up to which planes are added while they
-        help, MOST_PLANES at most, see core.explore; None for the given ones only
-    outward : or None for the surface's; on the side of it that `toward` points to, where given
-    tangent : azimuth 0 of the planes, see core.SamplingPlane.axes; None for its choice
-    extent, step : 0 for what the surface there asks for, see core.explore
+    location : world coordinates, which are projected onto the object
+    tolerance : mean deviation of the height to reach by adding planes while they help, up to MOST_PLANES, see
+        core.explore; None adds none
+    outward : the outward direction; None for the surface's normal, on the side `toward` if that is given
+    tangent : azimuth 0 of the planes, or None, see core.SamplingPlane.axes
+    extent, step : 0 has the surface choose, see core.explore
+    reaches : those in the report of a touch nearby, see core.explore_nearby; None begins anew
     sound : see MeshSurface
-    fit : what core.reconstruct takes
+    fit : arguments of core.reconstruct
 
     Raises ValueError with a sentence for the user.
     """
@@ -82,15 +81,14 @@ def touch(
         outward = [-v for v in outward]
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
-    size = {
-        "farthest": FARTHEST_SHARE * surface.size,
-        "tolerance": tolerance,
-        "most_planes": MOST_PLANES,
-        "extent": extent or "auto",
-        "step": step or "auto",
-    }
-    sensor = {"noise": noise, "rng": seed, "tangent": axes[:, 0]}
-    found = _explored(surface, point, outward, planes, **size, **sensor, **fit)
+    given = {"farthest": FARTHEST_SHARE * surface.size, "step": step or "auto", "noise": noise, **fit}
+    given |= {"rng": seed, "tangent": axes[:, 0]}
+    if reaches is None:
+        given |= {"tolerance": tolerance, "most_planes": MOST_PLANES, "extent": extent or "auto"}
+        found = _explored(core.explore, surface, point, outward, planes, **given)
+        reaches = core.reaches_of(found)
+    else:
+        found, reaches = _explored(core.explore_nearby, surface, point, outward, planes, reaches, **given)
     clock.append(perf_counter())
     require_single(found.result)
     report = {
@@ -98,6 +96,7 @@ def touch(
         "method": fit["method"],
         "noise": noise,
         "seed": seed,
+        "reaches": reaches.tolist(),
         **_exploration_report(found, len(planes), (early_ends if extent else ends)(found.result.contours)),
         "axes": axes.tolist(),
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
@@ -105,10 +104,10 @@ def touch(
     return Touched(surface, found.result, report)
 
 
-def _explored(surface, point, outward, planes, **given):
-    """What core.explore finds; where facets longer than some steps may be why it fails, the error says so."""
+def _explored(explore, surface, point, *where, **given):
+    """What `explore` of core finds. Where facets are longer than some steps, an error says so."""
     try:
-        return core.explore(surface, point, outward, planes, **given)
+        return explore(surface, point, *where, **given)
     except core.DegenerateCurvesError as error:
         step = {"auto": FINEST_STEP * surface.size}.get(given["step"], given["step"])
         facet = surface.facet(point)
@@ -121,7 +120,7 @@ def _explored(surface, point, outward, planes, **given):
 
 
 def _exploration_report(found, given, ended):
-    """What a touch has found, the first `given` of its planes not by itself; `ended` as in the report."""
+    """The report of a touch whose first `given` planes were given; `ended` as in reconstruction_report."""
     added = zip(found.planes[given:], found.stds, found.stds[1:], strict=False)
     return {
         "degree": found.result.patch.degree,
@@ -138,13 +137,13 @@ def _exploration_report(found, given, ended):
 
 
 def completed(touched, most=None):
-    """The touch with what is dear in its report too: where to touch next, and distances to the mesh.
+    """The touch with the slow parts of its report, too: where to touch next, and distances to the mesh.
 
-    most : of the vertices around, where not all are to be compared
+    most : the largest number of vertices to compare; None for all
     """
     clock, result, report = [perf_counter()], touched.result, touched.report
     found = _verification_report(touched.surface, result, most)
-    # Where faces are large a pocket between the curves may have no vertex that lies over the patch.
+    # If faces are large, a pocket between the curves may have no vertex that lies over the patch.
     offs = found.get("vertex_distance_mean"), core.height_error(result, touched.surface)
     found |= judgment(result, max(off or 0.0 for off in offs), report["ended"], found["vertices"])
     clock.append(perf_counter())
@@ -156,8 +155,8 @@ def completed(touched, most=None):
 
 
 def require_lengths(name, size, extent, step, noise):
-    """Raises ValueError for lengths, 0 where they are not given, that no touch of an object can have."""
-    if not all(length >= 0.0 for length in (extent, step, noise)):  # NaN is none
+    """Raises ValueError for lengths that no touch of an object can have; 0 stands for one not given."""
+    if not all(length >= 0.0 for length in (extent, step, noise)):  # NaN fails every comparison.
         raise ValueError(
             f"Extent, step and noise are lengths of 0 or more, got "
             f"{length(extent)}, {length(step)} and {length(noise)}"
@@ -178,7 +177,7 @@ def require_lengths(name, size, extent, step, noise):
 
 
 def _reference_point(name, surface, location, extent, step):
-    """The point of the surface nearest to the location, and the normal there."""
+    """The point of the surface nearest to the location, and its normal. Raises ValueError if that is far."""
     point, normal = nearest_point(name, surface, location, extent or AWAY * surface.size)
     require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
     return point, normal
@@ -187,7 +186,7 @@ def _reference_point(name, surface, location, extent, step):
 def nearest_point(name, surface, location, farthest):
     """The point of a surface nearest to a location, and the normal there.
 
-    Raises ValueError, with a sentence, where it is farther than that.
+    Raises ValueError, with a sentence, if it is farther than `farthest`.
     """
     if not np.isfinite(location).all():
         raise ValueError("The location has coordinates that are not finite: set it on the surface")
@@ -201,7 +200,7 @@ def nearest_point(name, surface, location, farthest):
 
 
 def require_fine(spacing, step):
-    """Raises ValueError where coordinates are too coarse for the step."""
+    """Raises ValueError if coordinates that are `spacing` apart are too coarse for the step."""
     if spacing > STEP_ROUNDING * step:
         raise ValueError(
             f"Neighboring coordinates at the point are {length(spacing)} apart in single precision, "
@@ -212,7 +211,7 @@ def require_fine(spacing, step):
 
 
 def reference_axes(outward, tangent=None):
-    """Columns e1, n and e1 x n of the planes: by `tangent`, unless that is along the normal."""
+    """Columns e1, n and e1 x n of the planes; e1 follows `tangent`, unless that is along the normal."""
     plane = core.SamplingPlane(0.0)
     try:
         return plane.axes(outward, tangent)
@@ -221,9 +220,9 @@ def reference_axes(outward, tangent=None):
 
 
 def plane_axes(matrix, settings, number):
-    """Columns t, u, t x u of a sampling plane of a probe with that world matrix, to draw it.
+    """Columns t, u and t x u of a sampling plane, for drawing; `matrix` is the probe's world matrix.
 
-    See core.SamplingPlane.axes; a tilt that cannot be touched with is drawn as the steepest.
+    See core.SamplingPlane.axes. A tilt that is too steep to touch with is drawn as the steepest.
     """
     tilt = min(max(settings.tilts[number], -STEEPEST), STEEPEST)
     plane = core.SamplingPlane(settings.azimuths[number], tilt)
@@ -231,7 +230,7 @@ def plane_axes(matrix, settings, number):
 
 
 def _verification_report(surface, result, most):
-    """Distances to the patch of the vertices over it that a finger can reach; none where there are none."""
+    """The report of distances from the patch to the vertices over it that a finger can reach, if any."""
     _, over = reachable(surface, result, most)
     misses = core.distances(result.geometry, result.frame.to_local(over))
     if not len(misses):

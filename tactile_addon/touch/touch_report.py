@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is said of a touch: a dict of plain values, its message included."""
+"""The report of a touch: a dict of plain values, including its message."""
 
 import math
 from collections import Counter
@@ -15,7 +15,7 @@ ENDS = {
     core.CREASE: "at a crease",
     core.NOT_MONGE: "where the surface turns away",
 }
-FEW_VERTICES = 6  # over a patch: with fewer it is facets that were felt, not the shape they stand for
+FEW_VERTICES = 6  # With fewer vertices over a patch, facets were felt and not the shape they stand for.
 
 
 def ends(contours):
@@ -27,7 +27,7 @@ def ends(contours):
 
 
 def early_ends(contours):
-    """A sentence on what has ended curves before the extent that was asked for; empty where nothing has."""
+    """A sentence on what has ended curves before the extent that was asked for, or ""."""
     counts = Counter(stop for contour in contours for stop in contour.stops)
     del counts[core.EXTENT]
     if not counts:
@@ -45,7 +45,7 @@ def _counted(counts, total):
 def judgment(result, mean, ended, vertices=FEW_VERTICES):
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
-    vertices : of the mesh over the patch, as far as they are known
+    vertices : number of the mesh's vertices over the patch, if it is known
     """
     status, message = core.judged_by_mesh(result, mean)
     found = {"status": status, "message": message + (ended if message == result.message else "")}
@@ -58,7 +58,7 @@ def judgment(result, mean, ended, vertices=FEW_VERTICES):
 
 
 def suggestion_report(result, reference):
-    """The plane that would tell most, as an azimuth like those of `planes`, and what it would bring."""
+    """The plane that would tell most, with an azimuth like those of the planes, and what it would bring."""
     e1, outward = reference[:, 0], reference[:, 1]
     plane, expected = core.suggest_plane(result, outward, e1)
     return {
@@ -69,7 +69,7 @@ def suggestion_report(result, reference):
 
 
 def measures(result):
-    """What else there is to say of a fit, which is dear, or of interest only once a gesture has ended."""
+    """The parts of a report that take long or matter only once a gesture has ended."""
     return {
         "area": result.domain.area,
         "total_absolute_curvature": result.total_absolute_curvature,
@@ -79,7 +79,7 @@ def measures(result):
 
 
 def reconstruction_report(result, ended=""):
-    """The report of a fit; `ended` is added to its message. Nothing of a mesh is known yet."""
+    """The report of a fit before it is compared with a mesh; `ended` is added to its message."""
     (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
         **judgment(result, 0.0, ended),

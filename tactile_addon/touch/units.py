@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lengths and curvatures in words, in the unit the scene shows lengths in."""
+"""Lengths and curvatures in words, in the unit in which the scene shows lengths."""
 
 import math
 
@@ -25,9 +25,9 @@ SUPERSCRIPTS = {1: "", 2: "²"}
 
 
 def unit_of(scene, size):
-    """(name, length in units of the world) of the unit for a thing of that size; "" where there is none.
+    """(name, length in units of the world) of the unit for a thing of this size; the name may be "".
 
-    The scene's own, unless that would make for very long numbers.
+    It is the scene's own unit, unless numbers would become very long.
     """
     settings = scene.unit_settings
     if settings.system == "NONE":
@@ -41,18 +41,18 @@ def unit_of(scene, size):
 
 
 def say(value, power, unit, std=None):
-    """A value in length^power, as in "0.0123 mm" or "-4.2 ± 0.3 1/mm²"; the panel has room for one digit."""
+    """A value in length^power in words, such as "0.0123 mm" or "-4.2 ± 0.3 1/mm²"."""
     spread = "" if std is None else f" ± {float(f'{std / unit[1] ** power:.1g}'):g}"
     return f"{value / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
 
 
 def length(value, unit=None):
-    """A length in words, in that unit or in the open scene's, for a message."""
+    """A length in words for a message, in this unit or in that of the open scene."""
     size = abs(value) if 0.0 < abs(value) < math.inf else 1.0
     return say(value, 1, unit or unit_of(bpy.context.scene, size))
 
 
 def symbol(power, unit):
-    """The unit of length^power, as in "mm" or "1/mm²"; empty for a number, and where lengths have none."""
+    """The unit of length^power, such as "mm" or "1/mm²"; "" for a plain number or if lengths have no unit."""
     name = unit[0] if power else ""
     return f"1/{name}{SUPERSCRIPTS[-power]}" if name and power < 0 else name

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reports of patches and maps as tables and sentences for people; and errors as sentences."""
+"""Reports of patches as tables and sentences for people, and errors as sentences."""
 
 from collections import Counter
 
@@ -11,16 +11,16 @@ from .touch_report import ENDS, FEW_VERTICES
 from .units import length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
-EARLY = ("edge", "crease", "turns away")  # what ends a curve that could be felt on
+EARLY = ("edge", "crease", "turns away")  # These end a curve early.
 
 
 def readable(report):
-    """Lines of label and value; lengths in the unit of the scene or file."""
+    """Lines of label and value, with lengths in the unit of the scene or file."""
     return table(readable_rows(report))
 
 
 def readable_rows(report):
-    """(label, value) of all that a patch has to say."""
+    """(label, value) of everything there is to say of a patch."""
     seconds, unit = report["seconds"], unit_of(bpy.context.scene, report["radius"])
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
     return [
@@ -52,7 +52,7 @@ def readable_rows(report):
 
 
 def verdict(report, unit):
-    """Whether a patch is good, and what to do where it is not, in a sentence."""
+    """A sentence on whether a patch is good, and what to do if it is not."""
     if report["status"] == "outdated":
         return "Outdated: touch again"
     if report["status"] != "ok":
@@ -68,7 +68,7 @@ def verdict(report, unit):
 
 
 def added_planes(report, unit):
-    """What more planes have brought, in the unit."""
+    """A sentence on what added planes have brought, in the unit."""
     added = report["added_planes"]
     if not added:
         return "One more plane would not help much"
@@ -88,7 +88,7 @@ def _tracked(report):
 
 
 def _lengths(report, unit):
-    """Rows of a touch; for measured curves, how far they miss their common point."""
+    """Rows with the lengths of a touch; for measured curves, how far they miss their common point."""
     names = [name for name in ("step", "extent", "radius") if name in report]
     rows = [(", ".join(names), ", ".join(say(report[name], 1, unit) for name in names))]
     if "misses" in report:
@@ -103,18 +103,18 @@ def table(rows):
 
 
 def many(count, one, several):
-    """So many of something, as in "1 touch"."""
+    """A count with its noun, as in "1 touch"."""
     return f"{count} {one if count == 1 else several}"
 
 
 def sentence(error):
-    """The words of an exception, as a sentence begins, in one line: names may hold more."""
+    """The message of an exception as a sentence in one line; names in it may have more lines."""
     words = " ".join(str(error).split())
     return words[:1].upper() + words[1:]
 
 
 def fit_summary(report):
-    """The fit in a sentence: the verdict on it, and the curvatures."""
+    """A sentence on a fit: the verdict on it, and the curvatures."""
     unit = unit_of(bpy.context.scene, report["radius"])
     curvatures = " and ".join(say(report[key], -1, unit) for key in ("k1", "k2"))
     return f"{verdict(report, unit)}. Curvatures {curvatures}"
@@ -132,7 +132,7 @@ def _verification(report, unit):
 
 
 def _verified_rows(found, unit):
-    """What is not in the report without it."""
+    """Rows on the verification against a mesh, which only some reports have."""
     if found is None:
         return []
     names = [name for name in ("vertex", "contact") if f"{name}_distance_mean" in found]
@@ -145,7 +145,7 @@ def _verified_rows(found, unit):
 
 
 def registration_summary(found):
-    """A sentence that says where a patch was put."""
+    """A sentence on where a patch was put by registration."""
     residual = found["residuals"][found["pose"] - 1]
     words = f'The contacts are {length(residual)} off "{found["target"]}" (root mean square)'
     if not found["is_ambiguous"]:
@@ -173,5 +173,5 @@ def _measured(report, key, power, unit):
 
 
 def _shared(report, key, unit):
-    """A length, and its share of the radius."""
+    """A length of the report in words, with its share of the radius."""
     return f"{say(report[key], 1, unit)}, {100.0 * report[key] / report['radius']:.2f} % of the radius"

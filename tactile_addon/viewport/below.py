@@ -13,8 +13,8 @@ from ..scene import patch_record
 from ..touch.surface import MeshSurface
 from .mouse import mouse_ray, viewport_below
 
-LAYERS = 64  # patches and hidden objects that the mouse sees through at most
-MANY_FACES = 200_000  # A mesh with more takes a noticeable time to be touched first.
+LAYERS = 64  # The mouse sees through at most so many patches and hidden objects.
+MANY_FACES = 200_000  # The first touch of a mesh with more faces takes a noticeable time.
 
 
 def large_meshes(context):
@@ -25,7 +25,7 @@ def large_meshes(context):
 
 
 def names_below(context, event, names):
-    """The names of the objects whose boxes are below the mouse, or may be."""
+    """Those of the names whose objects may be below the mouse, judged by their boxes."""
     viewport = viewport_below(context, event)
     if viewport is None:
         return []
@@ -38,7 +38,7 @@ def _is_over(name, region, view, mouse):
     obj = bpy.data.objects[name]
     corners = (obj.matrix_world @ Vector(corner) for corner in obj.bound_box)
     seen = [location_3d_to_region_2d(region, view, corner) for corner in corners]
-    if None in seen:  # behind the eye
+    if None in seen:  # A corner is behind the eye.
         return True
     ranges = ((min(axis), max(axis)) for axis in zip(*seen, strict=True))
     return all(low <= at <= high for at, (low, high) in zip(mouse, ranges, strict=True))
@@ -48,21 +48,21 @@ def read(context, names):
     """Has Blender build the trees of these objects' faces, which it keeps."""
     depsgraph = context.evaluated_depsgraph_get()
     for name in names:
-        with suppress(ValueError):  # said where it is touched
+        with suppress(ValueError):  # The touch will say why.
             MeshSurface(bpy.data.objects[name], depsgraph)
 
 
 def point_below(context, event):
-    """(object, location, direction toward the eye) of the mesh below the mouse, or None where there is none.
+    """(object, location, direction toward the eye) of the mesh below the mouse, or None if there is none.
 
-    Raises ValueError for what cannot be touched.
+    Raises ValueError for an object that cannot be touched.
     """
     viewport = viewport_below(context, event)
     if viewport is None:
         return None
     space, region, view = viewport
     eye, direction = mouse_ray(region, view, event)
-    # An orthographic view shows what is behind its origin too.
+    # An orthographic view also shows what is behind its origin.
     start = eye if view.is_perspective else eye - space.clip_end * direction
     depsgraph = context.evaluated_depsgraph_get()
     cast = context.scene.ray_cast
@@ -74,13 +74,14 @@ def point_below(context, event):
         if not probe.is_result(obj) and (obj != found.original or obj.visible_in_viewport_get(space)):
             if obj == found.original:  # A map's own transform differs from its source's by rounding.
                 _require_touchable(obj, matrix)
-            # Cast again from close by: from far away it is not exact.
+            # The ray is cast again from close by, because from far away it is not exact.
             surface = MeshSurface(obj, depsgraph)
             depth = (point - eye).dot(direction) - surface.size
             start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
             hit = surface.ray_cast(start, direction, 2.0 * surface.size)
             return obj, list(point) if hit is None else hit[0], -direction
-        # Go on behind it by more than rounding, from close by: from far away that exceeds a small object.
+        # The ray goes on behind the object by more than rounding. From far away that would be more than a
+        # small object, so the place is found again from close by.
         back = 1e-3 * (point - start).length
         hit, near, *_ = cast(depsgraph, point - back * direction, direction)
         start = (near if hit else point) + 1e-5 * max(back, point.length) * direction
@@ -88,14 +89,14 @@ def point_below(context, event):
 
 
 def _touched_by_map(obj, space):
-    """What a map or a whole object shows, where it is not to be seen itself; `obj` for all else."""
+    """The object that a map or a whole object was made from, if that is visible; else `obj` itself."""
     record = patch_record.touched_record(obj)
     source = record and bpy.data.objects.get(record["source"])
     return obj if source is None or source.visible_in_viewport_get(space) else source
 
 
 def _require_touchable(obj, matrix):
-    """Raises ValueError where a ray of the scene has hit what no touch can: no mesh, or an instance."""
+    """Raises ValueError if a ray has hit what cannot be touched: an instance, or another type than a mesh."""
     if obj.type != "MESH":
         raise ValueError(f'"{obj.name}" is not a mesh: convert it to one first')
     if matrix != obj.matrix_world:

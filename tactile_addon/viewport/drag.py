@@ -17,10 +17,10 @@ from ..touch.touch_object import plane_axes
 from .mouse import draw_hints, mouse_ray
 
 DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
-# Sines of the view and a plane, below which nothing can be dragged in it, or not well.
+# If the sine of the angle between view and plane is less, nothing can be dragged in the plane, or not well.
 EDGE_ON, STEEP = 0.03, 0.15
-SNAP = math.radians(5.0)  # the step of angles with Ctrl
-PRECISE = 0.1  # share of the mouse's way that counts with Shift
+SNAP = math.radians(5.0)  # With Ctrl, angles change by this step.
+PRECISE = 0.1  # With Shift, this share of the mouse's way counts.
 HINTS = (
     ("MOUSE_LMB", "Confirm"),
     ("MOUSE_RMB", "Cancel"),
@@ -56,8 +56,8 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if self.what in (DRAG_TURN, DRAG_TILT):
             found.tactile_probe.active_plane = self.plane
         self._matrix = found.matrix_world.copy()
-        # The handle comes to the mouse; where the button went down is not known, for a busy Blender hears
-        # of it late, with the mouse already elsewhere.
+        # The handle follows the mouse from here on. Where the button went down is not known, because a busy
+        # Blender hears of it late, when the mouse is already elsewhere.
         self._before = self._value = self._free = self._last = self._get(context)
         if self.what != POINT and self._below(context, event) is None:
             self.report({"WARNING"}, "The plane is seen edge on: turn the view to drag this handle")
@@ -83,7 +83,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         self._end(context)
 
     def _follow(self, context, event):
-        """Moves the value by what the mouse has moved, the point to below it."""
+        """Changes the value as the mouse has moved, or puts the point below the mouse."""
         if self.what == POINT:
             self._slide(context, event)
             return
@@ -103,7 +103,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         self._set(context, value)
 
     def _slide(self, context, event):
-        """Puts the probe on the surface below the mouse, turned by no more than the normal turns."""
+        """Puts the probe on the surface below the mouse, and turns it as the normal turns."""
         origin, direction = mouse_ray(context.region, context.region_data, event)
         depsgraph = context.evaluated_depsgraph_get()
         try:
@@ -111,18 +111,18 @@ class TACTILE_OT_drag(bpy.types.Operator):
             if not context.region_data.is_perspective:
                 origin -= context.space_data.clip_end * direction
             hit = surface.ray_cast(list(origin), list(direction), 4.0 * context.space_data.clip_end)
-        except (ValueError, AttributeError):  # the target is gone, or cannot be touched: the panel says so
+        except (ValueError, AttributeError):  # The target is gone or cannot be touched; the panel says so.
             return
         if hit is None:
             return
         upright, normal = self._matrix.col[2].xyz.normalized(), Vector(hit[1])
-        if upright.dot(direction) * normal.dot(direction) < 0.0:  # it stays on its side of the surface
+        if upright.dot(direction) * normal.dot(direction) < 0.0:  # It stays on its side.
             normal.negate()
         turn = upright.rotation_difference(normal) @ self._matrix.to_quaternion()
         self._set(context, Matrix.LocRotScale(Vector(hit[0]), turn, self._matrix.to_scale()))
 
     def _below(self, context, event):
-        """Where the mouse is: an angle, or a distance from the point; None where that cannot be told."""
+        """The angle of the mouse, or its distance from the point; None if that cannot be told."""
         origin, direction = mouse_ray(context.region, context.region_data, event)
         center, normal = self._matrix.translation, self._matrix.col[2].xyz.normalized()
         e1 = self._matrix.col[0].xyz.normalized()
@@ -180,7 +180,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
 
 
 def shown_probe(context):
-    """The probe that the panel shows, active by itself, its patch or its contours; None without handles."""
+    """The probe whose handles are shown: the active one, or that of the active patch or contours; or None."""
     found = probe.probe_of(context.object)
     if found is None or not found.visible_get() or probe.lock_of(found) is not None:
         return None

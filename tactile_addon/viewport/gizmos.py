@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles of the active probe: for its point, to turn sampling planes, to tilt one, and for the extent."""
+"""The handles of the active probe: they move its point, turn and tilt sampling planes, and set the extent."""
 
 import bpy
 import numpy as np
@@ -12,10 +12,10 @@ from ..touch.touch_object import plane_axes
 from .drag import DRAG_EXTENT, DRAG_TILT, DRAG_TURN, POINT, STEEP, shown_probe
 from .overlay import PLANE_COLORS
 
-HANDLE_REACH = 1.15  # the place of handles that turn, in extents from the point,
-UPRIGHT = 0.75  # and of those that tilt, along the normal
-BALL, LEAST_BALL = 0.12, 0.05  # sizes of balls, in those of Blender's gizmos,
-SHARE = 0.125  # and that of one in the reach of a patch that is small in the view
+HANDLE_REACH = 1.15  # Handles that turn planes are so many extents away from the point,
+UPRIGHT = 0.75  # and those that tilt planes so many extents above it.
+BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo size.
+SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
 
 
 class TACTILE_GGT_handles(bpy.types.GizmoGroup):
@@ -71,20 +71,19 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
             turn.hide, tilt.hide = i >= settings.plane_count, i != active
             if not turn.hide:
                 t, up, _ = plane_axes(matrix, settings, i).T
-                # Seen edge on, its plane turns by much where the mouse moves by little.
+                # If the tilt's plane is seen edge on, a little way of the mouse turns it by much.
                 tilt.hide = tilt.hide or abs(ahead.dot(Vector(t))) < STEEP
                 turn.matrix_basis = Matrix.Translation(center + HANDLE_REACH * reach * t)
                 tilt.matrix_basis = Matrix.Translation(center + UPRIGHT * reach * up)
         self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)
 
     def _shrink(self, context, center, reach):
-        """Makes the balls no larger than suits a patch that is small in the view, which they would hide."""
+        """Makes the balls smaller if the patch is small in the view, so that they do not hide it."""
         side = context.region_data.view_matrix.inverted_safe().col[0].xyz.normalized()
-        ends = (
+        here, there = (
             location_3d_to_region_2d(context.region, context.region_data, at)
             for at in (center, center + reach * side)
         )
-        here, there = ends
         if here is None or there is None:
             return
         gizmo = context.preferences.view.gizmo_size * context.preferences.system.ui_scale
@@ -94,7 +93,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
 
 
 def _line_of_sight(view, point):
-    """The direction, from the eye, in which a point of the world is seen."""
+    """The direction from the eye to a point of the world."""
     if view.is_perspective:
         return (point - view.view_matrix.inverted_safe().translation).normalized()
     return -view.view_matrix.inverted_safe().col[2].xyz.normalized()

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is below the mouse: the 3D viewport, and the line into the scene; and what its buttons do."""
+"""The 3D viewport below the mouse, the line from there into the scene, and hints on what its buttons do."""
 
 from mathutils import Vector
 
-WIDE = ("EVENT_ESC", "EVENT_CTRL")  # icons that reach into the text beside them
+WIDE = ("EVENT_ESC", "EVENT_CTRL")  # These icons reach into the text beside them.
 
 
 def draw_hints(layout, hints):
-    """The (icon, text) of mouse and keys in the status bar."""
+    """Draws hints, (icon, text) each, on mouse and keys in the status bar."""
     for icon, text in hints:
         if icon in WIDE:
             layout.label(icon=icon)
@@ -19,7 +19,7 @@ def draw_hints(layout, hints):
 
 
 def viewport_below(context, event):
-    """(space, region, view) of the 3D viewport below the mouse, or None over anything else."""
+    """(space, region, view) of the 3D viewport below the mouse, or None if it is over anything else."""
     x, y = event.mouse_x, event.mouse_y
     for area in context.screen.areas:
         inside = [r for r in area.regions if 0 <= x - r.x < r.width and 0 <= y - r.y < r.height]
@@ -31,8 +31,8 @@ def viewport_below(context, event):
 def mouse_ray(region, view, event):
     """(origin, direction) of the line below the mouse in a viewport, in the world.
 
-    Not by view3d_utils: the inverse of the whole projection, which it uses, is off by many pixels where
-    the clipping range is a million times as long as what is seen.
+    The functions of view3d_utils invert the whole projection. This does not, because it would be off by many
+    pixels if the clipping range is a million times as long as what is seen.
     """
     x = 2.0 * (event.mouse_x - region.x) / region.width - 1.0
     y = 2.0 * (event.mouse_y - region.y) / region.height - 1.0

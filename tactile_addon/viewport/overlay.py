@@ -16,20 +16,20 @@ from ..stability_map import map_object
 from ..touch import units
 from ..touch.touch_object import plane_axes
 
-# Okabe and Ito's colors, which color-blind readers can tell apart, one a sampling plane.
+# Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
 PLANE_COLORS = [
     (0.90, 0.62, 0.0), (0.34, 0.71, 0.91), (0.0, 0.62, 0.45),
     (0.94, 0.89, 0.26), (0.80, 0.47, 0.65), (0.84, 0.37, 0.0),
 ]  # fmt: skip
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
-FONT = 0  # Blender's own
-LEGEND_STEPS = 65  # of the legend's colors
-# In pixels at the resolution scale 1, width and height: the legend's bar, and Blender's navigation buttons.
+FONT = 0  # This is Blender's own font.
+LEGEND_STEPS = 65  # The legend's bar shows so many colors.
+# Width and height of the legend's bar and of Blender's navigation buttons, in pixels at resolution scale 1.
 BAR, NAVIGATION_GIZMO = (150, 12), (50, 290)
 
 
 def preview_lines(touched):
-    """(points, color) of what a pick shows: the rim of what was felt, the normal, and the section curves."""
+    """(points, color) of each line of a pick's preview: the rim of the patch, the normal and the contours."""
     r = touched.result
     edge = r.domain.boundary(RIM_CORNERS)
     edge = r.frame.to_world(np.column_stack([edge, r.height(*edge.T)]))
@@ -40,7 +40,7 @@ def preview_lines(touched):
 
 
 def draw_preview(seen):
-    """The lines of the touch in `seen`, a dict."""
+    """Draws the preview of seen["touched"], a touch or None."""
     if seen["touched"] is None:
         return
     scale = bpy.context.preferences.system.ui_scale
@@ -60,13 +60,13 @@ def _line(points, color, width):
 
 
 def _active(context):
-    """The active object, where the viewport shows overlays."""
+    """The active object if the viewport shows overlays, or None."""
     space = context.space_data
     return context.view_layer.objects.active if space and space.overlay.show_overlays else None
 
 
 def draw_plane():
-    """While a handle is dragged, the active sampling plane, as far as its contour may reach."""
+    """Draws the active sampling plane while a handle is dragged, as far as its contour may reach."""
     context = bpy.context
     if not any(operator.bl_idname == "TACTILE_OT_drag" for operator in context.window.modal_operators):
         return
@@ -89,7 +89,7 @@ def draw_plane():
 
 
 def draw_legend():
-    """The legend of the active patch, whole object or map: quantity, unit and range, beside the sidebar."""
+    """Draws the legend of the active patch, whole object or map: quantity, unit and range."""
     context = bpy.context
     if not shows_colors(context.space_data):
         return
@@ -115,7 +115,7 @@ def draw_legend():
 
 
 def _scale(context, title, record, size, power, low):
-    """The title with its unit, where the colors begin, and the (place, text) labels of a scale."""
+    """The title with its unit, the share at which colors begin, and the (share, text) labels of a scale."""
     unit = units.unit_of(context.scene, size)
     symbol = units.symbol(power, unit)
     top = record["color_limit"] / unit[1] ** power
@@ -124,7 +124,7 @@ def _scale(context, title, record, size, power, low):
 
 
 def _draw_box(context, title, low, labels, swatches=()):
-    """Title, colors from `low` to 1 with labels, if any, and swatches; nothing where it has no room."""
+    """Draws a title, a bar of colors from `low` to 1 if there are labels, and swatches, if there is room."""
     theme, scale = (
         context.preferences.themes[0].user_interface.wcol_tooltip,
         context.preferences.system.ui_scale,
@@ -155,14 +155,14 @@ def _draw_box(context, title, low, labels, swatches=()):
 
 
 def _draw_bar(x, y, wide, high, gap, low, labels):
-    """The colors from `low` to 1, and below them the (place, text) labels."""
+    """Draws the colors from `low` to 1, and the (share, text) labels below them."""
     at = np.linspace(x, x + wide, LEGEND_STEPS)
     shades = colors.shades(np.repeat(np.linspace(low, 1.0, LEGEND_STEPS), 2), 1.0)
     _fill([(a, b) for a in at for b in (y, y + high)], shades.tolist())
     labels = [(share, text.replace("-", "\N{MINUS SIGN}")) for share, text in labels]
     first, middle, last = (blf.dimensions(FONT, text)[0] for _, text in labels)
     if 0.5 * (wide - middle) < max(first, last):
-        del labels[1]  # it would run into one beside it
+        del labels[1]  # It would run into one beside it.
     line = blf.dimensions(FONT, "0")[1]
     for share, text in labels:
         middle = x + (share - low) / (1.0 - low) * wide
@@ -180,7 +180,7 @@ def _write(text, x, y):
 
 
 def _fill(points, shades):
-    """A strip of triangles, each of its points (x, y) in a color of its own."""
+    """Draws a strip of triangles, each point (x, y) of which has a color of its own."""
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     gpu.state.blend_set("ALPHA")
     batch_for_shader(shader, "TRI_STRIP", {"pos": points, "color": shades}).draw(shader)
@@ -188,7 +188,7 @@ def _fill(points, shades):
 
 
 def _free_strip(context, high):
-    """(left, right, bottom) of a strip so high that no sidebar, shelf or button covers, as low as can be."""
+    """(left, right, bottom) of the lowest strip of this height that no sidebar, shelf or button covers."""
     region, scale = context.region, context.preferences.system.ui_scale
     left, right, bottom = 0.0, region.width, 0.0
     hud = 0.0
@@ -212,7 +212,7 @@ def _free_strip(context, high):
 
 
 def draw_handlers():
-    """Adds the drawings that are always there; returns their handles, which remove them."""
+    """Adds the drawings that are always there, and returns the handles by which to remove them."""
     add = bpy.types.SpaceView3D.draw_handler_add
     kinds = ((draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
     return [add(draw, (), "WINDOW", kind) for draw, kind in kinds]

@@ -3,7 +3,7 @@
 """Pick Reference Point: hover to see how the surface lies, click to have a probe and a patch there."""
 
 import bpy
-from bpy.props import BoolProperty, FloatVectorProperty
+from bpy.props import BoolProperty
 
 from ..probes import anchor, probe, touch_again
 from ..probes.number_fields import dragged
@@ -12,7 +12,16 @@ from ..scene import patch_record
 from ..scene.viewports import show_colors
 from ..stability_map.map_object import inputs_of
 from ..touch import units
-from ..touch.settings import LOCATION, NAMES, TARGET, UNSAVED, TouchSettings, draw_all, touch_arguments
+from ..touch.settings import (
+    LOCATION,
+    NAMES,
+    OUTWARD,
+    TARGET,
+    UNSAVED,
+    TouchSettings,
+    draw_all,
+    touch_arguments,
+)
 from ..touch.touch_object import touch
 from ..touch.wording import sentence, verdict
 from . import overlay
@@ -38,12 +47,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
 
     target: TARGET
     location: LOCATION
-    outward: FloatVectorProperty(
-        name="Outward",
-        subtype="XYZ",
-        description="The direction to touch from; if not set, the surface's own normal",
-        options=UNSAVED,
-    )
+    outward: OUTWARD
     new: BoolProperty(
         name="New Probe",
         description="Make a new probe instead of moving the active one",
@@ -69,7 +73,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             self.report({"ERROR"}, "Points are picked in a 3D viewport: start the pick there")
             return {"CANCELLED"}
         self._area, self._unread = context.area, large_meshes(context)
-        for name in NAMES:  # those of the last pick are remembered, but suited another object
+        for name in NAMES:  # Blender remembers those of the last pick, which suited another object.
             self.properties.property_unset(name)
         try:
             self._inherit(context)
@@ -104,7 +108,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def _click(self, context, event):
-        """What the tool in the toolbar does."""
+        """Touches below the mouse at once, as the tool in the toolbar does."""
         self._seen = {"touched": None}
         words = self._hover(context, event)
         self._area.header_text_set(None)
@@ -121,7 +125,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         return self.execute(context)
 
     def cancel(self, context):
-        """Takes away all that shows that a pick is going on."""
+        """Removes everything that shows that a pick is going on."""
         bpy.types.SpaceView3D.draw_handler_remove(self._drawing, "WINDOW")
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
@@ -139,7 +143,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         found = moved or probe.make(context, target)
         settings = found.tactile_probe
         with_target = anchor.is_attached(found) if moved else self.parent
-        settings.is_probe = False  # It must not be touched again for each of these.
+        settings.is_probe = False  # The changes below must not make it touch again each time.
         settings.target = target
         if with_target and found.parent != target:
             anchor.attach(found, target)
@@ -178,9 +182,9 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         draw_all(layout, self, fields_of(context, self.target))
 
     def _inherit(self, context):
-        """The probe that is to be moved, if any; what is not set becomes what it has, or the active map.
+        """The probe to be moved, or None. Settings that are not set are taken from it or from the active map.
 
-        Raises ValueError where it cannot be changed.
+        Raises ValueError if the probe cannot be changed.
         """
         active = context.view_layer.objects.active
         moved, given = None if self.new else probe.probe_of(active), {}
@@ -195,7 +199,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         return moved
 
     def _hover(self, context, event):
-        """Touches below the mouse; the preview shows it, and the header says it, and it returns the words."""
+        """Touches below the mouse for the preview, and returns what the header says of it."""
         self._seen["touched"], words = None, "Move over a mesh to touch it"
         try:
             self._read(context, names_below(context, event, self._unread))
@@ -215,7 +219,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         return words
 
     def _read(self, context, names):
-        """Says that it takes a while to touch large meshes for the first time, and does what takes it."""
+        """Prepares large meshes for their first touch, and says so, because it takes a while."""
         if not names:
             return
         self._unread.difference_update(names)

@@ -28,7 +28,7 @@ def register():
 
 def unregister():
     bpy.utils.unregister_tool(TactileTool)
-    # Blender leaves the tool's keys among the user's.
+    # Blender itself leaves the tool's keys among the user's keys.
     user = bpy.context.window_manager.keyconfigs.user
     for keymap in [keymap for keymap in user.keymaps if keymap.name.endswith(f", {TactileTool.bl_label}")]:
         user.keymaps.remove(keymap)

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole object, touched by itself, as one surface."""
+"""A whole object as one surface, touched all over without help."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Touch All Over: touches that grow over an object by themselves; in slices in a window."""
+"""Touch All Over: touches that grow over an object by themselves; in slices if there is a window."""
 
 import bpy
 from bpy.props import FloatVectorProperty, IntProperty
@@ -57,7 +57,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     )
 
     stop = "Stop Touching and Keep"
-    meanwhile = {"PASS_THROUGH"}  # a detached mesh is touched
+    meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
     _growing = None
 
     @classmethod
@@ -85,7 +85,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         self._steps = self._shown()
 
     def _shown(self):
-        """The steps; in a window the patches appear between them."""
+        """The steps of the touches. In a window, patches appear between them."""
         shown = 0
         for _ in self._touches.steps():
             if self._growing is not None:
@@ -102,7 +102,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         self._touches.surface.require_source(context)
 
     def _stopped(self, context):
-        """Esc joins what there is so far; once more, or when that is meshed, and nothing is kept."""
+        """Has the patches so far joined. If Esc is pressed again, or during meshing, nothing is kept."""
         if self._touches.is_stopped or not self._touches.found:
             self._leave(context)
             return {"CANCELLED"}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is said of a whole object that was touched, in the panel and in the shell."""
+"""What the panel and the shell say of a whole object."""
 
 import bpy
 
@@ -9,17 +9,17 @@ from ..touch.wording import many, table
 
 
 def unit_of(record):
-    """The unit for what there is to say: lengths from below the tolerance to far above."""
+    """The unit of a report, which has lengths from below the tolerance to far above it."""
     return units.unit_of(bpy.context.scene, 10.0 * (record["tolerance"] or record["height_std"]))
 
 
 def object_readable(record):
-    """Lines of label and value; lengths in the unit of the scene or file."""
+    """Lines of label and value, with lengths in the unit of the scene or file."""
     return table(object_table_rows(record))
 
 
 def object_table_rows(record):
-    """(label, value) of all that a whole object has to say."""
+    """(label, value) of everything there is to say of a whole object."""
     unit, off = unit_of(record), _off(record, "mean")
     how = (
         many(record["touches"], "time", "times") if "touches" in record else f"{record['contacts']} contacts"
@@ -38,7 +38,7 @@ def object_table_rows(record):
 
 
 def object_summary(record):
-    """What is found of a whole object, in a sentence."""
+    """A sentence on what was found of a whole object."""
     std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
         touches = many(record["touches"], "touch", "touches")
@@ -47,7 +47,7 @@ def object_summary(record):
 
 
 def object_rows(record):
-    """(label, value) for the panel."""
+    """(label, value) of each row in the panel."""
     return _known(
         ("Touches", record.get("touches")),
         ("Contacts", record.get("contacts")),
@@ -64,7 +64,7 @@ def object_rows(record):
 
 
 def _known(*rows):
-    """Rows in words, without those whose value is None."""
+    """The rows whose value is not None, in words."""
     return [(label, str(value)) for label, value in rows if value is not None]
 
 
@@ -77,11 +77,11 @@ def _surface(record):
 
 
 def _tolerance(record):
-    """None where measured contacts have chosen it."""
+    """The tolerance in words, or None if measured contacts have chosen it."""
     return units.say(record["tolerance"], 1, unit_of(record)) if record["tolerance"] else None
 
 
 def _off(record, what):
-    """None where there was no mesh."""
+    """The mean or largest deviation from the mesh in words, or None if there was no mesh."""
     off = record.get(f"deviation_{what}")
     return None if off is None else units.say(off, 1, unit_of(record))

@@ -13,34 +13,36 @@ from ..touch.units import length
 from ..touch.wording import many
 from .whole_surface import WholeSurface
 
-TOLERANCE_SHARE = 1.0 / 500.0  # of the object's size, where no tolerance is given
-LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # of the size: beyond, no patch and no triangle fits
-SHORTEST_EDGE = 1e-3  # of the size: some millions of triangles
-STARTS = 20  # places that are tried where no place to begin is given
-TARGET_WITHIN = 0.05  # of the object's size, that the target is looked for along the normal
-COMPARED_AT_ONCE = 2000  # vertices whose deviation from the target is measured in a step
+# These lengths are shares of the object's size.
+TOLERANCE_SHARE = 1.0 / 500.0  # The default tolerance.
+LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
+SHORTEST_EDGE = 1e-3  # It makes some millions of triangles.
+TARGET_WITHIN = 0.05  # The target is looked for along the normal within this distance.
+STARTS = 20  # So many places to begin are tried if none is given.
+COMPARED_AT_ONCE = 2000  # A step measures the deviations of so many vertices from the target.
 
 
 class ObjectTouches:
-    """Touches of an evaluated mesh that begin at one place; all is in the directions of the world.
+    """Touches of an evaluated mesh that begin at one place, in the directions of the world.
 
-    surface : the mesh as it was, from its object's origin
+    surface : the mesh as it was, relative to its object's origin
     found : core.Reconstructions of the touches so far
-    done, uncovered : how many touches that took, some of which gave no patch; places known to be uncovered
-    words, share : what is going on, and the share of it that is done, None where nobody knows
+    done : the number of touches so far, including those that gave no patch
+    uncovered : the number of places that are known to be uncovered
+    words, share : what is going on, and the share of it that is done, or None if that is unknown
     whole : the WholeSurface, once the steps are done
     """
 
     def __init__(self, obj, depsgraph, *, location, tolerance, noise, seed, most, edge):
-        """`location` is None, and lengths 0, for a choice by the object.
+        """The object chooses the `location` if it is None, and lengths if they are 0.
 
-        Raises ValueError, with a sentence, for what cannot be touched.
+        Raises ValueError, with a sentence, for an object that cannot be touched and for bad settings.
         """
-        import scipy.interpolate  # half a second with all that it brings: not between two redraws
+        import scipy.interpolate  # The import takes half a second, too long between redraws.
         import scipy.ndimage  # noqa: F401
 
         for name, value in (("tolerance", tolerance), ("noise", noise), ("edge", edge)):
-            if not value >= 0.0:  # NaN is none
+            if not value >= 0.0:  # NaN fails every comparison, so it is refused, too.
                 raise ValueError(f"The {name} is a length of 0 or more, got {length(value)}")
         self.surface = DetachedMesh(obj, depsgraph)
         self.tolerance = tolerance or max(TOLERANCE_SHARE * self.surface.size, noise)
@@ -55,7 +57,7 @@ class ObjectTouches:
             self._start = nearest_point(obj.name, self.surface, at, AWAY * self.surface.size)
 
     def _require_lengths(self, noise, edge):
-        """Raises ValueError, with a sentence, for lengths that nothing on this object can have."""
+        """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
         name, size, tolerance = self.surface.name, self.surface.size, self.tolerance
         if tolerance < noise:
             raise ValueError(
@@ -83,7 +85,7 @@ class ObjectTouches:
             )
 
     def steps(self):
-        """Does all of it; a generator, which yields each few hundredths of a second."""
+        """Does everything, as a generator that yields every few hundredths of a second."""
         steps, state = self._started()
         while True:
             self._note(state)
@@ -96,7 +98,7 @@ class ObjectTouches:
         yield from self._shown()
 
     def _started(self):
-        """The steps of core and what the first of them said; raises ValueError where none can begin."""
+        """The steps of core, and the Progress of the first. Raises ValueError if touches cannot begin."""
         why = "no face has an area"
         for point, outward in self._places():
             steps = core.touch_all_over(
@@ -115,13 +117,13 @@ class ObjectTouches:
         raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
 
     def _places(self):
-        """Where the touches may begin, and the normal there."""
+        """Places where the touches may begin, with their normals."""
         if self._start is not None:
             yield self._start
             return
         faces = np.random.default_rng(self.seed).permutation(self.surface.faces)[:STARTS]
-        for middle in self.surface.points[faces].mean(axis=1):  # beside all creases between faces
-            with suppress(ValueError):  # a face of no area
+        for middle in self.surface.points[faces].mean(axis=1):  # It is off all edges.
+            with suppress(ValueError):  # The face has no area.
                 yield self.surface.project(middle)[:2]
 
     def _note(self, state):
@@ -150,11 +152,11 @@ class ObjectTouches:
             yield
 
     def stop(self):
-        """Has the steps touch no more, and join what there is."""
+        """Makes the steps touch no more, and join the patches so far."""
         self.is_stopped = True
 
     def report(self):
-        """What there is to say, a dict of plain values."""
+        """What was found, as a dict of plain values."""
         off = np.abs(self.whole.deviation)
         return {
             "touches": self.done,

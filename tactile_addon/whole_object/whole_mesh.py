@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What touches all over an object leave in the scene: their patches while they grow, then one surface."""
+"""What touches all over an object put into the scene: patches while they grow, then one surface."""
 
 import bpy
 import numpy as np
@@ -10,26 +10,26 @@ from ..scene import colors, patch_object, patch_record, undo
 from ..scene.mesh_data import emission, fill
 from ..scene.viewports import show_colors
 
-RINGS, SPOKES = (0.5, 1.0), 24  # of a patch while it is one of many
+RINGS, SPOKES = (0.5, 1.0), 24  # While a patch is one of many, it is drawn with these rings and spokes.
 
 
 class GrowingPatches:
-    """The patches that were found so far, as one object, until it is removed."""
+    """An object that shows the patches found so far, until it is removed."""
 
     def __init__(self, scene, surface):
         """`surface` is the DetachedMesh that is touched."""
         mesh = bpy.data.meshes.new(f"{surface.name} Touches")
         obj = bpy.data.objects.new(mesh.name, mesh)
         obj.show_in_front, obj.matrix_world = True, Matrix.Translation(surface.origin)
-        scene.collection.objects.link(obj)  # in none of its own, which might be left empty
-        with undo.after_step():  # of which there is one when it ends
+        scene.collection.objects.link(obj)  # A collection of its own might be left empty.
+        with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
         self._uid, self._patches = obj.session_uid, []
         show_colors()
 
     def add(self, found):
-        """Shows these core.Reconstructions too; nothing where somebody has deleted the object."""
+        """Shows these core.Reconstructions, too, unless somebody has deleted the object."""
         obj = self._object()
         if obj is None or not found:
             return
@@ -51,7 +51,7 @@ class GrowingPatches:
 
 
 def _disk(r):
-    """Points (n, 3) of a patch, on rings around its middle, and Gaussian curvatures (n,) there."""
+    """Points (n, 3) of a patch, on rings around its middle, and their Gaussian curvatures (n,)."""
     angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
     unit = np.column_stack([np.cos(angles), np.sin(angles)])
     x, y = r.domain.points_at(np.vstack([np.zeros((1, 2)), *(share * unit for share in RINGS)])).T
@@ -59,7 +59,7 @@ def _disk(r):
 
 
 def _fan():
-    """Triangles (m, 3) of such points."""
+    """The triangles (m, 3) between the points of a disk."""
     a, b = np.arange(SPOKES), np.roll(np.arange(SPOKES), -1)
     inner, outer = 1 + a, 1 + SPOKES + a
     return np.vstack(
@@ -72,7 +72,7 @@ def _fan():
 
 
 def insert(scene, name, whole, report):
-    """Adds the surface of a WholeSurface, of what has that name, to the scene; returns the object."""
+    """Adds a WholeSurface of the object with this name to the scene, and returns the new object."""
     mesh = bpy.data.meshes.new(f"{name} {'Touched' if 'touches' in report else 'Joined'}")
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin), True

@@ -6,18 +6,18 @@ import json
 
 import numpy as np
 
-CURVED_AT_ONCE = 3000  # vertices that are given their curvatures in a step
+CURVED_AT_ONCE = 3000  # A step computes the curvatures at so many vertices.
 
 
 class WholeSurface:
-    """What an atlas looks like, and its graph; lengths are in the directions of the world, from `origin`.
+    """The mesh and the graph of an atlas, in the directions of the world and relative to `origin`.
 
-    atlas, mesh : core.Atlas and core.Mesh; curvatures : as of Atlas.curvatures
-    deviation : signed distances (n,) of the mesh's vertices to what was touched; 0 where that was no mesh
+    atlas, mesh : core.Atlas and core.Mesh
+    curvatures : by name, (n,) each, at the vertices of the mesh, as from Atlas.curvatures
+    deviation : (n,), signed distances of the vertices from the mesh that was touched; 0 if there was none
+    graph : JSON, in the world
 
-    graph : as JSON
-
-    All but the atlas are there once the steps are done.
+    Only the atlas is there before the steps are done.
     """
 
     def __init__(self, atlas, origin):
@@ -25,7 +25,7 @@ class WholeSurface:
         self._in_doubt = 0
 
     def steps(self, edge):
-        """Does all of it; `edge` is a length, or 0. A generator, which yields the share that is done."""
+        """Does everything, as a generator that yields the share that is done; `edge` is a length or 0."""
         steps = self.atlas.meshing(edge or self.atlas.suggested_edge())
         while True:
             try:
@@ -45,7 +45,7 @@ class WholeSurface:
         for share in self.atlas.bounding():
             yield 0.8 + 0.1 * share
         for r in self.atlas.patches:
-            self._in_doubt += r.status != "ok"  # which takes a while, once
+            self._in_doubt += r.status != "ok"  # The first time this takes a while.
             yield 0.9
         graph = self._graph()
         yield 0.9
@@ -53,7 +53,7 @@ class WholeSurface:
         yield 0.9
 
     def _graph(self):
-        """The graph of patches as Atlas.to_dict has it, in the world."""
+        """The graph of Atlas.to_dict, moved to the world."""
         found = self.atlas.to_dict()
         frames, touch = [node["frame"] for node in found["nodes"]], found["next_touch"]
         for place, key in (
@@ -65,7 +65,7 @@ class WholeSurface:
         return found
 
     def report(self):
-        """What there is to say, a dict of plain values."""
+        """What was found, as a dict of plain values."""
         atlas, mesh = self.atlas, self.mesh
         return {
             "status": atlas.status,
@@ -76,6 +76,6 @@ class WholeSurface:
             "is_closed": mesh.is_closed,
             "vertices": len(mesh.vertices),
             "triangles": len(mesh.triangles),
-            "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # where it was felt
+            "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # It is inf where nothing was felt.
             "radius": float(np.median([r.radius for r in atlas.patches])),
         }

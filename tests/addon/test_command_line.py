@@ -10,13 +10,19 @@ import pytest
 from scenes import PLACE
 
 
-def test_a_patch_from_every_kind_of_file(command, files):
+def from_every_kind(command, files, *words):
+    """The reports of a command on each kind of file."""
     reports = []
     for kind in ("ply", "stl", "obj", "blend"):
-        code, out, _ = command("reconstruct", files / f"ball.{kind}", *PLACE, "--json", "-")
+        code, out, _ = command(words[0], files / f"ball.{kind}", *words[1:], "--json", "-")
         assert code == 0
         (line,) = [line for line in out.splitlines() if line.startswith("{")]
         reports.append(json.loads(line))
+    return reports
+
+
+def test_a_patch_from_every_kind_of_file(command, files):
+    reports = from_every_kind(command, files, "reconstruct", *PLACE)
     for report in reports:
         assert report["status"] == "ok"
         assert 0.0 < report["suggested_plane"]["expected_height_std"] < report["height_std"]
@@ -67,12 +73,7 @@ def test_a_whole_object_from_a_file(command, files):
 
 
 def test_a_map_from_every_kind_of_file(command, files):
-    reports = []
-    for kind in ("ply", "stl", "obj", "blend"):
-        code, out, _ = command("map", files / f"ball.{kind}", "--spacing", 1, "--json", "-")
-        assert code == 0
-        (line,) = [line for line in out.splitlines() if line.startswith("{")]
-        reports.append(json.loads(line))
+    reports = from_every_kind(command, files, "map", "--spacing", 1, "--extent", 0.5)
     for report in reports:
         assert report["patches"] == report["touched"] > 20
         assert report["in_doubt"] == 0

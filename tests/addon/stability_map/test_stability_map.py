@@ -17,7 +17,7 @@ from scenes import datablocks, made, positions, values
 import core
 
 PATCH, _, CREASE, EDGE, _, NOTHING = range(6)
-QUANTITIES = ("error", "height_std", "condition_number", "blind_share")
+QUANTITIES = ("error", "height_std", "reach", "condition_number", "blind_share")
 
 
 def stability_map(bpy, **arguments):
@@ -40,7 +40,7 @@ def edited(bpy, **cuts):
 def test_a_ball_is_alike_all_over(empty):
     # Facets twice as large are texture to some touches and none to others.
     empty.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128, radius=2.0)
-    painted, record = stability_map(empty, spacing=0.4, degree=4)
+    painted, record = stability_map(empty, spacing=0.4, extent=0.5, degree=4)
     assert record["points"] == record["touched"] == record["patches"]
     assert record["in_doubt"] == 0
     assert not any(record["refused"].values())
@@ -69,10 +69,69 @@ def test_what_a_map_says_is_what_a_touch_says(empty, ball):
         assert values(painted.data, "blind_share")[vertex] == pytest.approx(report["blind"] / 20)
 
 
+@pytest.fixture
+def ridge(empty):
+    """A sheet, 2 wide, with a ridge along y; the active object."""
+    obj = grid(empty, 100)
+    co = positions(obj.data)
+    co[:, 2] = 0.05 * (co[:, 0] ** 2 + co[:, 1] ** 2) + 0.12 * np.exp(-((co[:, 0] / 0.15) ** 2))
+    obj.data.vertices.foreach_set("co", co.astype(np.float32).ravel())
+    obj.data.update()
+    return obj
+
+
+def test_touches_that_choose_their_extent_are_those_of_the_other_operator(empty, ridge, extension):
+    depsgraph, planes = (
+        empty.context.evaluated_depsgraph_get(),
+        [extension.core.SamplingPlane(a) for a in (0.0, 1.0, 2.0)],
+    )
+    fit = {"method": "bayes", "degree": "auto", "weight": None, "solver": "fast"}
+    lengths = {"spacing": 0.5, "extent": 0.0, "step": 0.0, "noise": 0.0, "seed": 0}
+    touched = extension.tactile_addon.stability_map.stability.StabilityMap(
+        ridge, depsgraph, planes, **lengths, **fit
+    )
+    yields = sum(1 for _ in touched.steps())
+    assert yields > 5 * len(touched.chosen)  # a window redraws meanwhile
+    within = [
+        (number, vertex)
+        for number, vertex in enumerate(touched.chosen)
+        if touched.reason[number] < CREASE and np.abs(ridge.data.vertices[vertex].co.xy).max() < 0.9
+    ]
+    assert len(within) > 5
+    for number, vertex in within[:4]:
+        place, normal = ridge.data.vertices[vertex].co, ridge.data.vertices[vertex].normal
+        azimuths = (0.0, 1.0, 2.0, 0.0, 0.0, 0.0)
+        empty.ops.tactile.reconstruct(target=ridge.name, location=place, outward=normal, azimuths=azimuths)
+        report = empty.context.object["tactile"].to_dict()
+        assert touched.reach[number] == pytest.approx(report["extent"], rel=1e-3)
+        assert touched.height_std[number] == pytest.approx(report["height_std"], rel=0.02)
+
+
+def test_an_automatic_extent_fits_the_place(empty, ridge):
+    """Beside a ridge it is long, on it short: so fewer patches are in doubt there."""
+    painted, record = stability_map(empty, target=ridge.name, spacing=0.1)
+    fixed, given = stability_map(empty, target=ridge.name, spacing=0.1, extent=0.5)
+    assert (record["extent"], record["step"]) == (0.0, 0.0)
+    assert record["in_doubt"] < 0.5 * given["in_doubt"]
+    x, y = np.abs(positions(painted.data)[:, :2]).T
+    reach, inside = values(painted.data, "reach"), y < 0.5
+    assert np.median(reach[inside & (x < 0.1)]) < 0.5 * np.median(reach[inside & (x > 0.5) & (x < 0.7)])
+    assert record["reach_median"] == pytest.approx(np.median(reach[reach > 0.0]), rel=0.2)
+    assert values(fixed.data, "reach").max() == pytest.approx(0.5)
+
+
+def test_a_map_with_an_automatic_extent_says_so(empty, ridge, extension):
+    painted, record = stability_map(empty, target=ridge.name, spacing=0.5)
+    stability_map_room = extension.tactile_addon.stability_map
+    rows = dict(stability_map_room.map_report.map_table_rows(record))
+    assert rows["spacing, extent, step"] == "0.5 m, auto, auto"
+    assert stability_map_room.map_object.inputs_of(painted)["extent"] == 0.0  # of a probe on the map
+
+
 def test_a_cube_has_patches_on_its_faces_and_none_on_its_edges(empty):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     edited(empty, number_cuts=19)
-    painted, record = stability_map(empty, spacing=0.01)
+    painted, record = stability_map(empty, spacing=0.01, extent=0.25)
     mesh = painted.data
     assert record["points"] == len(mesh.vertices)
     on_edge = np.count_nonzero(np.abs(positions(mesh)) > 0.999, axis=1) > 1
@@ -86,7 +145,7 @@ def test_a_cube_has_patches_on_its_faces_and_none_on_its_edges(empty):
 def test_what_is_refused_has_no_value_and_a_color_of_its_own(empty, name):
     empty.ops.mesh.primitive_cube_add(size=2.0)
     edited(empty, number_cuts=9)
-    painted, _ = stability_map(empty, spacing=0.01)
+    painted, _ = stability_map(empty, spacing=0.01, extent=0.25)
     painted.tactile_map_colors = name
     refused = values(painted.data, "reason") == CREASE
     assert np.all(values(painted.data, name)[refused] == -1.0)

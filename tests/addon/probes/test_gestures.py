@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Probes while a handle is dragged, as in a window: what is dear waits for the end of the gesture."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+
+
+@pytest.fixture
+def gesture(extension, monkeypatch):
+    """Updates are those of a gesture; what it returns ends one."""
+    probes = extension.tactile_addon.probes
+    update = probes.touch_again.update
+    monkeypatch.setattr(
+        probes.change_handlers, "update", lambda probe, depsgraph, complete: update(probe, depsgraph, False)
+    )
+    return lambda bpy, probe: update(probe, bpy.context.evaluated_depsgraph_get(), complete=True)
+
+
+@pytest.fixture
+def ridge(empty):
+    """A sheet, 2 wide, that is nearly flat beside a ridge along y, the active object."""
+    empty.ops.mesh.primitive_grid_add(x_subdivisions=200, y_subdivisions=200, size=2.0)
+    obj = empty.context.object
+    co = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
+    obj.data.vertices.foreach_get("co", co.ravel())
+    x, y = co[:, 0], co[:, 1]
+    co[:, 2] = 0.05 * (x**2 + y**2) + 0.12 * np.exp(-((x / 0.15) ** 2))
+    obj.data.vertices.foreach_set("co", co.ravel())
+    obj.data.update()
+    return obj
+
+
+def pick(bpy, target, x, **given):
+    assert bpy.ops.tactile.pick(target=target.name, location=(x, 0.0, 0.1), new=True, **given) == {"FINISHED"}
+    probe = bpy.context.object
+    (patch,) = probe.children
+    return probe, patch
+
+
+def report_of(patch):
+    return patch["tactile"].to_dict()
+
+
+def slide(bpy, probe, patch, xs):
+    """Drags the point along x; the reports on the way."""
+    reports = []
+    for x in xs:
+        probe.location.x = x
+        bpy.context.view_layer.update()
+        assert probe.tactile_probe.message == ""
+        reports.append(report_of(patch))
+    return reports
+
+
+def test_an_automatic_extent_follows_while_the_point_is_dragged(empty, ridge, gesture):
+    probe, patch = pick(empty, ridge, -0.6)
+    first = report_of(patch)
+    reports = slide(empty, probe, patch, np.linspace(-0.58, 0.0, 30))
+    doubts = [report["message"] for report in reports if report["status"] != "ok"]
+    assert len(doubts) <= 2  # of what shorter curves would not tell better
+    assert all("principal directions" in message for message in doubts)
+    assert not any(report["is_verified"] for report in reports)
+    extents = [report["extent"] for report in reports]
+    assert extents[-1] < 0.5 * first["extent"]
+    assert not any(b > 1.1 * a for a, b in pairwise(extents))  # it does not flicker
+    assert probe.empty_display_size == pytest.approx(0.6 * extents[-1])  # handles and patch are as large
+    back = slide(empty, probe, patch, np.linspace(-0.02, -0.6, 30))
+    assert back[-1]["extent"] > 1.5 * extents[-1]
+    assert probe.tactile_probe.extent == 0.0
+
+
+def test_an_extent_that_is_given_stays_while_the_point_is_dragged(empty, ridge, gesture):
+    probe, patch = pick(empty, ridge, -0.6, extent=0.3)
+    reports = slide(empty, probe, patch, np.linspace(-0.5, 0.0, 5))
+    assert [report["extent"] for report in reports] == pytest.approx([0.3] * 5)
+    assert "uncertain" in [report["status"] for report in reports]
+
+
+def test_at_the_end_of_a_gesture_the_patch_is_that_of_a_fresh_touch(empty, ridge, gesture):
+    probe, patch = pick(empty, ridge, -0.6)
+    slide(empty, probe, patch, np.linspace(-0.5, -0.1, 9))
+    assert not report_of(patch)["is_verified"]
+    copy = probe.copy()  # which has no patch, so nothing to begin near
+    empty.context.collection.objects.link(copy)
+    gesture(empty, probe)
+    gesture(empty, copy)
+    dragged, (fresh,) = report_of(patch), copy.children
+    fresh = report_of(fresh)
+    for report in (dragged, fresh):
+        for name in ("seconds", "patch", "contours"):
+            del report[name]
+    assert dragged == fresh
+
+
+def test_a_number_of_an_array_that_is_set_is_answered_once(empty, ridge, gesture, extension, monkeypatch):
+    """Blender tells of it twice; a setting that is as it was is answered where something has happened."""
+    handlers, looked = extension.tactile_addon.probes.change_handlers, []
+    inner = handlers._look_at
+    monkeypatch.setattr(handlers, "_look_at", lambda *given: looked.append(1) or inner(*given))
+    probe, patch = pick(empty, ridge, -0.6)
+    looked.clear()
+    probe.tactile_probe.azimuths[0] = 0.1
+    assert len(looked) == 1
+    assert report_of(patch)["planes"][0][0] == pytest.approx(math.degrees(0.1))
+    probe.location.x += 0.05
+    empty.context.view_layer.update()
+    looked.clear()
+    probe.tactile_probe.azimuths[0] = 0.1
+    assert looked
+
+
+def test_a_plane_that_comes_while_another_is_turned_is_felt_too(empty, ridge, gesture):
+    probe, patch = pick(empty, ridge, -0.6)
+    probe.tactile_probe.plane_count = 4
+    empty.context.view_layer.update()
+    assert np.shape(report_of(patch)["reaches"]) == (4, 2)
+    for degrees in (2, 4, 6):
+        probe.tactile_probe.azimuths[0] = math.radians(degrees)
+    report = report_of(patch)
+    assert report["planes"][0][0] == pytest.approx(6.0)
+    assert report["status"] == "ok"
+    assert len(report["planes"]) == 4
+
+
+def test_reaches_that_somebody_has_edited_are_found_anew(empty, ridge, gesture):
+    probe, patch = pick(empty, ridge, -0.6)
+    for edited in ("far", [1.0], [[1.0, 2.0]]):
+        patch["tactile"]["reaches"] = edited
+        (report,) = slide(empty, probe, patch, [probe.location.x + 0.01])
+        assert np.shape(report["reaches"]) == (3, 2)

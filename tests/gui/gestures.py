@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run in a window of Blender on the scene of make_scene.py: an automatic extent while a point is dragged.
+
+On the scan of a pear where there is one, else on Suzanne. Pictures are to be looked at, beside the scene.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import gui
+from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).parent))
+from common import ASIDE, FOLDER, check, extent, is_complete, look, open_tab, patch, picture, probe, until
+
+SIDE, ACROSS = Vector((0.3, -1.0, 0.25)), 26  # where from, and pixels of each move
+SLIDES = 12
+
+
+def target():
+    """The name of the object to touch, alone in the view."""
+    file = FOLDER / "pear.ply"
+    if not file.is_file():
+        return "Suzanne"
+    for obj in bpy.data.objects:
+        obj.hide_set(True)
+    bpy.ops.wm.ply_import(filepath=str(file))
+    bpy.context.object.data.shade_smooth()
+    return bpy.context.object.name
+
+
+def below(obj, direction):
+    """Where a ray against `direction` from outside first meets an object."""
+    corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
+    center, size = sum(corners, Vector()) / 8, max(obj.dimensions)
+    hit, place, *_ = obj.ray_cast(
+        obj.matrix_world.inverted() @ (center + 2.0 * size * direction.normalized()), -direction.normalized()
+    )
+    return center, obj.matrix_world @ place if hit else center
+
+
+def reports():
+    record = patch()["tactile"]
+    return record["extent"], record["status"], bool(record["is_verified"])
+
+
+def steps():
+    yield from open_tab()
+    name = target()
+    obj = bpy.data.objects[name]
+    center, place = below(obj, SIDE)
+    look(center, SIDE, 1.6 * max(obj.dimensions))
+    yield 1
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.pick(target=name, location=place, new=True)
+    yield 1
+    yield from until(is_complete)
+    first = reports()
+    check("a pick chooses its extent", probe().tactile_probe.extent == 0.0 and first[1] == "ok", first)
+    at = [round(v) for v in gui.view_point(probe().matrix_world.translation)]
+    gui.xdo("mousemove", *at, "sleep", 0.3, "mousedown", 1, "sleep", 0.2)
+    yield 0.5
+    found = []
+    for i in range(1, SLIDES + 1):
+        gui.xdo("mousemove", at[0], at[1] - ACROSS * i // 2, "sleep", 0.25)
+        yield 0.4
+        found.append(reports())
+        if i == SLIDES // 2:
+            picture("sliding")
+    picture("slid")
+    print([f"{reach:.4g} {status}" for reach, status, _ in found], flush=True)
+    extents = [reach for reach, *_ in found]
+    check("while the point is dragged the extent follows", max(extents) > 1.1 * min(extents), extents)
+    check("... and no patch is in doubt", {status for _, status, _ in found} == {"ok"}, found)
+    check("... what is dear waits", not any(complete for *_, complete in found), found)
+    size = probe().empty_display_size / extent(probe())
+    check("... and the handles are as large as the patch", abs(size - 0.6) < 1e-3, size)
+    gui.xdo("mouseup", 1)
+    yield 1
+    yield from until(is_complete)
+    ended = reports()
+    check("the end of the gesture completes it", ended[1:] == ("ok", True), ended)
+    picture("slid_ended")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    before = ended[0]
+    probe().tactile_probe.live = False
+    gui.xdo("mousemove", *ASIDE)
+    yield 0.5
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.update()  # a touch anew
+    check(
+        "... with the extent of a touch anew",
+        abs(reports()[0] - before) < 1e-6 * before,
+        (reports(), depsgraph),
+    )
+
+
+gui.play(steps())
