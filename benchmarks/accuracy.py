@@ -56,7 +56,7 @@ SURFACES = {
     "sine": (surfaces.sine(), 14),
 }  # fmt: skip
 NOISES = (0.0, 0.02, 0.1)
-PLANES = {  # azimuths and tilts in degrees
+PLANES = {  # Azimuths and tilts in degrees.
     "0/60/120": ((0, 60, 120), (0, 0, 0)),
     "0/35/80": ((0, 35, 80), (0, 0, 0)),
     "0/60/120 tilted 12/-18/8": ((0, 60, 120), (12, -18, 8)),
@@ -65,9 +65,9 @@ PLANES = {  # azimuths and tilts in degrees
     "0/20/40": ((0, 20, 40), (0, 0, 0)),
 }
 EXACT_PLANES = tuple(PLANES)[:3]
-TURN = 23.0  # degrees of azimuth 0 against d1: a whole plane set may favor none of the directions
+TURN = 23.0  # Azimuth 0 is so many degrees off d1, so that a set of planes favors no direction.
 SHAPE_NOISE = 0.05
-STEPS = 12  # of a half curve: 75 contacts with the reference point in each curve
+STEPS = 12  # A half curve has so many, so three curves have 75 contacts.
 HOLD_OUT = 300
 RUNS = 20
 
@@ -76,11 +76,11 @@ class Case(NamedTuple):
     """What was touched, and what is true."""
 
     point: np.ndarray
-    axes: np.ndarray  # the true Darboux frame
+    axes: np.ndarray  # The true Darboux frame.
     kappas: tuple[float, float]
     contours: list
     noise: float
-    hold_out: np.ndarray  # (m, 3) on the surface, relative to the point
+    hold_out: np.ndarray  # (m, 3), on the surface and relative to the point.
 
 
 # What was touched ------------------------------------------------------------------------------------
@@ -210,7 +210,7 @@ def ours(case, **options):
     return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
 
-# The best, in the mean of all, of what `--choose` tries.
+# These are the best, on average, of those that `--choose` tries.
 SPLINES = {
     "RBF thin plate": {"kernel": "thin_plate_spline", "degree": 2, "smoothing": 0.1},
     "RBF cubic": {"kernel": "cubic", "degree": 2, "smoothing": 0.03},
@@ -267,11 +267,11 @@ def noise_limit(case, surface):
 
 
 class Score(NamedTuple):
-    error: float  # mean |dz|, um
-    kappa: float  # larger of the two errors, 1e-3 / mm
+    error: float  # The mean of |dz| in um.
+    kappa: float  # The larger error of the two curvatures in 1e-3 / mm.
     normal: float  # degrees
-    covered: float  # share of the hold-out within the 90 % interval
-    width: float  # mean height_std over mean |dz|
+    covered: float  # The share of the hold-out within the 90 % interval.
+    width: float  # The mean height_std over the mean |dz|.
 
 
 def score(fit, case):

@@ -31,20 +31,20 @@ from core.patch.monge import exponents, monomials
 from . import accuracy, plot
 from .plot import plt
 
-FINE = 96  # steps of a half curve, as tracked
-STEPS = (2, 3, 4, 6, 8, 12, 16, 24, 32)  # and as taken in three planes: 12 to 192 contacts
+FINE = 96  # Half curves are tracked with so many steps,
+STEPS = (2, 3, 4, 6, 8, 12, 16, 24, 32)  # of which so many are taken: 12 to 192 contacts in three planes.
 PLANES = (3, 4, 5, 6)
-TOTAL, EACH = 72, 24  # contacts of all curves, or of each, against the number of planes
+TOTAL, EACH = 72, 24  # Contacts of all curves, or of each, by the number of planes.
 ENOUGH = 1.25
 BAYES, TAGC, BOUND = "Bayes, degree 4", "TAGC", "Cramér-Rao bound, degree 4"
 CHOSEN = "as many as core.explore takes"
 METHODS = {BAYES: accuracy.ours, TAGC: partial(accuracy.ours, method="tagc")}
-LOOKS = {  # by noise: color, mark, and how the label stands to the line's end
+LOOKS = {  # By noise: color, mark, and the label's place at the line's end.
     0.0: (plot.BLUE, "o", "top"),
     0.02: (plot.GREEN, "s", "bottom"),
     0.1: (plot.VERMILION, "^", "center"),
 }
-TAGC_NOISE = 0.02  # of its line in the chart; the table has all
+TAGC_NOISE = 0.02  # The chart has only this noise for it, the table all.
 BEST = {degree: f"best polynomial of degree {degree}" for degree in (4, 6)}
 CAPTION = (
     "Marks: the default fit, medians and quartiles over {} exact surfaces and {} random shapes, radii of "
@@ -189,7 +189,7 @@ def cramer_rao(case):
     contacts = np.vstack([c.points for c in case.contours]) - case.point
     contacts = contacts[np.linalg.norm(contacts, axis=1) > 0.0] @ case.axes
     over, radius, terms = case.hold_out @ case.axes, np.abs(contacts).max(), exponents(1, 4)
-    # Blind directions are 0 but for rounding, the faintest visible one is 0.04 of the clearest.
+    # Blind directions are 0 except for rounding; the faintest visible one is 0.04 of the clearest.
     inverse = np.linalg.pinv(monomials(*contacts[:, :2].T / radius, terms), rcond=1e-2)
     std = case.noise * np.linalg.norm(monomials(*over[:, :2].T / radius, terms) @ inverse, axis=1)
     return 1e3 * np.sqrt(2.0 / np.pi) * std.mean()

@@ -7,7 +7,8 @@ checkout; bpy to read the scans and cast rays, pymeshlab for three of the peers.
 noise of .0005.
 Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the
 object from the mesh, what share of these the field's 90 % interval holds, the angle of normals across edges,
-that at points around which the object turns by less than 20 degrees, with their share, the share of points
+that at points around which the object turns by less than 20 degrees, with their share, by how much the joined
+surface and the object turn from .001 on one side of these points to .001 on the other, the share of points
 where K is alike within 90 %, and what the mesh is; (b) peers on the contacts of tolerance .001, each at the
 best of its settings, with the same normals; and where normals are off by ten degrees; (c) as many touches at
 random places and at evenly spaced ones, in one batch, with the seconds of touching alone. Draws
@@ -22,7 +23,7 @@ from time import process_time
 import numpy as np
 
 import core
-from core.atlas.join import charts_of, joined
+from core.atlas.join import charts_of, joined, told
 from core.atlas.object_atlas import Atlas
 from core.exploration.side_by_side import result_of
 from tests import solids
@@ -35,10 +36,11 @@ SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
 NOISE, COMPARED, POINTS, MOST = 0.0005, 0.001, 2500, 1500
 EDGE = 0.01
-FINE = 0.0002  # tolerance and noise at which 1000 touches are not enough
-BLURRED = np.radians(10.0)  # deviation of normals
-CREASE = 20.0  # degrees: where the object turns by more within an edge of the mesh there is a crease
-AROUND = 8  # places on a ring of that radius
+FINE = 0.0002  # With this tolerance and noise 1000 touches are not enough.
+BLURRED = np.radians(10.0)  # The deviation of blurred normals.
+CREASE = 20.0  # Where the object turns by more degrees within a mesh's edge, there is a crease.
+BESIDE = 0.001  # Normals are asked so far from an edge of two patches, on both sides.
+AROUND = 8  # So many places on a ring of that radius are asked.
 
 
 class Scanned:
@@ -52,21 +54,27 @@ class Scanned:
         self.points = np.array([point for point, _ in places])
         self.random = np.array(places[: POINTS // 2])
 
-    def turns(self, points):
-        """By how many degrees the scan turns at most within an edge of the mesh around points (n, 3)."""
-        return turns(points, lambda p: self.scan.tree.find_nearest(p)[1])
+    def normals(self, points):
+        """Normals of the scan where it is nearest to points (n, 3)."""
+        return np.array([self.scan.tree.find_nearest(tuple(p))[1] for p in points])
 
 
-def turns(points, normal):
-    """By how many degrees normals turn at most within EDGE around points (n, 3)."""
-    at = np.array([normal(tuple(p)) for p in points])
+def turns(points, normals):
+    """By how many degrees an object turns at most within EDGE around points (n, 3), by its normals."""
+    at = normals(points)
     e1 = np.cross(at, np.eye(3)[np.abs(at).argmin(axis=1)])
     e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
     e2, least = np.cross(at, e1), np.ones(len(points))
     for t in 2.0 * np.pi * np.arange(AROUND) / AROUND:
-        around = np.array([normal(tuple(p)) for p in points + EDGE * (np.cos(t) * e1 + np.sin(t) * e2)])
+        around = normals(points + EDGE * (np.cos(t) * e1 + np.sin(t) * e2))
         least = np.minimum(least, np.einsum("ni,ni->n", at, around))
     return np.degrees(np.arccos(np.clip(least, -1.0, 1.0)))
+
+
+def turns_across(points, ways, normals):
+    """By how many degrees normals turn from BESIDE on one side of points (n, 3) to the other, along ways."""
+    cosines = np.einsum("ni,ni->n", *(normals(points + side * BESIDE * ways) for side in (-1.0, 1.0)))
+    return np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
 
 class Exact:
@@ -85,9 +93,9 @@ class Exact:
         self.points = np.array(points)
         self.random = np.array([(p, self.solid.normal(*p)) for p in points[: POINTS // 2]])
 
-    def turns(self, points):
+    def normals(self, points):
         """As of a Scanned."""
-        return turns(points, lambda p: self.solid.normal(*p))
+        return np.array([self.solid.normal(*p) for p in points])
 
 
 class Blurred:
@@ -95,12 +103,12 @@ class Blurred:
 
     def __init__(self, thing):
         self.thing, self.rng = thing, np.random.default_rng(0)
-        self.name, self.start, self.outward, self.points, self.turns = (
+        self.name, self.start, self.outward, self.points, self.normals = (
             thing.name,
             thing.start,
             thing.outward,
             thing.points,
-            thing.turns,
+            thing.normals,
         )
 
     def ray_cast(self, origin, direction, distance):
@@ -113,7 +121,7 @@ class Blurred:
 
 def off_mesh(vertices, triangles, points):
     """Distances of points from a mesh, in permille of the size."""
-    import bpy  # noqa: F401  # brings mathutils
+    import bpy  # noqa: F401  # It brings mathutils.
     from mathutils.bvhtree import BVHTree
 
     tree = BVHTree.FromPolygons(np.asarray(vertices).tolist(), np.asarray(triangles).tolist())
@@ -143,15 +151,25 @@ def explored(thing, tolerance):
 
 def agreeing(thing, atlas):
     """The mean angle of normals across edges in degrees, that off creases of the object, the share of points
-    that are off them, and the share of points where K is alike within 90 %."""
+    that are off them; by how many degrees the joined surface and the object turn across edges; and the share
+    of points where K is alike within 90 %."""
     points = np.vstack([edge.curve for edge in atlas.edges])
     angles = np.degrees(np.concatenate([edge.angle for edge in atlas.edges]))
     alike = []
     for edge in atlas.edges:
         (one, other), stds = atlas.bends(edge)
         alike += (np.abs(one - other) <= 1.645 * np.hypot(*stds)).tolist()
-    smooth = thing.turns(points) < CREASE
-    return angles.mean(), angles[smooth].mean(), smooth.mean(), np.mean(alike)
+    smooth = turns(points, thing.normals) < CREASE
+
+    def surface(at):
+        return told(atlas.charts, atlas._felt, at).normal
+
+    some = points[np.random.default_rng(0).permutation(len(points))[:POINTS]]
+    up = surface(some)
+    ways = np.cross(up, np.random.default_rng(1).normal(size=up.shape))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    across = [turns_across(some, ways, normals).mean() for normals in (surface, thing.normals)]
+    return angles.mean(), angles[smooth].mean(), smooth.mean(), across, np.mean(alike)
 
 
 def row(thing, tolerance):
@@ -163,12 +181,13 @@ def row(thing, tolerance):
     within = np.mean(np.abs(distance[felt]) <= 1.645 * std[felt])
     shape = solids.topology(mesh.triangles)
     contacts = sum(len(c.points) for e in found for c in e.contours)
-    angle, smooth, share, alike = agreeing(thing, atlas)
+    angle, smooth, share, across, alike = agreeing(thing, atlas)
     cells = [thing.name, f"{1e3 * tolerance:g}", str(len(atlas.patches)), str(contacts)]
     cells += [f"{touching:.1f}", f"{meshing:.1f}", f"{100 * felt.mean():.1f}", three(off), f"{within:.2f}"]
     cells += [
         f"{angle:.1f}",
         f"{smooth:.1f} ({100 * share:.0f} %)",
+        f"{across[0]:.1f} / {across[1]:.1f}",
         f"{alike:.2f}",
         f"{shape.open} / {shape.euler} / {shape.pieces}",
     ]
@@ -256,7 +275,7 @@ def peers(thing, found, some=""):
             start = process_time()
             try:
                 off = run(*setting)
-            except Exception as error:  # a filter that fails at one setting
+            except Exception as error:  # A filter may fail at one setting.
                 print(f"{name} {setting}: {error}", file=sys.stderr)
                 continue
             if best is None or off.mean() < best[0].mean():
@@ -379,7 +398,10 @@ def main():
                 others += lines[0]
                 random += lines[1]
     head = "object|tolerance|touches|contacts|s touch, join|s mesh|% covered|mean / median / 95 %|within 90 %"
-    table([*head.split("|"), "angle at edges", "off creases", "K alike", "open edges / Euler / pieces"], rows)
+    table(
+        [*head.split("|"), "angle at edges", "off creases", "turn", "K alike", "open edges / Euler / pieces"],
+        rows,
+    )
     table(["object", "method", "setting", "mean / median / 95 %", "s"], others, left=3)
     if random:
         table(["object", "places", "touches", "% covered", "mean / median / 95 %", "s touch"], random, left=2)

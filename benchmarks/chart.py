@@ -30,15 +30,16 @@ from . import accuracy, machine, peers, plot
 from .amount import Remembering
 
 QUICK_PLANES = accuracy.EXACT_PLANES[:1]
-SEEDS = 4  # of the noise, in the full run
-RINGS = 25  # of the dense meshes: 1951 vertices
-REPEATED = 0.02  # seconds; a faster method is run three times more, for a median
-LEAST_COVERED = 0.9  # of the hold-out; a surface with less has failed
-HOLLOW = "(hollow)"  # said of what is out of competition
-DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}  # of modules that are called otherwise
+SEEDS = 4  # The full run has so many seeds of the noise.
+RINGS = 25  # Dense meshes have so many rings, which are 1951 vertices.
+REPEATED = 0.02  # A method that takes fewer seconds is run three times more, for a median.
+LEAST_COVERED = 0.9  # A surface that covers less of the hold-out has failed.
+HOLLOW = "(hollow)"  # The label of what is out of competition.
+# Distributions whose names differ from their modules'.
+DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}
 KAPPA, NORMAL = "kappa 1/mm", "normal degrees"
-TIME_LIMITS = (0.3, 300.0)  # of the axes
-OFF_SCALE = 400.0  # um; above are only names and values
+TIME_LIMITS = (0.3, 300.0)  # The limits of the axes.
+OFF_SCALE = 400.0  # Above so many um there are only names and values.
 HEIGHT_LIMITS, KAPPA_LIMITS, NORMAL_LIMITS = (2.5, 1500.0), (5e-6, 0.3), (4e-4, 30.0)
 
 
@@ -48,10 +49,10 @@ class Method(NamedTuple):
     label: str
     family: str
     run: object
-    says: str  # what the label stands for
+    says: str  # What the label stands for.
     needs: tuple = ()
     planes: int = 3
-    touches: bool = False  # by itself, instead of taking the contacts
+    touches: bool = False  # Whether it touches by itself instead of taking the contacts.
 
 
 OURS, PAPER, INTERPOLATION = "bayes: this project's default", "the paper's fits", "interpolation"
@@ -149,18 +150,18 @@ class Touch(NamedTuple):
     """A case, the contours of more planes through its point, and the true surface around as a mesh."""
 
     case: accuracy.Case
-    contours: dict  # by number of planes
-    vertices: np.ndarray  # the point first
+    contours: dict  # The contours by the number of planes.
+    vertices: np.ndarray  # The point comes first.
     triangles: np.ndarray
-    extent: float  # of the half curves
-    explored: object  # what core.explore finds there, no farther than that
+    extent: float  # The length of the half curves.
+    explored: object  # What core.explore finds there within this extent.
 
 
 class Result(NamedTuple):
     label: str
     noise: float
     ms: float
-    errors: tuple  # nan where it failed
+    errors: tuple  # These are nan where it has failed.
 
 
 # Measurement -----------------------------------------------------------------------------------------
@@ -168,7 +169,7 @@ class Result(NamedTuple):
 
 def touch_of(name, planes, noise, seed):
     surface, extent = accuracy.SURFACES[name]
-    remembering = Remembering(surface)  # rays in Python are slow: they are no part of the time
+    remembering = Remembering(surface)  # Rays in Python are slow and not part of the time.
     number = 1000 * seed + list(accuracy.SURFACES).index(name)
     case = accuracy.exact_case(name, planes, noise, number)
     contours = {3: case.contours}
@@ -180,7 +181,7 @@ def touch_of(name, planes, noise, seed):
     flat, triangles = in_rings(accuracy.domain_of(case.contours, case.point, case.axes, extent))
     vertices = accuracy.above(surface, case.axes, case.kappas, flat)
     offsets = np.random.default_rng(number).normal(0.0, noise, len(vertices))
-    offsets[0] = 0.0  # the point is exact, as in the contours
+    offsets[0] = 0.0  # The point is exact, as in the contours.
     azimuths, tilts = (np.radians(angles) for angles in accuracy.PLANES[planes])
     sampling = [SamplingPlane(a + np.radians(accuracy.TURN), t) for a, t in zip(azimuths, tilts, strict=True)]
     sensor = {"farthest": extent, "tangent": case.axes[:, 0], "noise": noise, "rng": number}
@@ -222,7 +223,7 @@ def fit_result(method, touch):
         return fit.height(x, y) - z
 
     if method.touches:
-        touched()  # the rays are remembered
+        touched()  # This remembers the rays.
     seconds, miss = typical(heights)
     covered = np.isfinite(miss)
     return seconds, (1e3 * np.abs(miss[covered]).mean() if covered.mean() >= LEAST_COVERED else np.nan,)
@@ -255,7 +256,7 @@ def measure(methods, result, errors, touch):
     for method in methods:
         try:
             seconds, found = result(method, touch)
-        except Exception as problem:  # whatever a peer raises where it can give nothing
+        except Exception as problem:  # Peers raise anything if they find nothing.
             print(f"{method.label}: {problem}", file=sys.stderr)
             seconds, found = np.nan, (np.nan,) * errors
         yield Result(method.label, touch.case.noise, 1e3 * seconds, found)
@@ -293,7 +294,7 @@ class Mark(NamedTuple):
 
     label: str
     family: str
-    more: bool  # data than the others have
+    more: bool  # Whether it has more data than the others.
     x: tuple
     y: tuple
 
@@ -424,11 +425,11 @@ def touches(quick):
 def measured(methods, frame_methods, quick):
     """The results of both charts, and medians of the Cramér-Rao bound by noise."""
     heights, frames, bounds = [], [], {noise: [] for noise in accuracy.NOISES}
-    with blender.quiet():  # one of MeshLab's filters prints
+    with blender.quiet():  # One of MeshLab's filters prints.
         for i, touch in enumerate([touch_of("pear", QUICK_PLANES[0], 0.02, 0), *touches(quick)]):
             of_heights = list(measure(methods, fit_result, 1, touch))
             of_frames = list(measure(frame_methods, frame_result, 2, touch))
-            if i:  # the first is to warm up
+            if i:  # The first one is for warming up.
                 heights += of_heights
                 frames += of_frames
                 bounds[touch.case.noise].append(accuracy.cramer_rao(touch.case))

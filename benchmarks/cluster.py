@@ -57,7 +57,7 @@ def processor_time(processes):
     for process in processes:
         try:
             times[process.pid] = sum(process.cpu_times()[:2])
-        except psutil.Error:  # it has ended
+        except psutil.Error:  # It has ended.
             continue
     return times
 
@@ -109,7 +109,7 @@ def rates(files, runs, touches):
     for workers in (1, 2):
         with connected(None, workers, None) as client:
             engine = Engine(client, LIMIT)
-            made(engine, files, options(2 * 60, 60, seed=99, **KINDS["fixed"]))  # warm
+            made(engine, files, options(2 * 60, 60, seed=99, **KINDS["fixed"]))  # This warms up.
             for _ in range(runs):
                 for kind, more in KINDS.items():
                     plain = looped(files, {"touches": touches[kind], "block": 500, **more}, workers)

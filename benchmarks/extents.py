@@ -26,8 +26,8 @@ from .paper_pictures import Stage, sheet
 from .refusals import SILENT
 from .scans import random_places, sampling_planes
 
-NECK = 0.19  # of the bottle, and what is above: the shoulder, the neck, the cap
-SCANS = {  # file, and the least height of a point that is touched
+NECK = 0.19  # Above this height is the shoulder, neck and cap of the bottle.
+SCANS = {  # The file, and the least height of a point that is touched.
     "shell": ("shell_gastropod.stl", None),
     "bottle neck": ("bottle_bleach.ply", NECK),
     "CAD block": ("cad_block.stl", None),
@@ -35,12 +35,14 @@ SCANS = {  # file, and the least height of a point that is touched
     "pear": ("pear.ply", None),
     "ball": (None, None),
 }
-PICTURES = {  # file, a point between ribs, between pockets, on a smooth side; how much is seen, of the size
+# The file, a point between ribs, between pockets or on a smooth side, and the share of the size that is seen.
+PICTURES = {
     "shell": ("shell_gastropod.stl", (-14.46461, -7.82709, 23.23658), 0.5),
     "CAD block": ("cad_block.stl", (-0.45, 0.3, 1.375), 0.7),
     "lemon": ("lemon.ply", (-0.03383, 0.02996, 0.03865), 1.0),
 }
-EXTENTS = {"auto": 0.0, "1/16": 1.0 / 16.0, "1/8": 1.0 / 8.0, "1/4": 1.0 / 4.0}  # of the object's size
+# Shares of the object's size.
+EXTENTS = {"auto": 0.0, "1/16": 1.0 / 16.0, "1/8": 1.0 / 8.0, "1/4": 1.0 / 4.0}
 
 
 def main():

@@ -40,11 +40,11 @@ def as_in_a_window(addon):
 
 
 def main():
-    sys.path.insert(0, sys.argv[1])  # before the folder of this file
+    sys.path.insert(0, sys.argv[1])  # This comes before the folder of this file.
     from tools import blender
 
     answers, output = os.fdopen(os.dup(1), "w"), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(output, 1)  # what Blender itself prints
+    os.dup2(output, 1)  # Blender itself prints there.
     extension = blender.start(Path(sys.argv[1], "build", "tactile_patch.zip"))
     import bpy
 

@@ -30,15 +30,16 @@ from tools import blender
 from . import live, machine, plot, table, timed
 from .plot import plt
 
-FACES = (10_000, 40_000, 160_000, 490_000, 1_000_000, 4_000_000)  # squares, as the sheet is one
+# These are square numbers, because the sheet is square.
+FACES = (10_000, 40_000, 160_000, 490_000, 1_000_000, 4_000_000)
 QUICK_FACES = (10_000, 160_000, 1_000_000)
-LOCATION, EXTENT, STEPS = (0.2, 0.1, 0.05), 0.3, 11  # steps of a half contour
+LOCATION, EXTENT, STEPS = (0.2, 0.1, 0.05), 0.3, 11  # A half contour has so many steps.
 TOUCHES = 51
 FIT, TRACKING, CASTS, OURS = "tracking and fit", "tracking", "Blender's ray casts", "ray casts of the surface"
 READ, FIRST = "read mesh", "first touch"
 BISECT, TO_BMESH = "bmesh.ops.bisect_plane", "to bmesh"
 SECTION, SEGMENTS, TO_TRIMESH = "trimesh section", "trimesh mesh_plane", "to trimesh"
-LOOKS = {  # of the lines: color, mark, style and label
+LOOKS = {  # Color, mark, style and label of each line.
     FIRST: (plot.BLACK, "v", ":", "first touch, once"),
     BISECT: (plot.VERMILION, "D", "--", BISECT),
     SECTION: (plot.PURPLE, "x", "--", "trimesh: section (x),\nmesh_plane (+)"),
@@ -102,7 +103,8 @@ def touches(extension, obj, depsgraph, surface, point, normal):
         tracking, both = touch(extension.core, surface, point, normal, azimuth)
         runs[TRACKING].append(tracking)
         runs[FIT].append(both)
-        # The rays of other azimuths: where these ran, the processor's cache is still warm.
+        # These are rays at other azimuths, because where the first ones ran, the processor's cache is still
+        # warm.
         runs[OURS].append(timed(cast_all, surface.ray_cast, rays[i - TOUCHES // 3])[0])
         runs[CASTS].append(timed(cast_bare, bare, rays[i - 2 * TOUCHES // 3])[0])
         if i % 10 == 0:
@@ -215,7 +217,7 @@ def main():
         extension = blender.start(options.zip)
         import bpy
 
-        measure(bpy, extension, 1000)  # imports
+        measure(bpy, extension, 1000)  # This imports everything.
         rows = [measure(bpy, extension, faces) for faces in (QUICK_FACES if options.quick else FACES)]
     if section not in PEERS:
         print("trimesh is not installed and left out.\n")
@@ -227,7 +229,7 @@ def main():
     ]
     plot.save(draw(rows), "mesh_size", CAPTION.format(TOUCHES, machine("bpy")), header, cells)
     sys.stdout.flush()
-    os._exit(0)  # Blender as a module may hang at exit
+    os._exit(0)  # Blender as a module may hang at exit.
 
 
 if __name__ == "__main__":

@@ -18,9 +18,9 @@ from tools import blender
 from . import SCANS_FOLDER, machine, table
 from .scans import random_places, sampling_planes
 
-EXTENTS = (1.0 / 8.0, 1.0 / 16.0, 0.0)  # of the object's size; 0 is automatic
-NEAR, GRID = 0.1, 400  # of the radius; points of a patch
-AROUND, HOLE = 96, 0.3  # corners and radius of the hole in a plate of side 2
+EXTENTS = (1.0 / 8.0, 1.0 / 16.0, 0.0)  # Shares of the object's size; 0 is automatic.
+NEAR, GRID = 0.1, 400  # A share of the radius, and the number of points of a patch.
+AROUND, HOLE = 96, 0.3  # Corners and radius of the hole in a plate of side 2.
 
 
 def main():

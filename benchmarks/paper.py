@@ -30,24 +30,25 @@ from tools import blender
 from . import SCANS_FOLDER, accuracy, machine, paper_pictures, table, timed
 from .scans import AZIMUTHS, SCANS
 
-NOISE = 0.05  # of a contact; the paper's fits miss theirs by as much
+NOISE = 0.05  # The noise of a contact; the paper's fits are off theirs by as much.
 SEEDS = 9
-TURN = 60.0 / SEEDS  # degrees from seed to seed: no direction of the planes is a favored one
-NINE = (15.0, 30.0, 45.0, 75.0, 90.0, 105.0, 135.0, 150.0, 165.0)  # azimuths of the verifying curves
-LEAN = np.array([3.0, -2.0, 4.0])  # degrees from the normal to the planes, and multiples of it
+TURN = 60.0 / SEEDS  # Planes turn by so many degrees from seed to seed, so that no direction is favored.
+NINE = (15.0, 30.0, 45.0, 75.0, 90.0, 105.0, 135.0, 150.0, 165.0)  # The azimuths of the verifying curves.
+LEAN = np.array([3.0, -2.0, 4.0])  # Planes lean by so many degrees, and by multiples of that.
 LEANS = (0.0, 1.0, 2.0, 4.0)
-DRAWN = 2.0  # of these, off by about as much as the paper's fit under no constraint
-DRAWN_ROWS = {"shell": "shell", "pear": "pear", "pebble": "lemon"}  # and what our pebble is
+DRAWN = 2.0  # This multiple is off by about as much as the paper's fit without a constraint.
+# The rows that are drawn, with their labels: our pebble is the lemon.
+DRAWN_ROWS = {"shell": "shell", "pear": "pear", "pebble": "lemon"}
 NECK_EXTENT, NECK_STEPS = 11.7, 9
-VERTICES = 1500  # of an exact surface, about
+VERTICES = 1500  # An exact surface has about so many vertices.
 LEAST_SQUARES, TAGC, QV, BAYES = "least-squares", "tagc", "quadratic-variation", "bayes"
 METHODS = (LEAST_SQUARES, TAGC, QV, BAYES)
 TABLE_II = (TAGC, QV, BAYES)
 NECK = "bottle neck"
 EXACT, SCAN = "exact", "scan"
 EXACT_NECK, SCANNED_NECK = "exact neck", "scanned neck"
-CONVEX = ("shell", "pebble")  # of the exact surfaces, all over the patch
-SHORT = 0.75  # of an extent, to see what it does
+CONVEX = ("shell", "pebble")  # These exact surfaces are convex all over the patch.
+SHORT = 0.75  # A shorter extent, as a share, shows its effect.
 
 
 class Figures(NamedTuple):
@@ -80,8 +81,8 @@ PAPER_TABLE = {
     NECK: Row(57, {TAGC: 0.0514}, None, {TAGC: 0.130}, None),
 }
 PAPER_MINUTES = 10.0
-PAPER_WEIGHT = 9.99  # lambda of (9) in 1/mm^2, for the neck; its other ones are not told
-QV_WEIGHT = 1e5  # for its constraint f(a) = 0, nearly
+PAPER_WEIGHT = 9.99  # The paper's lambda of (9) for the neck in 1/mm^2; it does not tell the others.
+QV_WEIGHT = 1e5  # It is nearly the paper's constraint f(a) = 0.
 
 
 # What is touched ---------------------------------------------------------------------------------------
@@ -96,8 +97,8 @@ class Place(NamedTuple):
     outward: np.ndarray
     extent: float
     steps: int
-    over: Callable  # the vertices over a reconstruction's domain, in its frame
-    mesh: int | None = None  # vertices in all
+    over: Callable  # A function: the vertices over a reconstruction's domain, in its frame.
+    mesh: int | None = None  # The number of all vertices.
 
     @property
     def weight(self):
@@ -165,13 +166,13 @@ class Tested(NamedTuple):
     kind: str
     row: Row
     milliseconds: dict
-    shorter: Row  # at a shorter extent, TAGC alone
-    alike: Row  # with TAGC's weight for QV as well
+    shorter: Row  # TAGC alone, at a shorter extent.
+    alike: Row  # With TAGC's weight for QV as well.
 
 
 class Fit(NamedTuple):
     result: core.Reconstruction
-    points: np.ndarray  # of the three curves, in the frame, the reference point in each
+    points: np.ndarray  # The contacts of the three curves in the frame, each with the reference point.
     milliseconds: float
 
 
@@ -243,7 +244,8 @@ def print_figures(measured):
     for title, of in measured.items():
         for method, runs in of.items():
             three, nine, curvature, milliseconds = np.median(runs, axis=0)
-            cells = (f"{three:.4f}", f"{nine:.4f}", _quartiles(runs), f"{curvature:.4f}")
+            quartiles = "{:.4g} to {:.4g}".format(*np.quantile(runs[:, 1], [0.25, 0.75]))
+            cells = (f"{three:.4f}", f"{nine:.4f}", quartiles, f"{curvature:.4f}")
             rows.append([title, method, *cells, f"{milliseconds:.1f} ms"])
     head = ["touched", "fit", "(6), three curves", "(6), nine curves", "its quartiles"]
     table([*head, "total absolute curvature", "time of a fit"], rows)
@@ -257,10 +259,6 @@ def _degrees(lean):
     return "/".join(f"{angle:g}" for angle in lean * LEAN) + " degrees" if lean else "upright"
 
 
-def _quartiles(runs):
-    return "{:.4g} to {:.4g}".format(*np.quantile(runs[:, 1], [0.25, 0.75]))
-
-
 def print_table(tested):
     print("(b) Table II\n")
     rows = []
@@ -268,7 +266,8 @@ def print_table(tested):
         rows.append([f"*{name}, the paper's*", *_distances(paper), f"{PAPER_MINUTES:.0f} min", ""])
         for of in (of for of in tested if of.place.name == name):
             title = f"{name}, {of.kind}, {of.place.extent:g} mm"
-            rows.append([title, *_distances(of.row), *_times(of.milliseconds)])
+            times = [f"{of.milliseconds[method]:.1f} ms" for method in (TAGC, BAYES)]
+            rows.append([title, *_distances(of.row), *times])
     columns = [f"{what}: {name}" for what in ("contacts", "vertices") for name in ("TAGC", "QV", "bayes")]
     head = ["object", "contacts", *columns[:3], "vertices", *columns[3:], "size ratio", "mesh vertices"]
     table([*head, "TAGC, fit", "bayes, fit"], rows)
@@ -287,10 +286,6 @@ def _distances(row):
         f"{row.contacts / row.vertices:.2%}" if counted else "",
         f"{row.mesh}" if row.mesh else "",
     ]
-
-
-def _times(times):
-    return [f"{times[method]:.1f} ms" for method in (TAGC, BAYES)]
 
 
 # Differences -------------------------------------------------------------------------------------------

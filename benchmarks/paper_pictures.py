@@ -11,10 +11,10 @@ from tools import demo
 from . import ROOT
 
 OUTPUT = ROOT / "build" / "paper"
-CUT = 1.65  # radii around the reference point that are shown of a mesh
-TALL = 8.19  # mm above and below the point that are shown of the neck's patches
-FINE = 0.01  # of the radius, between the vertices of a patch that is cut off
-SIZE = 480  # pixels of a picture in a sheet
+CUT = 1.65  # A mesh is shown within so many radii of the reference point.
+TALL = 8.19  # The neck's patches are shown so many mm above and below the point.
+FINE = 0.01  # The distance of vertices in a cut patch, as a share of the radius.
+SIZE = 480  # A picture in a sheet has so many pixels.
 INKS = {
     "black": (0.004, 0.004, 0.004, 1.0),
     "red": (0.85, 0.01, 0.01, 1.0),
@@ -154,9 +154,9 @@ def _cut(stage, obj, place, r):
     mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
     up, (x, y, z) = r.frame.axes[:, 2].tolist(), r.frame.to_local(points).T
     near = (np.hypot(x, y) < CUT * r.radius) & (np.abs(z) < CUT * r.radius)
-    for i in np.flatnonzero(near):  # what lies below another layer is in the way of the view from inside
+    for i in np.flatnonzero(near):  # What lies below another layer would hide the view from inside.
         near[i] = not is_hidden(place.surface, points[i].tolist(), up, 2.0 * CUT * r.radius)
-    # Emission is in linear light, the colors meant are as seen.
+    # Emission is linear, but these colors are as seen.
     colors = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
     attributes = [("normal_color", "FLOAT_COLOR", colors.astype(np.float32))]
     material = stage.mesh_data.emission("Normals", attribute="normal_color")

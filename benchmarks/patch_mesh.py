@@ -19,7 +19,7 @@ from tests import surfaces
 from . import machine
 
 PLANES = [SamplingPlane(azimuth) for azimuth in np.radians([13.0, 73.0, 133.0])]
-TOUCHES = [  # name, surface, extent, noise
+TOUCHES = [  # Name, surface, extent and noise.
     ("plane", surfaces.plane(), 12.0, 0.0),
     ("plane, noise 0.1", surfaces.plane(), 12.0, 0.1),
     ("sphere of 25", surfaces.sphere(25.0), 12.0, 0.0),
@@ -32,8 +32,8 @@ TOUCHES = [  # name, surface, extent, noise
     ("quartic", surfaces.quartic(), 20.0, 0.0),
     ("sine", surfaces.sine(), 12.0, 0.02),
 ]
-STEPS = 8  # of the points in a triangle
-HALVINGS = 12  # of the interval that the grid's spacing is in
+STEPS = 8  # A triangle is sampled with so many steps.
+HALVINGS = 12  # The interval of the grid's spacing is halved so often.
 
 
 def between(r: Reconstruction, points, triangles):

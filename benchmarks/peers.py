@@ -142,7 +142,7 @@ def smoothing_spline(case, degree=2, misfit=5e-3):
     weights = np.full(len(contacts), 1.0 / np.hypot(case.noise / radius, misfit))
     options = {"w": weights, "bbox": [-1.2, 1.2, -1.2, 1.2], "kx": degree, "ky": degree}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of knots that it would like to add
+        warnings.simplefilter("ignore")  # It warns of knots that it would like to add.
         spline = SmoothBivariateSpline(*contacts.T, **options)
     return _scaled_fit(r, lambda points: spline.ev(*points.T))
 
@@ -190,7 +190,7 @@ def screened_poisson(case, true_normals, neighbors=40):
     normals = np.vstack([contour.normals for contour in case.contours]) @ r.frame.axes
     offsets = np.vstack([contour.points for contour in case.contours]) - case.point
     given = normals[np.linalg.norm(offsets, axis=1) > 0.0]
-    normals = np.vstack([case.axes[:, 2] @ r.frame.axes, given])  # in the order of the contacts
+    normals = np.vstack([case.axes[:, 2] @ r.frame.axes, given])  # They are in the order of the contacts.
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=contacts, v_normals_matrix=normals))
     if not true_normals:

@@ -21,9 +21,10 @@ from core import SamplingPlane, reconstruct, track
 from . import ROOT, SCANS_FOLDER, accuracy, table
 from .real import Scan
 
-BATCH = 20  # touches of each scan at once
+BATCH = 20  # So many touches of each scan are made at once.
 POINTS, PLANES, EXTENT, STEPS = 6, (3, 5), 1.0 / 16.0, 12  # of each scan; of its size
-KINDS = {"batch": 1, "planes": 1, "touch": 2, "fit": 5, "spline": 5}  # with the rounds of each
+# The kinds of touches, with the number of rounds.
+KINDS = {"batch": 1, "planes": 1, "touch": 2, "fit": 5, "spline": 5}
 
 
 def compare(base, cases, tasks):

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How near the fits come to real surfaces, and whether their intervals are true there.
 
-`python -m benchmarks.real [--points N] [--only fixed | automatic | choose] [--chart]`, from the root of a
-checkout; bpy to read the scans and to cast rays, scikit-learn for the Gaussian process. Prints Markdown
+`python -m benchmarks.real [--points N] [--only fixed | automatic | choose | taps] [--chart]`, from the root
+of a checkout; bpy to read the scans and to cast rays, scikit-learn for the Gaussian process. Prints Markdown
 tables:
 
 (a) scans touched without noise at random points (seeded, by area) with three to six planes, half curves of
@@ -16,7 +16,8 @@ refused, how many doubts are right, and how many of the sure are off.
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
 With `--chart` the same is drawn, build/charts/real_surfaces.png.
-With `choose` the residual's constants are chosen on all scans but one, for each, and judged on that one.
+With `choose` the residual's constants are chosen on all scans but one, for each, and judged on that one;
+with `taps` those of the taps.
 """
 
 import argparse
@@ -33,19 +34,22 @@ import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
 from core.bayes import residual_evidence, rough_fit
+from core.exploration import one_touch, taps
 from core.patch import geometry, residual
 from core.patch.monge import exponents, monomials
+from core.reconstruction import status
 from tools import blender
 
 from . import SCANS_FOLDER, machine, table
 from .peers import Fit, quadric_process, radial_basis
 
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
-HOLD_OUT, LEAST = 90, 20  # points of the mesh above a domain
+# At most so many points of the mesh above a domain are compared, and at least so many.
+HOLD_OUT, LEAST = 90, 20
 LAYERS = 4
 NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 8, 0.3, 0.2  # toward a surface: a step in radii, and of its height
 WIDE, OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 0.02, 3.0, 5.0, 10.0, 0.05
-DENSE = 150  # points for the true frame
+DENSE = 150  # The true frame is fitted to so many points.
 
 
 class Scan:
@@ -110,27 +114,27 @@ class Touch(NamedTuple):
     """A case of benchmarks.accuracy, as far as the peers need it."""
 
     point: np.ndarray
-    axes: np.ndarray  # the paper's frame
+    axes: np.ndarray  # The paper's frame.
     contours: list
-    hold_out: np.ndarray  # (m, 3), relative to the point
+    hold_out: np.ndarray  # (m, 3), relative to the point.
 
 
 class Score(NamedTuple):
-    error: float  # permille of the radius
+    error: float  # In permille of the radius.
     covered: float = np.nan
-    interval: float = np.nan  # score of the 90 % interval, permille
+    interval: float = np.nan  # The score of the 90 % interval in permille.
 
 
 @contextmanager
 def constants(**values):
-    """The residual's, for a while."""
+    """Those of the residual or the taps, for a while."""
     modules = [
         m
-        for m in (geometry, residual, residual_evidence, rough_fit)
+        for m in (geometry, residual, residual_evidence, rough_fit, one_touch, taps, status)
         if any(hasattr(m, name) for name in values)
     ]
     if unknown := [name for name in values if not any(hasattr(m, name) for m in modules)]:
-        raise ValueError(f"no module of the fit has the constants {unknown}")
+        raise ValueError(f"no module has the constants {unknown}")
     before = [{name: getattr(m, name) for name in values if hasattr(m, name)} for m in modules]
     try:
         for module, old in zip(modules, before, strict=True):
@@ -157,7 +161,7 @@ def ours(touch, **values):
 
 
 OURS, ALONE, PROCESS = "bayes", "without residual", "Matérn process on a quadric"
-# Settings that came out best on the scans.
+# These settings were the best ones on the scans.
 METHODS = {
     OURS: ours,
     ALONE: partial(ours, UNEXPLAINED_MISFIT=math.inf),
@@ -300,6 +304,7 @@ def automatic_row(scan, count):
         1e3 * median([r.radius for r, _ in sure] or [0.0]),
         1e3 * median(seconds or [0.0]),
         1e3 * np.mean([off / r.radius for r, off in sure + doubtful]),
+        max([off / r.mean_height_std for r, off in sure], default=0.0),
     ]
 
 
@@ -380,10 +385,63 @@ def choose(scans, count):
     )
 
 
+TAPS = {
+    "TOO_FAR_OFF": (5.0, 7.0, 14.0, 20.0),
+    "CONTRADICTING": (2.0, 4.0),
+    "NEAR_RIM": (0.9, 0.95),
+    "WITHIN": (0.5, 0.75),
+    "SHORTER": (1.1, 1.3),
+    "DOUBTFUL_GAP": (0.05, 0.2),
+}  # instead of what they are, one at a time
+ENOUGH_AREA = 0.99  # of the largest: what is less costs more than it is worth
+
+
+def choose_taps(scans, count):
+    """For each scan the constants of the taps chosen on the others.
+
+    Of those with the fewest sure touches off by more than 5 deviations, and with ENOUGH_AREA (the mean over
+    scans of its share of what it is now), the one whose worst sure touch is off by the fewest deviations.
+    """
+    now = "as they are"
+    settings = {now: {}} | {f"{name} {v:g}": {name: v} for name, values in TAPS.items() for v in values}
+    rows = {}
+    for setting, values in settings.items():
+        with constants(**values):
+            rows[setting] = {scan.name: automatic_row(scan, count) for scan in scans}
+
+    def silent(setting, names):
+        return sum(rows[setting][name][5] for name in names)
+
+    def area(setting, names):
+        return np.mean([rows[setting][name][7] / rows[now][name][7] for name in names])
+
+    def worst(setting, names):
+        return max(rows[setting][name][11] for name in names)
+
+    def told(setting, names):
+        sums = (sum(rows[setting][name][i] for name in names) for i in (0, 4, 5, 7))
+        return [*(f"{v:.0f}" for v in sums), f"{area(setting, names):.3f}", f"{worst(setting, names):.2f}"]
+
+    names = [scan.name for scan in scans]
+    head = ["sure", "off > 2 %", "> 5 deviations", "all areas", "share", "worst"]
+    print("Each setting on all scans.\n")
+    table(["setting", *head], [[s, *told(s, names)] for s in settings])
+    print("Each scan with what the others choose.\n")
+    lines = []
+    for left in [*([name] for name in names), []]:
+        others = [name for name in names if name not in left]
+        least = min(silent(s, others) for s in settings)
+        allowed = [s for s in settings if silent(s, others) == least]
+        enough = ENOUGH_AREA * max(area(s, others) for s in allowed)
+        best = min((s for s in allowed if area(s, others) >= enough), key=lambda s: worst(s, others))
+        lines.append([*(left or ["none"]), best, *told(best, left or names)])
+    table(["left out", "chosen on the others", *head], lines, left=2)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--points", type=int, default=100, help="of each scan (%(default)s)")
-    parser.add_argument("--only", choices=("fixed", "automatic", "choose"), help="a part")
+    parser.add_argument("--only", choices=("fixed", "automatic", "choose", "taps"), help="a part")
     parser.add_argument("--chart", action="store_true", help="draw as well")
     parser.add_argument("--scan", default="", help="only those with this in their names")
     options = parser.parse_args()
@@ -394,6 +452,8 @@ def main():
         scans = [Scan(path) for path in paths]
     if options.only == "choose":
         return choose(scans, options.points)
+    if options.only == "taps":
+        return choose_taps(scans, options.points)
     if options.only != "automatic":
         scores, seconds = {}, defaultdict(list)
         for scan in scans:

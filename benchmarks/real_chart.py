@@ -8,7 +8,7 @@ import numpy as np
 
 from . import machine, plot
 
-STYLES = (  # in the order of benchmarks.real's methods
+STYLES = (  # These are in the order of benchmarks.real's methods.
     ("bayes", plot.BLUE, "o"),
     ("without residual", plot.SKY, "s"),
     ("RBF thin plate", plot.GREEN, "^"),

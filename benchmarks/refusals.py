@@ -22,7 +22,7 @@ from . import SCANS_FOLDER, machine, table
 from .scans import random_places, sampling_planes
 
 SILENT = 5.0
-EXTENTS = (1.0 / 8.0, 1.0 / 32.0)  # of the object's size: that of a map, and one for details
+EXTENTS = (1.0 / 8.0, 1.0 / 32.0)  # Shares of the object's size: the extent of a map, and one for details.
 
 
 def main():

@@ -36,14 +36,14 @@ from . import SCANS_FOLDER, machine, table, timed
 
 SCANS = ("pear.ply", "bottle_bleach.ply", "asteroid_eros.ply", "bone_femur_proximal.stl")
 SIZE, NOISE = 100.0, 0.1  # mm
-SHARE = 0.2  # of the size, a half contour's extent
+SHARE = 0.2  # The extent as a share of the size.
 STEPS = 12
 PLANES = surfaces.planes((0, 60, 120))
 NEAR, TURN = 1.0, math.radians(2.0)  # mm
 AMBIGUOUS = 1.5
 FINE_TURNS = 36
-FIRST, KEPT = 6, 300  # contacts that all poses are judged by first; poses that are refined
-REFINED = 50  # of those, to the nearest triangles
+FIRST, KEPT = 6, 300  # All poses are judged by so many contacts first; so many are refined.
+REFINED = 50  # So many of those are refined to the nearest triangles.
 
 
 class Scan:
@@ -75,7 +75,7 @@ class Scan:
                 contours = core.track(self, point, normal, PLANES, **lengths, rng=rng)
                 moved = [core.Contour((c.points - shift) @ turn, noise=NOISE) for c in contours]
                 r = core.reconstruct((point - shift) @ turn, moved, outward=normal @ turn)
-            except ValueError:  # an edge, a hole
+            except ValueError:  # There is an edge or a hole.
                 continue
             found.append((r, turn, shift))
         return found

@@ -32,11 +32,11 @@ from . import machine, table, timed
 from .peers import matern_on_quadric
 
 BALL, LEAST_FORCE = 3.15, 0.1  # mm, N
-BLOCK, SHARE = 60, 5  # contacts that follow each other; of the blocks one in so many is held out
-BAND, IN_BAND = 0.35, 50  # mm to either side of a curve's plane; contacts of a curve
-FEWEST = 300  # contacts at a place
-SUBSET, MOST = 200, 600  # random contacts that a process, and a spline, are fitted to
-SMOOTHINGS = (0.1, 1.0, 10.0)  # in unit radius; of 0.01 to 100 the best are among them
+BLOCK, SHARE = 60, 5  # Contacts form blocks in their order, and one block in so many is held out.
+BAND, IN_BAND = 0.35, 50  # A curve takes contacts within so many mm of its plane, and so many of them.
+FEWEST = 300  # A place needs so many contacts.
+SUBSET, MOST = 200, 600  # A process and a spline are fitted to so many random contacts.
+SMOOTHINGS = (0.1, 1.0, 10.0)  # In unit radius; the best ones of 0.01 to 100 are among them.
 
 
 class Place(NamedTuple):
@@ -63,7 +63,7 @@ def explorations(folder):
 
     for path in sorted(Path(folder).rglob("exploration/*.mat")):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of MATLAB classes that it does not know
+            warnings.simplefilter("ignore")  # It warns of MATLAB classes that it does not know.
             (logger,) = load_from_mat(path).values()
         logs = logger.properties["logs"].ravel()
         position, force = (np.concatenate([log[key].T for log in logs]) for key in ("position", "force"))
@@ -190,7 +190,7 @@ def scores_at(place, radius):
             options = {"outward": place.outward, "strokes": strokes}
             seconds, r = timed(reconstruct, judge.frame.origin, crossed, **options)
             scores[name] = of_reconstruction(r, seconds, judge, place)
-    except ValueError:  # rows too far apart for curves
+    except ValueError:  # The rows are too far apart for curves.
         pass
     return scores
 

@@ -22,7 +22,7 @@ from tools import blender
 
 from . import SCANS_FOLDER, machine, table
 
-METHODS = {  # and how they are called: each at its default
+METHODS = {  # The methods at their defaults, and their names.
     "bayes": "bayes",
     "tagc": "tagc, weight 1e3",
     "quadratic-variation": "quadratic-variation, weight 1e5",
@@ -30,7 +30,7 @@ METHODS = {  # and how they are called: each at its default
 }
 AZIMUTHS = (0.0, 60.0, 120.0)
 RUNS = 7
-LEAST_VERTICES = 20  # over a patch, for its mean distance to count
+LEAST_VERTICES = 20  # A mean distance counts if so many vertices are over the patch.
 
 
 class Scan(NamedTuple):
@@ -40,7 +40,7 @@ class Scan(NamedTuple):
     file: str
     location: tuple[float, float, float]
     extent: float
-    steps: int  # of a half curve, for about as many contacts as the paper has
+    steps: int  # With so many steps of a half curve there are about as many contacts as in the paper.
     noise: float
     unit: str
     scale: float

@@ -30,10 +30,10 @@ from tools import blender
 
 from . import accuracy, machine, ratios, table, timed
 
-WITHIN = 1e-6  # of an objective
+WITHIN = 1e-6  # Minima within this share of the objective count as the same.
 TIGHT = {"maxiter": 1000, "ftol": 1e-12, "gtol": 1e-9}
 WEIGHT = 1000.0
-COPIES = 7  # of the touches, for (b)
+COPIES = 7  # For (b) the touches are there so many times.
 RUNS = 5
 
 

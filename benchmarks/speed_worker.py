@@ -14,11 +14,11 @@ from time import process_time
 
 import numpy as np
 
-sys.path.insert(0, sys.argv[1])  # before the folder of this file, which has no core
+sys.path.insert(0, sys.argv[1])  # This comes before the folder of this file, which has no core.
 
 import core
 
-FARTHEST, HEIGHTS = 0.5, 300  # of the size of a scan
+FARTHEST, HEIGHTS = 0.5, 300  # A share of the scan's size, and a number of heights.
 HELPS, MOST_PLANES = 0.1, 6
 EVEN = [core.SamplingPlane(math.pi * i / 3) for i in range(3)]
 
@@ -27,7 +27,7 @@ class Mesh:
     """A mesh in Blender's tree."""
 
     def __init__(self, points, faces):
-        import bpy  # noqa: F401  # which brings mathutils
+        import bpy  # noqa: F401  # It brings mathutils.
         from mathutils.bvhtree import BVHTree
 
         self.tree = BVHTree.FromPolygons(points.tolist(), faces.tolist(), all_triangles=True)

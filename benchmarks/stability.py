@@ -32,11 +32,11 @@ from . import machine, plot
 from .accuracy import SURFACES, TURN, above, darboux, table
 
 SEEDS = 3
-TOO_FAR, TURNED, UMBILIC, SMALL = 3.0, 10.0, 0.05, 0.01  # of the rule
+TOO_FAR, TURNED, UMBILIC, SMALL = 3.0, 10.0, 0.05, 0.01  # The numbers of the rule.
 NOISE, NORMAL_STD = 0.05, 0.02  # mm, radians
-STEPS = 12  # of a half curve
+STEPS = 12  # A half curve has so many.
 HOLD_OUT = 100
-SADDLE = "monkey saddle"  # of which planes at its lines see nothing: a sweep of its own
+SADDLE = "monkey saddle"  # Planes along its lines see nothing, so it has a sweep of its own.
 
 
 class Setting(NamedTuple):
@@ -44,14 +44,14 @@ class Setting(NamedTuple):
 
     azimuths: tuple = (0.0, 60.0, 120.0)
     tilts: tuple = (0.0, 0.0, 0.0)
-    turn: float = TURN  # of azimuth 0 against d1
+    turn: float = TURN  # The angle between azimuth 0 and d1.
     step: float = 1.0 / STEPS
     noise: float | None = None  # None for NOISE
-    change: Callable | None = None  # of the curves: (curves, point, extent, rng) -> curves
-    wrap: Callable | None = None  # of the surface to touch: (surface, axes, extent) -> surface
+    change: Callable | None = None  # Changes curves: (curves, point, extent, rng) -> curves.
+    wrap: Callable | None = None  # Changes the surface: (surface, axes, extent) -> surface.
     scale: float = 1.0
-    offset: float = 0.0  # of all coordinates, in extents, which are then of single precision
-    normals: float | None = None  # degrees that measured normals are turned by, said to be good to NORMAL_STD
+    offset: float = 0.0  # All coordinates are moved by so many extents and rounded to single precision.
+    normals: float | None = None  # Measured normals are turned by so many degrees, but claim NORMAL_STD.
 
 
 class Sweep(NamedTuple):
@@ -60,7 +60,7 @@ class Sweep(NamedTuple):
     title: str
     values: tuple
     benign: tuple
-    setting: Callable  # of a value
+    setting: Callable  # Makes the Setting of a value.
     surfaces: Callable = lambda value: {n: s for n, s in SURFACES.items() if n != SADDLE}
 
 
@@ -68,9 +68,9 @@ class Outcome(NamedTuple):
     """What one method made of one touch; numbers are NaN where it was refused."""
 
     status: str
-    error: float = np.nan  # mean |dz|, of the radius
-    std: float = np.nan  # mean height_std, of the radius
-    turn: float = np.nan  # degrees; 0 where the point is an umbilic, or said to be one
+    error: float = np.nan  # The mean of |dz| as a share of the radius.
+    std: float = np.nan  # The mean height_std as a share of the radius.
+    turn: float = np.nan  # In degrees; 0 if the point is an umbilic, or said to be one.
     condition: float = np.nan
 
     @property
@@ -139,7 +139,7 @@ def outcome(surface, setting, point, outward, contours, method):
         surface, r.frame.axes, np.array([r.patch.k1, r.patch.k2]) * setting.scale, grid / setting.scale
     )
     misses = np.abs(r.height(*grid.T) - setting.scale * (there @ r.frame.axes[:, 2])) / r.radius
-    error = np.mean(np.where(np.isfinite(misses), misses, 1.0))  # a patch over nothing is off by its radius
+    error = np.mean(np.where(np.isfinite(misses), misses, 1.0))  # A patch over nothing is off by its radius.
     rotation = true_axes.T @ r.frame.axes
     half = max(np.trace(rotation), np.trace(rotation * [-1, -1, 1]))
     turn = np.degrees(np.arccos(np.clip((half - 1.0) / 2.0, -1.0, 1.0)))
@@ -205,7 +205,7 @@ class Facets:
     """A surface as triangles with edges of about a size, in Blender's tree."""
 
     def __init__(self, size, surface, axes, extent):
-        import bpy  # noqa: F401  # mathutils comes with it
+        import bpy  # noqa: F401  # It brings mathutils.
         from mathutils.bvhtree import BVHTree
         from scipy.spatial import Delaunay
 
@@ -280,9 +280,9 @@ SWEEPS = (
 )  # fmt: skip
 
 
-# Upright, all at the origin: what these do to curves is done in the axes of the world.
+# Surfaces are upright at the origin, because curves are changed in the axes of the world.
 BENT = {"quadric": (-0.04, -0.01), "saddle": (-0.04, 0.02)}
-LINES = {  # r^n sin(n theta), zero along planes at 0, 60 and 120 degrees
+LINES = {  # r^n sin(n theta), which is 0 along planes at 0, 60 and 120 degrees.
     "sin 3 theta": {(2, 1): 3, (0, 3): -1},
     "sin 6 theta": {(5, 1): 6, (3, 3): -20, (1, 5): 6},
     "sin 9 theta": {(8, 1): 9, (6, 3): -84, (4, 5): 126, (2, 7): -36, (0, 9): 1},

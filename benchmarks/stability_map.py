@@ -22,18 +22,25 @@ from tools import blender
 from . import machine, table
 from .live import Clock, sheet
 
-CASES = [(10_000, 0.0), (100_000, 0.0), (100_000, 0.02), (1_000_000, 0.0)]  # faces, spacing
+EXTENT = 0.25  # an eighth of the sheet
+CASES = [  # faces, spacing, extent
+    (10_000, 0.0, EXTENT),
+    (100_000, 0.0, EXTENT),
+    (100_000, 0.02, EXTENT),
+    (1_000_000, 0.0, EXTENT),
+    (100_000, 0.0, 0.0),
+]
 RUNS = 3
 
 
-def measure(bpy, clock, faces, spacing):
+def measure(bpy, clock, faces, spacing, extent):
     """A row of the table."""
     sheet(bpy, faces)
     runs = []
     for _ in range(RUNS):
         clock.spent.clear()
         start = perf_counter()
-        bpy.ops.tactile.stability_map(target="Grid", spacing=spacing)
+        bpy.ops.tactile.stability_map(target="Grid", spacing=spacing, extent=extent)
         runs.append((perf_counter() - start, dict(clock.spent)))
         painted = bpy.context.object
         count = painted["tactile_map"]["touched"]
@@ -42,7 +49,14 @@ def measure(bpy, clock, faces, spacing):
     parts = [spent["tracking"], spent["fit"] + spent["noting"] - spent["error"], spent["error"]]
     parts.append(whole - sum(parts) - spent["detached"])
     cells = [f"{1e3 * seconds / count:.2f}" for seconds in parts]
-    return [f"{faces}", f"{count}", f"{count / whole:.0f}", *cells, f"{spent['detached']:.2f}"]
+    return [
+        f"{faces}",
+        f"{extent or 'auto'}",
+        f"{count}",
+        f"{count / whole:.0f}",
+        *cells,
+        f"{spent['detached']:.2f}",
+    ]
 
 
 def main():
@@ -53,11 +67,27 @@ def main():
 
     addon, clock = extension.tactile_addon, Clock()
     clock.wrap(addon.touch.detached_mesh.DetachedMesh, "__init__", "detached")
-    for name, stage in (("track", "tracking"), ("reconstruct_many", "fit"), ("with_height_stds", "fit")):
-        clock.wrap(addon.stability_map.stability.core, name, stage)
+    side_by_side, tracking = extension.core.exploration.side_by_side, extension.core.contours.tracking
+    for owner, name, stage in (
+        (tracking, "first_contact", "tracking"),
+        (tracking, "_followed", "tracking"),
+        (side_by_side, "fitted", "fit"),
+        (side_by_side, "_with_stds", "fit"),
+    ):
+        clock.wrap(owner, name, stage)
     clock.wrap(addon.stability_map.stability.StabilityMap, "_note", "noting")
     clock.wrap(addon.stability_map.stability.core, "height_error", "error")
-    columns = ("faces", "points", "points/s", "tracking", "fit", "error", "thinning, paint", "once, s")
+    columns = (
+        "faces",
+        "extent",
+        "points",
+        "points/s",
+        "tracking",
+        "fit",
+        "error",
+        "thinning, paint",
+        "once, s",
+    )
     with blender.quiet():
         rows = [measure(bpy, clock, *case) for case in CASES]
     table(columns, rows, left=0)
