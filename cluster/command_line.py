@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python -m cluster touch OBJECTS...`, or `whole`: a data set of touches, or of surfaces, from the shell."""
+"""The words of `python -m cluster touch OBJECTS...` and `whole`: data sets of touches or of surfaces."""
 
 import argparse
 import os
@@ -21,11 +21,11 @@ from .input_files import KINDS, files_of
 from .run import Run, StoppedError, summed_up
 from .summary import summary
 
-WRONG_WORDS, STOPPED, WITH_ERRORS, INTERRUPTED = 2, 1, 3, 130  # exit codes
+WRONG_WORDS, STOPPED, WITH_ERRORS, INTERRUPTED = 2, 1, 3, 130  # The exit codes.
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Makes a data set; returns the exit code."""
+    """Makes a data set, and returns the exit code."""
     parser = _parser()
     given = parser.parse_args(words)
     if given.dashboard and find_spec("bokeh") is None:
@@ -55,7 +55,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """A request to end, as schedulers of batch jobs send it, is the same as Ctrl+C."""
+    """Within this context, a request to end, as schedulers of batch jobs send it, counts as Ctrl+C."""
 
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
@@ -103,7 +103,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_work(add: Any) -> None:
-    """What to touch, and who does."""
+    """Adds the options of what to touch, and on which workers."""
     help = f"{', '.join(KINDS)} files, folders of them, or .txt lists of these"
     add("objects", nargs="+", type=Path, metavar="OBJECT", help=help)
     add("--output", type=Path, required=True, metavar="FOLDER", help="folder of the data set, new or begun")
@@ -117,7 +117,7 @@ def _add_work(add: Any) -> None:
 
 
 def _add_touches(add: Any) -> None:
-    """How to touch; all of it is in the manifest."""
+    """Adds the options of how to touch, which are all in the manifest."""
     add("--touches", type=_count, default=1000, help="touches per object (%(default)s)")
     add("--block", type=_count, default=500, help="touches per task and file (%(default)s)")
     add("--seed", type=int, default=0, help="seed of places and noise (%(default)s)")
@@ -145,7 +145,7 @@ def _add_touches(add: Any) -> None:
 
 
 def _add_whole(add: Any) -> None:
-    """How to touch all over; all of it is in the manifest."""
+    """Adds the options of how to touch all over, which are all in the manifest."""
     add("--seed", type=int, default=0, help="seed of the first place and the noise (%(default)s)")
     help = "standard deviation of the sensor (0)"
     add("--noise", type=_length, metavar="LENGTH", default=Length(0.0, False), help=help)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dask: workers here or elsewhere, and orders that are carried out by them whatever happens to them."""
+"""Dask: workers here or elsewhere, who carry out orders; what is lost with one of them is ordered again."""
 
 import logging
 import math
@@ -19,27 +19,27 @@ from distributed.scheduler import KilledWorker
 from .worker import task
 from .worker.process import FAILED
 
-# Ctrl+C goes to all processes of a terminal, and is for the one that ends the others.
+# Ctrl+C reaches all processes of a terminal, but only one should end the others.
 DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-# What Dask measures of itself all the time takes some hundredths of a processor, for each process.
+# Dask's measurements of itself would take some hundredths of a processor for each process.
 CALM = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
 }
-AHEAD = 3  # orders that are out at once, for each thread of a worker
+AHEAD = 3  # For each thread of a worker, so many orders are out at once.
 LEAST_AHEAD = 16
-LOOK_EVERY = 5.0  # seconds between looks at how many threads there are
+LOOK_EVERY = 5.0  # The threads of all workers are counted every so many seconds.
 GONE = "The worker was lost with it again and again"
-CONNECT = 60.0  # seconds in which a scheduler that was restarted may come back
+CONNECT = 60.0  # A scheduler that was restarted may come back within so many seconds.
 
 
 class EngineError(Exception):
-    """There is no scheduler, or none any more, or it is none for this; a sentence."""
+    """There is no scheduler, or it is gone, or does not suit; the message is a sentence."""
 
 
 class Order(NamedTuple):
-    """What a worker is to do: `label` names object and block, `name` and `arguments` are as in hand.py."""
+    """What a worker has to do: `label` names object and block, `name` and `arguments` are as in hand.py."""
 
     label: str
     name: str
@@ -47,7 +47,7 @@ class Order(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """How an order went, what came of it, and what went wrong before."""
+    """How an order went, its result, and what went wrong before."""
 
     order: Order
     how: str
@@ -57,7 +57,7 @@ class Outcome(NamedTuple):
 
 @contextmanager
 def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Iterator[Client]:
-    """A client of the scheduler at an address, or of one with so many workers on this machine."""
+    """A client of the scheduler at an address, or of a new one with `workers` workers on this machine."""
     if scheduler is None:
         with (
             dask.config.set(CALM),
@@ -83,10 +83,10 @@ def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Ite
 
 
 class Engine:
-    """Has orders carried out by the workers of a client's scheduler, few of them out at once.
+    """Gives orders to the workers of a client's scheduler, a few at a time.
 
     limit : seconds that an order may take
-    threads : of all workers there are, or were a little while ago
+    threads : number of threads of all workers, as of a few seconds ago
     """
 
     def __init__(self, client: Client, limit: float) -> None:
@@ -95,10 +95,10 @@ class Engine:
         self._looked, self.threads = -math.inf, 0
 
     def performed(self, orders: Iterable[Order]) -> Iterator[Outcome]:
-        """Each outcome as it comes.
+        """Yields each outcome as it comes.
 
         What is lost with a worker, or with a scheduler that is restarted, is ordered again. Raises
-        EngineError where the scheduler does not come back.
+        EngineError if the scheduler does not come back.
         """
         waiting, out = iter(orders), {}
         running = as_completed()
@@ -118,7 +118,7 @@ class Engine:
     def _submit(self, order: Order, out: dict[Future, Order], running: as_completed) -> None:
         self._require_scheduler()
         self._number += 1
-        # The first part is what the scheduler groups tasks by; the label is what its logs tell.
+        # The scheduler groups tasks by the first part, and its logs show the label.
         key = (f"{order.name}-{self._run}", order.label, self._number)
         words = (order.label, self.limit, order.name, *order.arguments)
         future = self.client.submit(task.perform, *words, key=key, pure=False)
@@ -126,7 +126,7 @@ class Engine:
         running.add(future)
 
     def _outcomes(self, futures: Iterable[Future]) -> dict[Future, tuple[str, Any, list[str]]]:
-        """How it went, by future; those that are lost are left out."""
+        """How orders went, by their futures; those that are lost are left out."""
         found = {}
         finished = [future for future in futures if future.status == "finished"]
         with suppress(CancelledError, OSError, TimeoutError):
@@ -144,7 +144,7 @@ class Engine:
         return found
 
     def _room(self) -> int:
-        """How many orders may be out at once."""
+        """The number of orders that may be out at once."""
         if monotonic() - self._looked > LOOK_EVERY:
             self._looked = monotonic()
             self._require_scheduler()

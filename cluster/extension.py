@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's own packages out of the checkout, under the name that Blender would give their parent.
+"""The extension's packages from the checkout, under the name that Blender would give their parent.
 
-The add-on's `__init__` is left out, which brings the whole of its user interface.
+The add-on's `__init__` is left out, because it would import the whole user interface.
 """
 
 import sys
@@ -32,5 +32,5 @@ def addon(module: str) -> ModuleType:
 
 
 def version() -> str:
-    """The extension's."""
+    """The version of the extension."""
     return tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]

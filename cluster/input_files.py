@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which files the words of the command stand for."""
+"""The files that the words of the command stand for."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -10,9 +10,9 @@ LIST = ".txt"
 
 
 def files_of(words: Iterable[Path]) -> list[str]:
-    """Absolute paths of files, of those below folders and of those in lists, each once, in order.
+    """The absolute paths of files, of those in folders and of those in lists, each once, in order.
 
-    Raises ValueError, with a sentence, for what is none of these.
+    Raises ValueError, with a sentence, for words that are none of these.
     """
     found = sorted({str(path.resolve()) for word in words for path in _files(word)})
     if not found:

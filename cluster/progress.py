@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a run is, in one line: on a terminal it is written over, elsewhere a line now and then."""
+"""How far a run is, in one line, which is overwritten on a terminal and repeated now and then elsewhere."""
 
 import sys
 from time import monotonic
 
-SAY_EVERY = {True: 0.5, False: 10.0}  # seconds between lines, by whether they go to a terminal
+SAY_EVERY = {True: 0.5, False: 10.0}  # Seconds between lines, by whether they go to a terminal.
 
 
 class Progress:
-    """Counts touches or surfaces, of `total` to be made now, and says how many there are a second."""
+    """Counts touches or surfaces, of which `total` are to be made, and tells how many are made a second."""
 
     def __init__(self, noun: str) -> None:
         self.noun = noun
@@ -17,17 +17,17 @@ class Progress:
         self.begin(0)
 
     def begin(self, total: int) -> None:
-        """So many are to be made, from now on."""
+        """Starts to count up to `total`."""
         self.total, self.done, self.errors = total, 0, 0
         self.start = self._said = monotonic()
 
     @property
     def rate(self) -> float:
-        """How many a second."""
+        """The number that is made a second."""
         return self.done / max(monotonic() - self.start, 1e-9)
 
     def add(self, done: int, errors: int, workers: int) -> None:
-        """Notes that more are done, and says so where it is time."""
+        """Notes that more are done, and prints the line if it is time."""
         self.done, self.errors = self.done + done, self.errors + errors
         if monotonic() - self._said >= SAY_EVERY[self._is_terminal] or self.done == self.total:
             self._said = monotonic()
@@ -46,7 +46,7 @@ class Progress:
         return ", ".join(words)
 
     def note(self, text: str) -> None:
-        """Says something else, in lines of its own."""
+        """Prints something else in lines of its own."""
         print("\r" + text.ljust(self._width) if self._width else text, file=sys.stderr, flush=True)
         self._width = 0
 

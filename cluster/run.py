@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A run: looks through the files, has the blocks touched that are missing, and sums up."""
+"""A run: it looks through the files, has missing blocks touched, and sums up."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -19,14 +19,14 @@ from .worker.process import FAILED, STOP
 
 
 class StoppedError(Exception):
-    """A worker cannot go on, whatever the object; a sentence."""
+    """A worker cannot go on, whatever the object; the message is a sentence."""
 
 
 class Run:
-    """What is to be done for a data set, and how far it is."""
+    """What has to be done for a data set, and how far it is."""
 
     def __init__(self, data_set: DataSet, options: Options | WholeOptions, files: list[str]) -> None:
-        """Raises ValueError for the folder of another data set, OSError where it cannot be written to."""
+        """Raises ValueError for the folder of another data set, and OSError if it cannot be written to."""
         self.data_set, self.options, self.files = data_set, options, files
         self.old = manifest.read(data_set)
         if self.old is not None:
@@ -37,7 +37,7 @@ class Run:
         self.progress = Progress(options.parts)
 
     def work(self, engine: Engine) -> None:
-        """All that is missing. Raises ValueError for files that have changed, StoppedError and OSError."""
+        """Makes what is missing. Raises ValueError for files that have changed, StoppedError and OSError."""
         done = self.data_set.done()
         objects = self._survey(engine, done)
         blocks = {
@@ -61,7 +61,7 @@ class Run:
         self.progress.end()
 
     def _survey(self, engine: Engine, done: set[str]) -> list[dict[str, Any]]:
-        """The facts of all objects that are to be touched, each once; the manifest then has them."""
+        """The facts of all objects that are to be touched, each once, which also go into the manifest."""
         known = {path for path in self.files if f"{file_key(path, Path(path).stem)}-00000" in done}
         versions = manifest.versions()
         orders = (Order(path, "survey", (path, versions)) for path in self.files if path not in known)
@@ -79,7 +79,7 @@ class Run:
         return list(self._distinct(each for path in self.files for each in facts[path]))
 
     def _distinct(self, objects: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-        """The objects that can be touched, each geometry once; the others get error rows."""
+        """The objects that can be touched, each geometry once; for the others it writes error rows."""
         seen: dict[str, dict[str, Any]] = {}
         for facts in objects:
             if facts["hash"] is None:
@@ -109,7 +109,7 @@ class Run:
         return f"{_title(facts)} block {block}"
 
     def _log(self, text: str, aloud: bool = True) -> None:
-        """Writes into the folder's log, and to the terminal."""
+        """Writes a text to the folder's log and, if `aloud`, to the terminal."""
         now = datetime.now().astimezone().isoformat(timespec="seconds")
         with self.data_set.log.open("a", encoding="utf-8") as file:
             file.write(f"{now} {text}\n")
@@ -118,7 +118,7 @@ class Run:
 
 
 def summed_up(data_set: DataSet) -> list[dict[str, Any]]:
-    """Rows of the file of objects, which is written too, out of the summaries of all blocks."""
+    """The rows of the file of objects, which is written as well, from the summaries of all blocks."""
     rows: dict[str, dict[str, Any]] = {}
     for summary in data_set.summaries():
         facts, counts = summary["facts"], Counter(summary["counts"])

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is said of a data set at the end of a run."""
+"""The summary of a data set at the end of a run."""
 
 from typing import Any
 
 from .data_set.columns import COUNTS
 
-MOST_NAMED = 10  # objects with errors that are named
+MOST_NAMED = 10  # At most so many objects with errors are named.
 
 
 def summary(rows: list[dict[str, Any]], run: Any) -> str:

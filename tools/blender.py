@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender as a Python module with the built extension installed in it, as its users install it.
 
-Import it before bpy, which reads the folder of the user's files once, on import: the project's
-own stands in for the user's.
+Import it before bpy, which reads the folder of the user's files once, on import: this replaces it by one of
+the project's.
 """
 
 import importlib
@@ -13,14 +13,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 BUILD = Path(__file__).resolve().parents[1] / "build"
-# Tests that run beside each other each have a Blender of their own.
+# Tests that run beside each other each have their own Blender.
 RESOURCES = BUILD / ("blender-{}.{}".format(*sys.version_info) + os.environ.get("PYTEST_XDIST_WORKER", ""))
 os.environ["BLENDER_USER_RESOURCES"] = str(RESOURCES)
 
 
 @contextmanager
 def quiet():
-    """Keeps what Blender itself prints, a line a second and more, out of standard output."""
+    """Within this context, what Blender itself prints does not reach standard output."""
     sys.stdout.flush()
     output = os.dup(1)
     with open(os.devnull, "w") as nowhere:

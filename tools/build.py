@@ -24,10 +24,11 @@ import markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 MANIFEST = ROOT / "blender_manifest.toml"
-# Blender's pattern list can only exclude, so what ships is named: nothing else lying in a checkout,
-# an environment or a scan, can get into a release.
+# Blender's list of patterns can only exclude. So what ships is named here, and nothing else that lies in a
+# checkout, such as an environment or a scan, can get into a release.
 SHIPPED = ("__init__.py", "LICENSE", "core", "presets", "tactile_addon")
-# The page that Blender's Online Manual opens, and those that it leads to, made into HTML with their pictures.
+# The page that Blender's Online Manual opens and those that it leads to are made into HTML with their
+# pictures.
 DOCS = ROOT / "docs"
 MANUAL = ("viewport", "lesson", "messages")
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Tactile Patch</title>
@@ -40,7 +41,8 @@ pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
 LEAD = """<!doctype html><meta charset="utf-8"><title>Tactile Patch</title>
 <meta http-equiv="refresh" content="0; url=viewport.html#{}">
 """
-# For the Python of the wheels: the first Blender that has it, and the first that has it no more.
+# For the Python of the wheels: the first Blender that has it, and the first one that does not have it any
+# more.
 SERIES = {"311": ("4.5.0", "5.1.0"), "313": ("5.1.0",)}
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}
 
@@ -140,7 +142,7 @@ def download(wheel: Path) -> None:
     print(f"Downloading {wheel.name}", file=sys.stderr)
     name, version, python, abi, tags = wheel.stem.split("-")
     wheel.parent.mkdir(exist_ok=True)
-    # Into a folder of its own first: an interrupted download must not pass for a wheel later.
+    # It goes into its own folder first, because an interrupted download must not pass for a wheel later.
     with tempfile.TemporaryDirectory(dir=wheel.parent) as folder:
         command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
         command += ["--only-binary=:all:", "--implementation", "cp", "--abi", abi]
@@ -177,8 +179,7 @@ def stage(folder: Path, platforms: list[str], wheels: list[str], series: tuple[s
         lines = "".join(f'{key} = "{value}"\n' for key, value in limits.items())
         text = re.sub(r"^blender_version_min = .*\n", lines, text, flags=re.MULTILINE)
         expected |= limits
-    # The text is edited to keep all the rest as it is written; this notices if it was written so
-    # that the edit missed.
+    # The text is edited, so that everything else stays as it is written. This notices if an edit has missed.
     if tomllib.loads(text) != {key: value for key, value in expected.items() if value}:
         sys.exit(f"{MANIFEST.name}: platforms and wheels must be plain arrays, `key = [...]`.")
     (folder / MANIFEST.name).write_text(text, encoding="utf-8")
@@ -193,7 +194,7 @@ def write_manual(folder: Path) -> None:
         (folder / f"{name}.html").write_text(PAGE.format(body), encoding="utf-8")
         for picture in re.findall(r"!\[.*?\]\((.+?)\)", text):
             shutil.copy2(DOCS / picture, folder)
-        # Windows opens files without what stands behind the "#", so each section has a page that leads to it.
+        # Windows opens files without the part after "#", so each section has a page that leads to it.
         for section in re.findall(r'<h[23] id="(.+?)"', body) if name == MANUAL[0] else []:
             (folder / f"{section}.html").write_text(LEAD.format(section), encoding="utf-8")
 

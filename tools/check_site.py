@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a folder of HTML holds together: each link leads somewhere, nothing is loaded from other hosts."""
+"""Checks a folder of HTML: each link leads somewhere, and nothing is loaded from other hosts."""
 
 import re
 import sys
@@ -42,7 +42,7 @@ def problems(folder):
                 if (tag, name) in LOADED:
                     yield f"{where} is loaded from another host"
                 continue
-            # The page for what is not found is shown at any address, so its links begin at the top.
+            # The page for missing addresses is shown at any address, so its links begin at the top.
             target = (
                 folder / words.path[1:] if words.path.startswith("/") else path.parent / unquote(words.path)
             )
@@ -59,7 +59,7 @@ def problems(folder):
 
 
 def main():
-    """Prints what is wrong with the folder that is named."""
+    """Prints what is wrong with the given folder."""
     folder = Path(sys.argv[1]).resolve()
     found = list(problems(folder))
     if found or not any(folder.rglob("*.html")):

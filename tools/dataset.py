@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SCANS = ROOT.parent / "shared" / "data" / "meshes"
 BUILD = ROOT / "build"
 WORDS = ("--touches", "200", "--block", "100", "--noise", "0.05%", "--workers", "2")
-TICKS = (0.1, 0.3, 1.0, 3.0, 10.0)  # permille of an object's size
+TICKS = (0.1, 0.3, 1.0, 3.0, 10.0)  # In permille of an object's size.
 
 
 def main():
@@ -45,7 +45,7 @@ def main():
         str(options.output),
     ]
     code = subprocess.run(command, cwd=ROOT).returncode
-    if code not in (0, 3):  # 3: there are objects that could not be touched
+    if code not in (0, 3):  # With 3 there are objects that could not be touched.
         sys.exit(code)
     stored = pq.read_table(options.output / "objects.parquet").to_pylist()
     columns = ["hash", "mesh_error", "radius", "contacts", "normals"]
@@ -58,7 +58,7 @@ def main():
 
 
 def shapes(folder):
-    """Suzanne and some primitives as .ply, for where there are no scans."""
+    """Writes Suzanne and some primitives as .ply, if there are no scans."""
     import bpy
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -93,7 +93,7 @@ def of_object(touches, facts):
 
 
 def print_table(found):
-    """A row for each object."""
+    """Prints a row for each object."""
     head = f"{'':24}{'ok':>6}{'doubt':>7}{'refused':>9}{'error':>7}"
     print(f"\n{head}{'radius, %':>11}{'off, permille':>15}{'ms':>6}")
     for facts, patches in found:
@@ -105,7 +105,7 @@ def print_table(found):
 
 
 def draw(found, path):
-    """The contacts that face the viewer, of each object, in colors of their patch's error."""
+    """Draws each object's contacts that face the viewer, in the colors of their patch's error."""
     across = min(len(found), 3)
     down = -(-len(found) // across)
     figure, axes = pyplot.subplots(

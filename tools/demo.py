@@ -13,11 +13,11 @@ import numpy as np
 
 from tools import blender
 
-SPOT = (0.32, -0.19, 0.84)  # on Suzanne's forehead
-NOISE = 1.0 / 1200.0  # of the object's size; 0.05 mm on a 60 mm object
+SPOT = (0.32, -0.19, 0.84)  # It is on Suzanne's forehead.
+NOISE = 1.0 / 1200.0  # As a share of the object's size: 0.05 mm on 60 mm.
 WIDTH, HEIGHT = 1200, 900
 BAR_STEPS = 128
-BAR_REACH = 1.5  # patch radii from the middle of the bar to either end
+BAR_REACH = 1.5  # The bar reaches so many patch radii to either end.
 
 
 def main():
@@ -50,7 +50,7 @@ def touch(extension, mesh=""):
         target = next(o for o in bpy.context.scene.objects if o.type == "MESH" and len(o.data.polygons))
         corners = np.array([target.matrix_world @ type(target.location)(c) for c in target.bound_box])
         location, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
-        # From the front and a little above, as one would look at it.
+        # The ray comes from the front and a little above, as people look at things.
         ray = np.array([0.0, 2.0, -1.0]) / np.sqrt(5.0)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         hit, point, *_ = bpy.context.scene.ray_cast(depsgraph, location - 2.0 * size * ray, ray)
@@ -67,7 +67,7 @@ def touch(extension, mesh=""):
 
 
 def compose(extension, patch, unit):
-    """Camera, light, a color bar and labels for a picture of the patch, whose colors come out true."""
+    """Adds camera, light, a color bar and labels for a picture of the patch in its true colors."""
     report = patch[extension.tactile_addon.scene.patch_record.RECORD].to_dict()
     put, radius = stage(extension, report), report["radius"]
     color_bar(extension, put, report["color_limit"], unit)
@@ -83,7 +83,7 @@ def compose(extension, patch, unit):
 
 
 def stage(extension, report):
-    """Camera, light and the look of the scene around the patch of a report; what places labels there."""
+    """Sets up camera, light and look around the patch of a report; returns what places labels there."""
     import bpy
     from mathutils import Matrix, Vector
 
@@ -137,7 +137,7 @@ class _Overlay:
 
 
 def color_bar(extension, put, limit, unit):
-    """A strip with the patch's own material from -limit to limit, ticks and a title."""
+    """Adds a strip with the patch's own material from -limit to limit, with ticks and a title."""
     import bpy
 
     module = extension.tactile_addon
@@ -158,7 +158,7 @@ def color_bar(extension, put, limit, unit):
 
 
 def look(scene, source):
-    """Clay for the mesh, a light background, and colors that reach the file as they are."""
+    """Gives the mesh clay and a light background, and lets colors reach the file as they are."""
     import bpy
 
     if not any(slot.material for slot in source.material_slots):
@@ -178,9 +178,9 @@ def look(scene, source):
 
 
 def render(patch, path, samples=32):
-    """Draws the scene with Cycles; patch and contours, which lie in the mesh, come nearer for that.
+    """Draws the scene with Cycles. Patch and contours, which lie in the mesh, come nearer for that.
 
-    The camera is orthographic, so the move does not show.
+    The camera is orthographic, so this does not show.
     """
     import bpy
 

@@ -15,9 +15,9 @@ from tools import blender, demo
 
 OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "film.webp"
 WIDTH, HEIGHT, SAMPLES, QUALITY = 560, 420, 16, 88
-LARGEST = 300_000  # bytes, so that a README opens at once
-STROKES, TURNS = 7, 15  # pictures a curve, and pictures of the turn
-SHORT, LONG = 90, 1500  # milliseconds
+LARGEST = 300_000  # The film has at most so many bytes, so that the README opens at once.
+STROKES, TURNS = 7, 15  # Each curve takes so many pictures, and the turn takes so many.
+SHORT, LONG = 90, 1500  # Pictures stay for so many milliseconds.
 CAPTIONS = (
     "A finger slides along three curves",
     "From them alone: the patch, by Gaussian curvature",
@@ -133,7 +133,7 @@ class Film:
         ball = bpy.context.object
         material = self.extension.tactile_addon.scene.mesh_data.emission("Finger", color=FINGER)
         ball.data.materials.append(material)
-        ball.visible_shadow = False  # it floats, like all that is drawn in front of the mesh
+        ball.visible_shadow = False  # It floats, like all that is drawn in front of the mesh.
         return ball
 
     def link(self, name, data, color):

@@ -17,7 +17,7 @@ from matplotlib.patches import Arc
 import core
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-REACH = 0.75  # of the patches, in units of 1 / |k1|
+REACH = 0.75  # The patches reach so far, in units of 1 / |k1|.
 BLUE, RED, BLACK, GRAY = "#0072b2", "#d55e00", "#222222", "#999999"
 SHAPES = {"cap (top of an egg)": (-1.0, -0.5), "pipe": (-1.0, 0.0), "saddle": (-1.0, 0.7)}
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("core", "tests", "tools", "benchmarks", "docs", "examples", "pyproject.toml")
-TESTS = {  # of each module of core, those that fail soonest first
+TESTS = {  # The tests of each module of core; those that fail soonest come first.
     "arguments": "reconstruction serialization",
     "bayes/contradiction": "measured_normals",
     "bayes/evidence": "posterior measured_normals",
@@ -77,7 +77,7 @@ NAMES = {"maximum": "minimum", "minimum": "maximum", "max": "min", "min": "max",
 
 
 class Mutant(NamedTuple):
-    """One changed place of a module: its source, and what to say of it."""
+    """One changed place of a module: its source, and a line that describes it."""
 
     module: str
     said: str
@@ -85,9 +85,9 @@ class Mutant(NamedTuple):
 
 
 def places_of(module: str) -> list[tuple[str, int]]:
-    """What can be changed in a module of core, each as the module and the number of a node of its tree."""
+    """The places that can be changed in a module of core, as the module and the number of a tree's node."""
     nodes = list(ast.walk(_tree(module)))
-    # What says of which type something is no test could notice.
+    # No test could notice a changed annotation.
     types = [getattr(node, name, None) for node in nodes for name in ("annotation", "returns")]
     skipped = {id(part) for top in types if top is not None for part in ast.walk(top)}
     return [(module, i) for i, node in enumerate(nodes) if id(node) not in skipped and _change(node)]
@@ -109,7 +109,7 @@ def _tree(module: str) -> ast.Module:
 
 
 def _change(node: ast.AST) -> Callable[[ast.AST], None] | None:
-    """What changes a node of this kind; None for what stays."""
+    """A function that changes a node of this kind, or None if it stays."""
     if isinstance(node, ast.BinOp | ast.BoolOp | ast.AugAssign) and type(node.op) in OPERATORS:
         return lambda n: setattr(n, "op", OPERATORS[type(n.op)]())  # type: ignore[attr-defined]
     if isinstance(node, ast.Compare) and type(node.ops[0]) in OPERATORS:
@@ -137,7 +137,7 @@ def outcome(mutant: Mutant, place: Path, seconds: float) -> str:
     names = TESTS[mutant.module].split()
     tests = [str(found) for name in names for found in (place / "tests/core").rglob(f"test_{name}.py")]
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    # Seconds of the processor, not of the clock: a busy machine kills nothing.
+    # These are seconds of the processor and not of the clock, so that a busy machine kills nothing.
     limit = (int(seconds), int(seconds))
     try:
         run = subprocess.run(
@@ -168,7 +168,8 @@ def main() -> None:
     options = parser.parse_args()
     every = [place for module in options.modules or TESTS for place in places_of(module)]
     drawn = random.Random(options.seed).sample(every, min(options.count, len(every)))[options.first :]
-    chosen = [mutant_at(*place) for place in drawn]  # now: the checkout may change meanwhile
+    # This happens first, because the checkout may change meanwhile.
+    chosen = [mutant_at(*place) for place in drawn]
     outcomes = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everything that a release is, in build/release/VERSION, or a sentence why it cannot be one.
+"""Makes all files of a release in build/release/VERSION, or says in a sentence why there can be none.
 
 - A zip for each system, and one without wheels: one download for all Blenders, to be installed from disk.
 - repository/: a static repository of Blender's own (index.json, and index.html with links to drop into
@@ -84,14 +84,14 @@ def section(root: Path, version: str) -> tuple[str | None, str]:
 
 
 def git(root: Path, *arguments: str) -> str:
-    """What git says."""
+    """The output of git."""
     return subprocess.run(
         ["git", *arguments], cwd=root, check=True, capture_output=True, text=True
     ).stdout.strip()
 
 
 def run(script: str, *arguments: str | Path) -> None:
-    """Run a script of this checkout; what fails has said why."""
+    """Run a script of this checkout, which says itself why it fails."""
     status = subprocess.run([sys.executable, ROOT / script, *arguments], stdout=subprocess.DEVNULL).returncode
     if status:
         sys.exit(status)

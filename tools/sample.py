@@ -14,9 +14,9 @@ import numpy as np
 from tools import blender
 
 OUTPUT = Path(__file__).resolve().parents[1] / "examples" / "sample.blend"
-LARGEST = 300_000  # bytes
+LARGEST = 300_000  # The file has at most so many bytes.
 AROUND, ALONG, SUBDIVISIONS = 32, 20, 3
-HEIGHT, PLACE = 2.4, 1.45  # of the vase, and of the probe on it
+HEIGHT, PLACE = 2.4, 1.45  # The heights of the vase, and of the probe on it.
 NOTE = """A probe on a vase
 
 Open the sidebar (N), tab Tactile.
@@ -48,7 +48,7 @@ def profile(z):
 
 
 def make():
-    """The scene: the vase, the note, and the probe, which is active."""
+    """Makes the scene: the vase, the note, and the probe, which is active."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_factory_startup=True)
@@ -59,7 +59,7 @@ def make():
     note()
     steepness = (profile(PLACE + 1e-4) - profile(PLACE - 1e-4)) / 2e-4
     front = (0.0, -float(profile(PLACE)), PLACE)
-    # Four planes: what three leave open on a vase is more than their deviation says.
+    # It takes four planes, because three leave more open on a vase than their deviation says.
     azimuths = [*np.radians([0.0, 45.0, 90.0, 135.0]), 0.0, 0.0]
     outward = (0.0, -1.0, -float(steepness))
     bpy.ops.tactile.pick(
@@ -88,7 +88,7 @@ def vase():
 
 
 def note():
-    """The words, in the scene and as a text of the file."""
+    """Adds the note to the scene, and as a text of the file."""
     import bpy
 
     bpy.data.texts.new("Read Me").write(NOTE)
@@ -100,7 +100,7 @@ def note():
 
 
 def frame_viewports():
-    """Every 3D viewport looks at the probe from the front, with its sidebar open."""
+    """Makes every 3D viewport look at the probe from the front, with its sidebar open."""
     import bpy
     from mathutils import Vector
 
@@ -118,7 +118,7 @@ def frame_viewports():
 def save(path):
     import bpy
 
-    # Palettes, brushes and the like of the startup file are nobody's here.
+    # Nobody needs palettes, brushes and the like of the startup file here.
     bpy.data.orphans_purge(do_recursive=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, check_existing=False)
 

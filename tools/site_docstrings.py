@@ -8,11 +8,11 @@ from textwrap import dedent
 import griffe
 
 ARGUMENT = re.compile(r"^(\w+(?:, \w+)*) : ")
-AGAIN = re.compile(r"; (\w+) : ")  # more than one in a line
+AGAIN = re.compile(r"; (\w+) : ")  # There may be several arguments in a line.
 
 
 class HouseStyle(griffe.Extension):
-    """`name : what it is`, with what belongs to it indented, and `>>>` examples."""
+    """Reads arguments as `name : what it is`, with indented lines that belong to them, and `>>>` examples."""
 
     def on_instance(self, *, obj, **_):
         """Rewrites the docstring of whatever was found."""
@@ -31,7 +31,7 @@ def markdown_of(text):
 def _block(lines):
     if lines and lines[0].startswith(">>>"):
         return ["```pycon", *lines, "```"]
-    if lines and lines[0].startswith("    "):  # a formula
+    if lines and lines[0].startswith("    "):  # It is a formula.
         return ["```text", *map(dedent, lines), "```"]
     if not any(map(ARGUMENT.match, lines)):
         return lines

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What MkDocs does with the pages beside its own: two that are not in docs, and formulas.
+"""What MkDocs does besides its own work: it adds two pages that are not in docs, and draws formulas.
 
 mkdocs.yml names this file as a hook.
 """
@@ -12,7 +12,7 @@ from latex2mathml.converter import convert
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
-# Pages of the checkout that the site has too, and links in them that begin in another folder there.
+# Pages of the checkout that the site has, too; their links begin in another folder there.
 OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 FENCE = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
 CODE = re.compile(r"`[^`]*`")
@@ -21,7 +21,7 @@ INLINE = re.compile(r"\$(\S(?:[^$\n]*\S)?)\$")
 
 
 def on_files(files, config):
-    """Adds the pages that stand beside README.md."""
+    """Adds the pages beside README.md."""
     for name, page in OUTSIDE.items():
         text = (ROOT / name).read_text(encoding="utf-8").replace("](docs/", "](")
         for other, its_page in OUTSIDE.items():
@@ -31,7 +31,7 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, **_):
-    """Formulas between dollar signs as MathML, which browsers show without a script."""
+    """Turns formulas between dollar signs into MathML, which browsers show without a script."""
     kept = []
 
     def keep(match):
@@ -40,9 +40,9 @@ def on_page_markdown(markdown, **_):
 
     text = CODE.sub(keep, FENCE.sub(keep, markdown))
     text = DISPLAY.sub(lambda m: convert(m[1].strip(), display="block"), text)
-    # In a span: a line that begins with <math> would be a block of its own.
+    # It is in a span, because a line that begins with <math> would be a block of its own.
     text = INLINE.sub(lambda m: f"<span>{convert(m[1])}</span>", text)
-    # What was kept first stands in nothing that was kept later.
+    # Parts that were kept first are not inside of parts that were kept later.
     for number in reversed(range(len(kept))):
         text = text.replace(f"\0{number}\0", kept[number])
     return text

@@ -22,7 +22,7 @@ def main():
     parser.add_argument("release", nargs="?", type=Path, default=release.folder_of_version(), help=help)
     folder = parser.parse_args().release.resolve()
     with tempfile.TemporaryDirectory() as user:
-        os.environ["BLENDER_USER_RESOURCES"] = user  # read on import of bpy
+        os.environ["BLENDER_USER_RESOURCES"] = user  # bpy reads it on import.
         import bpy
 
         print(f"Blender {bpy.app.version_string}, Python {sys.version.split()[0]}")
@@ -45,7 +45,7 @@ def index_of(bpy):
 
 def install_from(bpy, url):
     """Adds the repository and installs what it offers to this Blender."""
-    bpy.context.preferences.system.use_online_access = True  # asked for although these are files
+    bpy.context.preferences.system.use_online_access = True  # Blender asks for it even for files.
     bpy.context.preferences.extensions.repos.new(name=REPOSITORY, module=REPOSITORY, remote_url=url)
     bpy.ops.extensions.repo_sync(repo_index=index_of(bpy))
     bpy.ops.extensions.package_install(
@@ -54,7 +54,7 @@ def install_from(bpy, url):
 
 
 def touch(bpy, module, origin):
-    """A patch on Suzanne, or an end with a sentence."""
+    """Makes a patch on Suzanne, or ends with a sentence."""
     if module not in bpy.context.preferences.addons:
         sys.exit(f"try_release: {origin} could not be installed")
     with blender.quiet():

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is asked for, and the files it is written to; no Blender, no Dask."""
+"""The options of a data set and its files, without Blender and without Dask."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The columns of a data set: types, units and meanings, which stand in the metadata of each file too."""
+"""The columns of a data set: types, units and meanings, which are also in the metadata of each file."""
 
 from typing import Any
 
@@ -119,7 +119,7 @@ def _schema(columns: tuple[tuple[str, pa.DataType, str, str], ...]) -> pa.Schema
 
 
 TOUCH_SCHEMA = _schema(TOUCHES)
-# For the name of a folder: the schemas of its files, and of the file of objects beside it.
+# The schemas of the files in a folder, and of the file of objects beside it, by the folder's name.
 SCHEMAS = {
     "touches": (TOUCH_SCHEMA, _schema(OBJECTS)),
     "surfaces": (_schema(SURFACES), _schema((*OBJECTS, *FOUND))),
@@ -127,7 +127,7 @@ SCHEMAS = {
 
 
 def table(rows: list[dict[str, Any]], schema: pa.Schema, metadata: dict[str, str] | None = None) -> pa.Table:
-    """The rows as a table; what a row does not have is null."""
+    """The rows as a table; values that a row does not have are null."""
     arrays = [pa.array([row.get(field.name) for row in rows], field.type) for field in schema]
     return pa.Table.from_arrays(arrays, schema=schema.with_metadata(metadata))
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The folder of a data set: a file for each task's rows, a manifest, and a file of objects at the end.
 
-All are written aside and renamed, so that there are only whole ones.
+Each is written under another name and then renamed, so that there are only complete files.
 """
 
 import json
@@ -17,14 +17,14 @@ from ..extension import addon
 from .columns import REPEATED, SCHEMAS, TOUCH_SCHEMA, table
 
 whole_file = addon("files.whole_file")
-SUMMARY = "summary"  # key of a file's metadata
-ERROR = "-error.parquet"  # ends the names of files of error rows; without them a run tries again
-DIGITS = 16  # of hashes
+SUMMARY = "summary"  # The key of a file's summary in its metadata.
+ERROR = "-error.parquet"  # Files of error rows end with this; if they are deleted, a run tries again.
+DIGITS = 16  # Hashes have so many digits.
 REPEATING = [field.name for field in TOUCH_SCHEMA if field.type == REPEATED] + ["stops.list.element"]
 
 
 def hash_of(*parts: bytes) -> str:
-    """A hash of all of these."""
+    """The hash of all parts."""
     digest = sha256()
     for part in parts:
         digest.update(part)
@@ -32,12 +32,12 @@ def hash_of(*parts: bytes) -> str:
 
 
 def file_key(path: str, name: str) -> str:
-    """What stands for the hash of an object that cannot be read, in names of files."""
+    """The word that replaces the hash of an object that cannot be read in the names of files."""
     return hash_of(path.encode(), b"\0", name.encode())
 
 
 class DataSet:
-    """The files of a data set in `folder`; its rows are in the folder `parts`: touches, or surfaces."""
+    """The files of a data set in `folder`; its rows, touches or surfaces, are in the folder `parts`."""
 
     def __init__(self, folder: Path, parts: str = "touches") -> None:
         self.folder, self.parts = folder, folder / parts
@@ -45,9 +45,9 @@ class DataSet:
         self.log = folder / "log.txt"
 
     def create(self) -> None:
-        """Makes the folder, and takes away what an interrupted run has left aside.
+        """Makes the folder, and removes the unfinished files of an interrupted run.
 
-        Raises OSError, with a sentence, where nothing can be written to it.
+        Raises OSError, with a sentence, if nothing can be written to it.
         """
         try:
             self.parts.mkdir(parents=True, exist_ok=True)
@@ -58,26 +58,26 @@ class DataSet:
             ) from error
 
     def _tidy(self) -> None:
-        """Takes away what was left aside by whoever was interrupted while it wrote."""
+        """Removes files that were not finished because somebody was interrupted while writing."""
         for left in self.parts.glob(".*.parquet"):
             left.unlink(missing_ok=True)
 
     def block_path(self, key: str, block: int) -> Path:
-        """Where the file of a block is."""
+        """The path of a block's file."""
         return self.parts / f"{key}-{block:05d}.parquet"
 
     def done(self) -> set[str]:
-        """Names, without what follows the block, of all files of rows."""
+        """The names of all files of rows, up to the block's number."""
         names = (path.name for path in self.parts.glob("[!.]*.parquet"))
         return {name.removesuffix(ERROR).removesuffix(".parquet") for name in names}
 
     def summaries(self) -> Iterator[dict[str, Any]]:
-        """The summary of each file of rows, in the order of their names."""
+        """The summaries of all files of rows, in the order of their names."""
         for path in sorted(self.parts.glob("[!.]*.parquet")):
             yield json.loads(pq.read_schema(path).metadata[SUMMARY.encode()])
 
     def write_errors(self, facts: dict[str, Any], block: int | None, numbers: range, message: str) -> None:
-        """Rows that say why these touches of an object, or of a block of it, could not be made."""
+        """Writes rows that say why these touches of an object, or of a block of it, could not be made."""
         common = {"object": facts["name"], "hash": facts.get("hash"), "block": block}
         rows = [common | {"touch": i, "status": "error", "message": message} for i in numbers]
         key = facts.get("hash") or file_key(facts["file"], facts["name"])
@@ -85,7 +85,7 @@ class DataSet:
         write_block(path.with_name(path.stem + ERROR), rows, facts, 0.0, {"error": len(rows)})
 
     def write_objects(self, rows: Sequence[dict[str, Any]]) -> None:
-        """The file of objects, which is the last that is written."""
+        """Writes the file of objects, which is the last one."""
         self._tidy()
         _write(self.objects, table(list(rows), SCHEMAS[self.parts.name][1]))
 
@@ -93,9 +93,9 @@ class DataSet:
 def write_block(
     path: Path, rows: list[dict[str, Any]], facts: dict[str, Any], seconds: float, counts: dict[str, int]
 ) -> dict:
-    """Writes rows about the object of these facts, and how many touches ended how; the file's summary.
+    """Writes rows about the object of these facts with the counts of their kinds; returns the file's summary.
 
-    Raises OSError, with a sentence, where the file cannot be written.
+    Raises OSError, with a sentence, if the file cannot be written.
     """
     message = rows[0]["message"] if "error" in counts else None
     summary = {"facts": facts, "counts": counts, "seconds": seconds, "message": message}
@@ -105,5 +105,5 @@ def write_block(
 
 def _write(path: Path, content: Any) -> None:
     with whole_file.replacing(path) as temporary:
-        # Numbers rarely repeat, and as a dictionary they would take half as long again, and more room.
+        # Numbers rarely repeat; as a dictionary they would take more room, and half as long again to write.
         pq.write_table(content, temporary, compression="zstd", use_dictionary=REPEATING)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a data set was made of and how; what another run wants otherwise is refused, never mixed in."""
+"""The manifest says how and from what a data set was made; a run with other options is refused."""
 
 import json
 from importlib.metadata import version as version_of
@@ -15,15 +15,15 @@ PACKAGES = ("bpy", "numpy", "scipy")
 
 
 def versions() -> dict[str, str]:
-    """Versions of all that rows depend on."""
+    """The versions of everything on which rows depend."""
     found = {"format": str(FORMAT), "tactile_patch": extension.version()}
     return found | {name: version_of(name) for name in PACKAGES}
 
 
 def read(data_set: DataSet) -> dict[str, Any] | None:
-    """The manifest of a data set that was begun; None where there is none.
+    """The manifest of a data set that was begun, or None if there is none.
 
-    Raises ValueError, with a sentence, where it cannot be read.
+    Raises ValueError, with a sentence, if it cannot be read.
     """
     if not data_set.manifest.exists():
         return None
@@ -37,7 +37,7 @@ def read(data_set: DataSet) -> dict[str, Any] | None:
 
 
 def require_same(old: dict[str, Any], options: Options) -> None:
-    """Raises ValueError where a data set was made by other versions or with other options."""
+    """Raises ValueError if a data set was made by other versions or with other options."""
     for kind, now in (("versions", versions()), ("options", options.to_dict())):
         for name in sorted(now.keys() | old[kind].keys()):
             was, wanted = old[kind].get(name), now.get(name)
@@ -49,7 +49,7 @@ def require_same(old: dict[str, Any], options: Options) -> None:
 
 
 def require_same_objects(old: dict[str, Any], files: dict[str, Any]) -> None:
-    """Raises ValueError where a file has not the objects that it had; files may be added."""
+    """Raises ValueError if a file does not have the objects that it had; files may be added."""
     for path, hashes in files.items():
         had = old["files"].get(path, {})
         if any(known is not None and hashes.get(name) != known for name, known in had.items()):
@@ -60,7 +60,7 @@ def require_same_objects(old: dict[str, Any], files: dict[str, Any]) -> None:
 
 
 def write(data_set: DataSet, options: Options, files: dict[str, Any]) -> None:
-    """The manifest; `files` are hashes of objects by name, by path."""
+    """Writes the manifest; `files` are the hashes of objects by their names, by the paths of files."""
     content = {"versions": versions(), "options": options.to_dict(), "files": files}
     whole_file.write_text(data_set.manifest, json.dumps(content, indent=1) + "\n")
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How objects are touched: what the words of the command say, checked, and the lengths of one object."""
+"""How objects are touched: the options of the command, checked, and their lengths on one object."""
 
 import math
 from dataclasses import asdict, dataclass, fields
@@ -33,7 +33,7 @@ class Length:
         return cls(value / 100.0, True) if text.strip().endswith("%") else cls(value, False)
 
     def on(self, size: float) -> float:
-        """The length on an object of that size."""
+        """The length on an object of this size."""
         return self.value * size if self.is_share else self.value
 
     def __str__(self) -> str:
@@ -41,21 +41,22 @@ class Length:
 
 
 class Lengths:
-    """Options of which some are lengths, as words."""
+    """Options of which some are lengths, given as words."""
 
     def length(self, name: str, size: float) -> float | None:
-        """One of the lengths on an object of that size; None where it is chosen."""
+        """One of the lengths on an object of this size, or None if the surface chooses it."""
         words = getattr(self, name)
         return None if words is None else Length.of(words).on(size)
 
 
 @dataclass(frozen=True)
 class Options(Lengths):
-    """All that rows depend on beside the object; lengths are words, see Length, None where they are chosen.
+    """Everything besides the object on which rows depend; lengths are words, see Length, None to be chosen.
 
-    touches : of each object; block : touches of a task, which are one file
+    touches : number of touches of each object
+    block : number of touches of a task, which fill one file
     azimuths, tilts : of the sampling planes, in degrees
-    tolerance : deviation of the height up to which planes are added; None for the given ones only
+    tolerance : mean deviation of the height to reach by adding planes; None adds none
     """
 
     touches: int
@@ -87,12 +88,12 @@ class Options(Lengths):
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "Options":
-        """What `to_dict` gave, perhaps from JSON, which has no tuples."""
+        """The options that `to_dict` made `values` from, perhaps through JSON, which has no tuples."""
         plain = {field.name: values.get(field.name) for field in fields(cls)}
         return cls(**plain | {name: tuple(plain[name]) for name in ("azimuths", "tilts")})
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """The options as plain values."""
         return asdict(self) | {"azimuths": list(self.azimuths), "tilts": list(self.tilts)}
 
     def planes(self) -> list[Any]:
@@ -101,12 +102,12 @@ class Options(Lengths):
         return [core.SamplingPlane(math.radians(a), math.radians(t)) for a, t in pairs]
 
     def fit(self) -> dict[str, Any]:
-        """What core.reconstruct takes."""
+        """The arguments of core.reconstruct."""
         degree = self.degree if self.degree == "auto" else int(self.degree)
         return {"method": self.method, "degree": degree, "weight": self.weight, "solver": self.solver}
 
     def exploration(self, size: float) -> dict[str, Any]:
-        """What core.explore_many takes beside places, on an object of that size."""
+        """The arguments of core.explore_many besides places, for an object of this size."""
         return {
             "extent": self.length("extent", size) or "auto",
             "step": self.length("step", size) or "auto",
@@ -124,7 +125,7 @@ class Options(Lengths):
         return range(block * self.block, min((block + 1) * self.block, self.touches))
 
     def _rehearse(self) -> None:
-        """Raises ValueError where not even a plane could be rebuilt from its own curves."""
+        """Raises ValueError if not even a plane could be rebuilt from its own curves."""
         up, along = (0.0, 0.0, 1.0), np.linspace(-1.0, 1.0, 21)
         axes = [plane.axes(up) for plane in self.planes()]
         contours = [core.Contour(np.outer(along, a[:, 0]), plane_normal=a[:, 2]) for a in axes]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How whole objects are touched: what the words of `whole` say, checked."""
+"""How whole objects are touched: the options of `whole`, checked."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -10,10 +10,10 @@ from .options import Length, Lengths
 
 @dataclass(frozen=True)
 class WholeOptions(Lengths):
-    """All that surfaces depend on beside the object; an object is one task, and one row.
+    """Everything besides the object on which surfaces depend; an object is one task and one row.
 
-    tolerance : deviation of the height that each patch is to be below, a length as in Options; None for auto
-    most : touches of an object
+    tolerance : mean deviation of the height to reach for each patch, a length as in Options, or None
+    most : largest number of touches of an object
     """
 
     seed: int
@@ -34,7 +34,7 @@ class WholeOptions(Lengths):
             raise ValueError(f"tolerance: expected the noise {noise} or more, got {tolerance}")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """The options as plain values."""
         return asdict(self)
 
     def blocks(self) -> range:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The process that has Blender and touches: `python -m cluster.worker.hand FD`, started by process.py.
 
-It takes orders from a connection and answers each. A watchdog below Python ends it where an order takes too
-long, even in the middle of a call of Blender's; and it ends itself when who has started it is gone.
+It takes orders from a connection and answers each. A watchdog outside of Python ends it if an order takes too
+long, even within a call of Blender. It ends itself when the process that started it is gone.
 """
 
 import faulthandler
@@ -28,13 +28,13 @@ from .process import DONE, FAILED, STOP
 
 
 class HopelessError(Exception):
-    """Nothing can be done here, whatever the object."""
+    """Nothing can be done on this machine, whatever the object."""
 
 
 class Hand:
-    """Carries out orders; keeps the object touched last, for the next block mostly is of it too.
+    """Carries out orders. It keeps the last object, because the next block is of the same one in most cases.
 
-    opened : how many objects it has opened
+    opened : the number of objects that it has opened
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class Hand:
         self._target: Any = None
 
     def survey(self, path: str, versions: dict[str, str]) -> list[dict[str, Any]]:
-        """Facts of the objects in a file. Raises HopelessError where rows made here would not be the same."""
+        """The facts of the objects in a file. Raises HopelessError if rows made here would differ."""
         here = manifest.versions()
         if here != versions:
             name = next(name for name in {**here, **versions} if here.get(name) != versions.get(name))
@@ -54,12 +54,12 @@ class Hand:
         return objects.survey(path)
 
     def touch(self, facts: dict[str, Any], options: dict[str, Any], block: int, path: str) -> dict[str, Any]:
-        """Touches an object, and writes the rows of that block to the file `path`; their summary."""
+        """Touches an object, writes the rows of a block to the file `path`, and returns its summary."""
         rows, seconds = touches.touched(self._object(facts), Options.from_dict(options), block)
         return _written(path, rows, facts, seconds, Counter(kind_of(row["status"]) for row in rows))
 
     def whole(self, facts: dict[str, Any], options: dict[str, Any], block: int, path: str) -> dict[str, Any]:
-        """Touches an object all over, and writes its row to the file `path`; the file's summary."""
+        """Touches an object all over, writes its row to the file `path`, and returns its summary."""
         row, seconds = surfaces.surface(self._object(facts), WholeOptions(**options))
         counts = {"ok": row["touches"] - row["in_doubt"], "in_doubt": row["in_doubt"]}
         return _written(path, [row], facts | {name: row[name] for name, *_ in FOUND}, seconds, counts)
@@ -83,19 +83,19 @@ def _written(path: str, *content: Any) -> dict[str, Any]:
 
 
 def answered(run: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
-    """How it went, and what came of it: a value, or a sentence."""
+    """How a call went, and its result: a value, or a sentence."""
     try:
         return DONE, run(*arguments)
     except HopelessError as error:
         return STOP, str(error)
-    except Exception as error:  # whatever it is, it is this object's and no other's
+    except Exception as error:  # Whatever it is, other objects are not concerned.
         words = " ".join(str(error).split()) or type(error).__name__
-        return FAILED, words.removeprefix("Error: ")  # which Blender's operators begin with
+        return FAILED, words.removeprefix("Error: ")  # Messages of Blender's operators begin with it.
 
 
 def main() -> None:
     """Answers orders until there are no more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for who has started it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # The process that started it handles Ctrl+C.
     connection, orders = Connection(int(sys.argv[1])), queue.SimpleQueue()
     threading.Thread(target=_listen, args=(connection, orders), daemon=True).start()
     hand = Hand()
@@ -113,7 +113,7 @@ def _listen(connection: Connection, orders: "queue.SimpleQueue[Any]") -> None:
         try:
             orders.put(connection.recv())
         except (EOFError, OSError):
-            os._exit(0)  # perhaps in the middle of an order, which nobody waits for any more
+            os._exit(0)  # Nobody waits for the order any more.
 
 
 if __name__ == "__main__":

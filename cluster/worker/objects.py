@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The objects in files, and one of them as it is touched; with bpy."""
+"""The objects in files, and one of them as it is touched; it needs bpy."""
 
 from pathlib import Path
 from typing import Any
@@ -13,49 +13,50 @@ from ..extension import addon, core
 
 detached_mesh, evaluated_mesh = addon("touch.detached_mesh"), addon("touch.evaluated_mesh")
 mesh_file = addon("files.mesh_file")
-SCENES = (".blend", ".obj")  # files of several objects, which have names of their own
+SCENES = (".blend", ".obj")  # These files may have several objects, which have names of their own.
 
 
 class Touchable:
-    """An evaluated mesh object of the open scene, to be touched many times.
+    """An evaluated mesh object of the open scene that can be touched many times.
 
-    obj : of the scene, which is good until another file is opened
-    surface : for core, in the directions of the world from the object's origin
-    offset : (3,), of that origin in the world
-    points, triangles : (n, 3) and (m, 3), counterclockwise from outside, as in `surface`
+    obj : the object of the scene, which is valid until another file is opened
+    surface : the mesh for core, in the directions of the world and relative to the object's origin
+    offset : (3,), this origin in the world
+    points, triangles : (n, 3) and (m, 3), counterclockwise from outside, in the coordinates of `surface`
     facts : plain values that say which object it is
     """
 
     def __init__(self, obj: Any, path: str) -> None:
-        """Raises ValueError, with a sentence, where `obj` cannot be touched."""
+        """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
         self.obj = obj
         evaluated, linear, self.offset = evaluated_mesh.evaluated_object(obj, depsgraph)
         self.surface = detached_mesh.DetachedMesh(obj, depsgraph)
         self.points, self.triangles = self.surface.points, _triangles(evaluated.data, linear)
         shape = (self.points, self.triangles, self.offset)
+        units = bpy.context.scene.unit_settings
         self.facts = {
             "name": _name_of(obj, path),
             "hash": hash_of(*(np.ascontiguousarray(array).tobytes() for array in shape)),
             "file": path,
             "size": self.surface.size,
-            "unit": _unit(),
+            "unit": None if units.system == "NONE" else units.scale_length,
             "vertices": len(self.points),
             "triangles": len(self.triangles),
         }
 
     def places(self, count: int, rng: np.random.Generator) -> Any:
-        """Random points all over it and the unit normals there, (n, 3) each."""
+        """Random points all over the object and the unit normals there, (count, 3) each."""
         return core.scattered(self.points, self.triangles, count, rng)
 
 
 def survey(path: str) -> list[dict[str, Any]]:
-    """The facts of all objects of a file; `trouble`, a sentence, in those of one that cannot be touched."""
+    """The facts of all objects in a file; those of one that cannot be touched have `trouble`, a sentence."""
     return [_facts(obj, path) for obj in _open(path)]
 
 
 def touchable(path: str, name: str) -> Touchable:
-    """The object of that name out of a file. Raises OSError or ValueError, with a sentence."""
+    """The object of this name in a file. Raises OSError or ValueError, with a sentence."""
     for obj in _open(path):
         if _name_of(obj, path) == name:
             return Touchable(obj, path)
@@ -63,7 +64,7 @@ def touchable(path: str, name: str) -> Touchable:
 
 
 def _open(path: str) -> list[Any]:
-    """The mesh objects of a file that are visible, by name."""
+    """The visible mesh objects of a file, sorted by name."""
     mesh_file.open_file(Path(path))
     objects = sorted(bpy.context.view_layer.objects, key=lambda obj: obj.name)
     found = [obj for obj in objects if obj.type == "MESH" and obj.visible_get()]
@@ -84,14 +85,8 @@ def _name_of(obj: Any, path: str) -> str:
 
 
 def _triangles(mesh: Any, linear: Any) -> Any:
-    """Indices of a mesh's vertices, (m, 3), counterclockwise from outside after that transform."""
+    """The triangles (m, 3) of a mesh, counterclockwise from outside after the transform `linear`."""
     mesh.calc_loop_triangles()
     found = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", found.ravel())
     return found[:, ::-1] if np.linalg.det(linear) < 0.0 else found
-
-
-def _unit() -> float | None:
-    """Meters in a unit of the open scene; None where it does not say."""
-    settings = bpy.context.scene.unit_settings
-    return None if settings.system == "NONE" else settings.scale_length

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hand in a process of its own: started, asked, watched and ended."""
+"""A hand in a process of its own, which is started, asked, watched and ended here."""
 
 import os
 import platform
@@ -14,17 +14,17 @@ from typing import Any
 
 from ..extension import ROOT
 
-DONE, FAILED, STOP = "done", "failed", "stop"  # How an order went: STOP where all others would go so too.
-START = 120.0  # seconds that Blender may take to start
-GRACE = 1.0  # seconds in which a process that is about to end does so
-TIMEOUT, UNENDED = "Timeout (", "It did not end by itself"  # The first is the watchdog's word.
-MOST_OPENED = 200  # objects that a process opens before another takes its place
+DONE, FAILED, STOP = "done", "failed", "stop"  # How an order went; STOP if all others would fail, too.
+START = 120.0  # Blender may take so many seconds to start.
+GRACE = 1.0  # A process that is about to end gets so many seconds.
+TIMEOUT, UNENDED = "Timeout (", "It did not end by itself"  # The watchdog writes the first.
+MOST_OPENED = 200  # A process that has opened so many objects is replaced.
 THREADS = ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR")
-TAIL = 20_000  # characters of what a process has said last
+TAIL = 20_000  # So many of the last characters that a process has written are read.
 
 
 class LostError(Exception):
-    """The process has ended, or was ended, in the middle of an order; says why."""
+    """The process has ended, or was ended, during an order; the message says why."""
 
 
 class NotStartedError(LostError):
@@ -32,7 +32,7 @@ class NotStartedError(LostError):
 
 
 class HandProcess:
-    """A process that has Blender; nothing is forked, so what Blender has in it is never copied."""
+    """A process that has Blender. It is not forked, so that nothing of Blender is copied."""
 
     def __init__(self) -> None:
         ours, theirs = Pipe()
@@ -52,11 +52,11 @@ class HandProcess:
 
     @property
     def is_worn(self) -> bool:
-        """Whether another should take its place, so that memory stays flat."""
+        """Whether it should be replaced, so that memory does not grow."""
         return self._opened >= MOST_OPENED or self._process.poll() is not None
 
     def ask(self, limit: float, name: str, *arguments: Any) -> tuple[str, Any]:
-        """How an order went, and what came of it; see hand.py. Raises LostError where the process is gone."""
+        """How an order went, and its result; see hand.py. Raises LostError if the process is gone."""
         self._start()
         with suppress(EOFError, OSError):
             self._connection.send((limit, name, arguments))
@@ -69,14 +69,14 @@ class HandProcess:
         raise LostError(f"{way}\n{words}")
 
     def close(self) -> None:
-        """Ends it, whatever it does."""
+        """Ends the process, whatever it does."""
         self._connection.close()
         self._process.kill()
         self._process.wait()
         self._said.close()
 
     def _start(self) -> None:
-        """Waits for a new one until it says that Blender is there."""
+        """Waits for a new process until it says that Blender is there."""
         if not self._is_new:
             return
         with suppress(EOFError, OSError):
@@ -92,7 +92,7 @@ class HandProcess:
         )
 
     def _end(self) -> tuple[str, str]:
-        """Ends it; how it had ended by itself, and its last words."""
+        """Ends the process, and returns how it had ended by itself, and its last words."""
         try:
             code = self._process.wait(GRACE)
             way = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"

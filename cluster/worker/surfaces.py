@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An object touched all over, as a row; the same for the same object and options, wherever it is made."""
+"""An object that is touched all over, as a row, which is the same wherever it is made."""
 
 from time import process_time
 from typing import Any
@@ -19,7 +19,7 @@ object_touches = addon("whole_object.object_touches")
 def surface(target: Touchable, options: WholeOptions) -> tuple[dict[str, Any], float]:
     """The row of an object of the open file, and the seconds of processor time that it took.
 
-    Raises ValueError, with a sentence, where it cannot be touched so.
+    Raises ValueError, with a sentence, if it cannot be touched with these options.
     """
     start, facts = process_time(), target.facts
     touches = object_touches.ObjectTouches(

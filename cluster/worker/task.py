@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Dask runs. Each thread of a worker has a hand of its own; what goes wrong is tried twice."""
+"""The task that Dask runs. Each thread of a worker has a hand of its own, and what fails is tried twice."""
 
 import threading
 from typing import Any
@@ -12,7 +12,7 @@ _own = threading.local()
 
 
 def perform(label: str, limit: float, name: str, *arguments: Any) -> tuple[str, Any, list[str]]:
-    """How an order went, what came of it, and what went wrong before; `label` names object and block."""
+    """How an order went, its result, and what went wrong before; `label` names object and block."""
     troubles: list[str] = []
     for _ in range(TRIES):
         last = FAILED
@@ -28,7 +28,7 @@ def perform(label: str, limit: float, name: str, *arguments: Any) -> tuple[str, 
 
 
 def _hand() -> HandProcess:
-    """This thread's, another one where it is gone or worn."""
+    """The hand of this thread, or a new one if that is gone or worn."""
     hand = getattr(_own, "hand", None)
     if hand is not None and hand.is_worn:
         hand.close()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The touches of a block, as rows; the same for the same object and options, wherever they are made."""
+"""The touches of a block as rows, which are the same wherever they are made."""
 
 from collections.abc import Iterator
 from time import process_time
@@ -13,11 +13,11 @@ from ..extension import addon, core
 from .objects import Touchable
 
 touch_object = addon("touch.touch_object")
-BATCH = 50  # touches that are felt and fitted side by side
+BATCH = 50  # So many touches are felt and fitted side by side.
 
 
 def touched(target: Touchable, options: Options, block: int) -> tuple[list[dict[str, Any]], float]:
-    """Rows of a block of touches, and the seconds of processor time that they took.
+    """The rows of a block of touches, and the seconds of processor time that they took.
 
     Raises ValueError, with a sentence, for lengths that no touch of the object can have.
     """
@@ -31,7 +31,7 @@ def touched(target: Touchable, options: Options, block: int) -> tuple[list[dict[
 
 
 def explored(target: Touchable, options: Options, block: int) -> Iterator[tuple[Any, Any, list[Any]]]:
-    """Places, outward normals and what was found there, batch by batch."""
+    """Yields places, outward normals and what was found there, batch by batch."""
     rng = np.random.default_rng([options.seed, int(target.facts["hash"], 16), block])
     size, count = target.facts["size"], len(options.numbers(block))
     points, outward = target.places(count, rng)
@@ -61,7 +61,7 @@ def _rows(target: Touchable, options: Options, block: int) -> Iterator[dict[str,
 
 
 def _row(target: Touchable, found: Any) -> dict[str, Any]:
-    """What a touch has found."""
+    """What a touch has found, as a row."""
     r, contours = found.result, found.result.contours
     return {
         "status": r.status,
