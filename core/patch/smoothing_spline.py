@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import Array
+from .lapack import on_one_thread
 
 # python -m benchmarks.atlas chose these.
 SIDE = 21  # There are so many knots along each axis, evenly spaced over [-half, half].
@@ -47,37 +48,60 @@ class _Equations(NamedTuple):
     size: float
 
 
+class _Columns(NamedTuple):
+    """Columns of n values each, of which normal equations are sums with the weights of n contacts.
+
+    bands, rights : sparse, ((WIDTH + 1) SIDE^2, n) and (SIDE^2, n), what each contact brings
+    squares : (n,), sums over the columns; columns : their number
+    """
+
+    bands: Any
+    rights: Any
+    squares: Array
+    columns: int
+
+    def weighted(self, weights: Array) -> _Equations:
+        """The normal equations of contacts that count by weights (n,)."""
+        band = (self.bands @ weights).reshape(WIDTH + 1, SIDE**2)
+        square, size = float(weights @ self.squares), float(self.columns * np.count_nonzero(weights))
+        return _Equations(band, self.rights @ weights, square, size)
+
+
 class _Solution(NamedTuple):
-    """-2 log likelihood, the band of the Cholesky factor, and the coefficients (SIDE^2,)."""
+    """-2 log likelihood, the band of the Cholesky factor L, and the right side (SIDE^2,) divided by L."""
 
     surprise: float
     factor: Array
-    coefficients: Array
+    halfway: Array
+
+    def coefficients(self) -> Array:
+        """The coefficients (SIDE^2,)."""
+        return _divided(self.factor, self.halfway, "T")
 
 
+@on_one_thread
 def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: float, noise: float) -> Spline:
     """The spline of contacts and unit normals, (n, 3) each, which count by weights (n,).
 
     half : half the side of the square of knots
     noise : least standard deviation of a contact
     """
-    heights, *slopes = bases(contacts[:, 0], contacts[:, 1], half)
+    knots, basis = bases(contacts[:, 0], contacts[:, 1], half)
     up = np.maximum(normals[:, 2], LEAST_COSINE)
-    asked = -normals[:, :2] / up[:, None]
+    asked = np.column_stack([contacts[:, 2], -normals[:, :2] / up[:, None]]).T
+    heights, slopes = _columns(knots, basis[:1], asked[:1]), _columns(knots, basis[1:], asked[1:])
     # A slope s has 1 + s^2 times the deviation.
     certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)
     sizes, sloping = [grid[i] for grid, i in zip(_grids(noise), START, strict=True)], weights * certainty
     for _ in range(SIZE_PASSES):
-        data = [_equations([heights], weights, contacts[:, 2:]), _equations(slopes, sloping, asked)]
+        data = [heights.weighted(weights), slopes.weighted(sloping)]
         found = _likeliest(data, sizes, half, noise)
-        off = np.abs(contacts[:, 2] - heights @ found.coefficients)
-        across = np.stack([by @ found.coefficients for by in slopes], axis=1) - asked
-        turned = np.sqrt(certainty) * np.hypot(*across.T)
-        outlying = _student(off, sizes[1])
-        weights, sloping = outlying, outlying * certainty * _student(turned, sizes[2])
-    data = [_equations([heights], weights, contacts[:, 2:]), _equations(slopes, sloping, asked)]
-    found = _solved(data, sizes, half)
-    return Spline(found.coefficients.reshape(SIDE, SIDE), _stds(found.factor, half))
+        off = np.einsum("cnk,nk->cn", basis, found.coefficients()[knots]) - asked
+        turned = np.sqrt(certainty) * np.hypot(off[1], off[2])
+        weights = _student(np.abs(off[0]), sizes[1])
+        sloping = weights * certainty * _student(turned, sizes[2])
+    found = _solved([heights.weighted(weights), slopes.weighted(sloping)], sizes, half)
+    return Spline(found.coefficients().reshape(SIDE, SIDE), _stds(found.factor))
 
 
 def _grids(noise: float) -> tuple[Any, Any, Any]:
@@ -101,7 +125,7 @@ def _likeliest(data: list[_Equations], sizes: list[float], half: float, noise: f
 
 
 def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solution:
-    from scipy.linalg import cho_solve_banded, cholesky_banded
+    from scipy.linalg import cholesky_banded
 
     roughness, *stds = sizes
     pitch = 2.0 * half / (SIDE - 1)
@@ -113,17 +137,34 @@ def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solutio
         surprise += some.square / std**2 + 2.0 * some.size * np.log(std)
     matrix[0] += SPLINE_ROUNDING * matrix[0].max()
     factor = cholesky_banded(matrix, overwrite_ab=True, lower=True, check_finite=False)
-    found = cho_solve_banded((factor, True), right, check_finite=False)
-    surprise += 2.0 * np.log(factor[0]).sum() - right @ found
-    return _Solution(float(surprise), factor, found)
+    halfway = _divided(factor, right, "N")
+    surprise += 2.0 * np.log(factor[0]).sum() - halfway @ halfway
+    return _Solution(float(surprise), factor, halfway)
 
 
-def _equations(bases: list[Any], weights: Array, values: Array) -> _Equations:
-    """The normal equations that fit bases (n, SIDE^2) times coefficients to the columns of values (n, k)."""
-    matrix = sum(basis.T @ basis.multiply(weights[:, None]) for basis in bases)
-    right = sum(basis.T @ (weights * column) for basis, column in zip(bases, values.T, strict=True))
-    square = float(weights @ (values**2).sum(axis=1))
-    return _Equations(_band(matrix), right, square, float(len(bases) * np.count_nonzero(weights)))
+def _divided(factor: Array, right: Array, trans: str) -> Array:
+    """The right side (SIDE^2,) or (SIDE^2, k) divided by a Cholesky factor, or by its transpose with "T"."""
+    from scipy.linalg.lapack import dtbtrs
+
+    found: Array = dtbtrs(factor, right, uplo="L", trans=trans)[0]
+    return found.reshape(right.shape)
+
+
+def _columns(knots: Any, basis: Array, values: Array) -> _Columns:
+    """What n contacts bring to normal equations that fit bases (c, n, 16) at knots (n, 16) to values (c, n)."""
+    from scipy.sparse import csc_matrix
+
+    # A contact has 16 coefficients, so 136 pairs of them are in the band of the matrix's lower half.
+    one, other = np.tril_indices(16)
+    diagonal = (knots[:, one] - knots[:, other]) * SIDE**2
+    pairs = np.einsum("cnp,cnp->np", basis[:, :, one], basis[:, :, other])
+    rights = np.einsum("cnk,cn->nk", basis, values)
+    parts = []
+    for each, rows, size in ((pairs, diagonal + knots[:, other], WIDTH + 1), (rights, knots, 1)):
+        starts = np.arange(0, each.size + 1, each.shape[1])
+        shape = size * SIDE**2, len(knots)
+        parts.append(csc_matrix((each.ravel(), rows.ravel(), starts), shape=shape))
+    return _Columns(parts[0], parts[1], (values**2).sum(axis=0), len(basis))
 
 
 def _student(misses: Array, std: float) -> Array:
@@ -132,17 +173,21 @@ def _student(misses: Array, std: float) -> Array:
     return np.where(ratios > FAR_OFF, (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
 
 
-def _stds(factor: Array, half: float) -> Array:
+def _stds(factor: Array) -> Array:
     """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and take the longest."""
-    from scipy.linalg import cho_solve_banded
+    coarse = _heights_at_coarse_knots()
+    some = np.sqrt((_divided(factor, coarse, "N") ** 2).sum(axis=0))
+    return between(some.reshape((SIDE + 1) // 2, -1))
 
-    coarse = slice(None, None, 2)
-    knots = np.linspace(-half, half, SIDE)[coarse]
-    x, y = (axis.ravel() for axis in np.meshgrid(knots, knots, indexing="ij"))
-    basis = bases(x, y, half)[0].toarray()
-    told = cho_solve_banded((factor, True), basis.T, check_finite=False)
-    some = np.sqrt(np.maximum(np.einsum("ki,ik->k", basis, told), 0.0))
-    return between(some.reshape(len(knots), -1))
+
+@cache
+def _heights_at_coarse_knots() -> Array:
+    """What coefficients contribute to the heights at every other knot, (SIDE^2, k)."""
+    x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, SIDE)[::2]], indexing="ij")
+    at, basis = bases(x.ravel(), y.ravel(), 1.0)
+    found = np.zeros((SIDE**2, len(at)), order="F")
+    np.add.at(found, (at, np.arange(len(at))[:, None]), basis[0])
+    return found
 
 
 def between(some: Array) -> Array:
@@ -154,22 +199,15 @@ def between(some: Array) -> Array:
     return full
 
 
-def bases(x: Array, y: Array, half: float) -> list[Any]:
-    """Sparse matrices (n, SIDE^2) that give heights and slopes along x and y at n places by coefficients."""
-    from scipy.sparse import csr_matrix
-
+def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
+    """The 16 knots (n, 16) that tell of n places, and their shares (3, n, 16) in height and slopes there."""
     pitch = 2.0 * half / (SIDE - 1)
     (column, *by_x), (row, *by_y) = (weights_at(along / pitch) for along in (x, y))
     steps = np.arange(-1, 3)
     knots = (column[:, None, None] + steps[:, None]) * SIDE + row[:, None, None] + steps
-    starts = np.arange(0, 16 * len(x) + 1, 16)
-    return [
-        csr_matrix(
-            (((by_x[i][:, :, None] * by_y[j][:, None]) / pitch ** (i + j)).ravel(), knots.ravel(), starts),
-            shape=(len(x), SIDE**2),
-        )
-        for i, j in ((0, 0), (1, 0), (0, 1))
-    ]
+    orders = ((0, 0), (1, 0), (0, 1))
+    found = [by_x[i][:, :, None] * by_y[j][:, None] / pitch ** (i + j) for i, j in orders]
+    return knots.reshape(-1, 16), np.array(found).reshape(3, -1, 16)
 
 
 def weights_at(at: Array) -> tuple[Any, Array, Array]:
