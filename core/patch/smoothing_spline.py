@@ -151,7 +151,7 @@ def _divided(factor: Array, right: Array, trans: str) -> Array:
 
 
 def _columns(knots: Any, basis: Array, values: Array) -> _Columns:
-    """What n contacts bring to normal equations that fit bases (c, n, 16) at knots (n, 16) to values (c, n)."""
+    """What n contacts bring to the fit of bases (c, n, 16) at knots (n, 16) to values (c, n)."""
     from scipy.sparse import csc_matrix
 
     # A contact has 16 coefficients, so 136 pairs of them are in the band of the matrix's lower half.

@@ -29,7 +29,7 @@ def touched(bpy, target, location):
 
 
 def lost(bpy, patch):
-    """Where the patch was; it is somewhere else now."""
+    """Moves the patch somewhere else and returns where it was."""
     matrix = patch.matrix_world.copy()
     patch.matrix_world = Matrix.LocRotScale(Vector((4.0, -3.0, 7.0)), Euler((2.0, 0.7, -1.2)), None) @ matrix
     bpy.context.view_layer.update()
@@ -37,7 +37,7 @@ def lost(bpy, patch):
 
 
 def apart(one, other):
-    """Distance, and angle in degrees, of two transforms."""
+    """The distance between two transforms, and the angle between them in degrees."""
     turn = one.to_quaternion().rotation_difference(other.to_quaternion()).angle
     return (one.translation - other.translation).length, math.degrees(min(turn, 2.0 * math.pi - turn))
 
@@ -130,7 +130,7 @@ def test_the_patch_of_a_probe_is_where_its_probe_is(empty, suzanne, extension):
 
 
 def imported(bpy, suzanne, tmp_path):
-    """The patch of contacts in a file, alone and active; it knows no mesh."""
+    """A patch that was imported from a file and moved away: it is active and knows no mesh."""
     patch = touched(bpy, suzanne, forehead(suzanne, bpy))
     path = tmp_path / "felt.csv"
     assert bpy.ops.tactile.export_contacts(filepath=str(path)) == {"FINISHED"}

@@ -26,7 +26,7 @@ def add_ball(bpy, radius=RADIUS, name="Sphere"):
 
 @pytest.fixture
 def patch(empty):
-    """The patch of a finely faceted ball of radius 2, active, alone selected."""
+    """The patch of a finely faceted ball of radius 2; it is active, and nothing else is selected."""
     add_ball(empty)
     assert empty.ops.tactile.reconstruct(**TOUCH) == {"FINISHED"}
     return empty.context.object
@@ -97,7 +97,7 @@ def test_another_mesh_of_known_distance_by_name_and_by_selection(empty, patch):
     activate(empty, patch, other)
     selected = verified(empty, patch)
     assert selected == named
-    # Against the ball that was touched all is as it was.
+    # Verified against the ball that was touched, the patch has its first status and message again.
     activate(empty, patch)
     assert verified(empty, patch)["target"] == "Sphere"
     assert [patch["tactile"][key] for key in ("status", "message")] == [report["status"], report["message"]]
@@ -119,7 +119,7 @@ def test_patch_and_mesh_moved_turned_and_in_another_unit(empty, patch, scale):
             expected = value * (scale if "distance" in key or "error" in key else 1.0)
             assert other[key] == pytest.approx(expected, rel=0.02, abs=2e-6 * scale), key
     assert other["vertices"] == pytest.approx(one["vertices"], abs=2)
-    # A scan in the patch's old unit, as its mesh has it, is the same thing too.
+    # The result is the same where the mesh's own coordinates keep the old unit and its transform scales them.
     ball.data.transform(Matrix.Scale(1.0 / scale, 4))
     ball.matrix_world = ball.matrix_world @ Matrix.Scale(scale, 4)
     empty.context.view_layer.update()
@@ -200,7 +200,7 @@ def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patc
     at = positions(ball.data)
     away = np.linalg.norm(at - np.array(patch["tactile"]["frame"]["origin"]), axis=1)
     at *= 1.0 + 0.05 * np.clip(1.0 - away / 0.5, 0.0, 1.0)[:, None]
-    ball.data.vertices.foreach_set("co", at.ravel())  # by the attribute, Blender would keep its old tree
+    ball.data.vertices.foreach_set("co", at.ravel())  # set through the attribute, Blender would keep its old tree
     ball.data.update()
     found = verified(empty, patch)
     assert patch["tactile"]["status"] == "uncertain"
@@ -316,7 +316,7 @@ def test_without_a_patch_and_in_edit_mode_the_button_is_gray(empty, patch):
     empty.ops.object.mode_set(mode="OBJECT")
     activate(empty, patch)
     assert empty.ops.tactile.verify.poll()
-    activate(empty, patch.children[0])  # by its contours
+    activate(empty, patch.children[0])  # its contours stand for it
     assert empty.ops.tactile.verify.poll()
 
 
@@ -328,7 +328,7 @@ def test_one_undo_takes_all_of_it_back(empty, patch):
     empty.ops.tactile.verify("EXEC_DEFAULT", True, target="Larger")
     empty.ops.ed.undo_push(message="after")
     empty.ops.ed.undo()
-    if "verification" in empty.data.objects[name]["tactile"]:  # a script's own push was one more
+    if "verification" in empty.data.objects[name]["tactile"]:  # the push above was one step more
         empty.ops.ed.undo()
     patch = empty.data.objects[name]
     assert "verification" not in patch["tactile"]
@@ -390,7 +390,7 @@ def test_what_changes_while_it_is_compared_ends_it_with_a_sentence(empty, patch,
 
 
 def test_in_steps_it_finds_what_it_finds_at_once(empty, patch, extension):
-    """Whatever Blender evaluates between two steps."""
+    """It does so even where Blender evaluates the mesh again between two steps."""
     operator = extension.tactile_addon.comparison.verify_operator
     ball, wanted, done = empty.data.objects["Sphere"], verified(empty, patch), []
     deviation = values(patch.data, "deviation")
@@ -398,7 +398,7 @@ def test_in_steps_it_finds_what_it_finds_at_once(empty, patch, extension):
     verification.look(empty.context.evaluated_depsgraph_get())
     for _ in verification.steps():
         done.append(verification.done)
-        ball.data.update()  # to the same shape, which frees what was evaluated
+        ball.data.update()  # the shape stays, but the evaluated mesh is freed
         empty.context.view_layer.update()
         verification.look(empty.context.evaluated_depsgraph_get())
     assert len(done) > 4

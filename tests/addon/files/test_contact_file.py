@@ -117,7 +117,7 @@ def test_a_ply_of_bare_points_is_a_stroke(contact_file, read, tmp_path):
     properties = "property double x\nproperty double y\nproperty double z\n"
     assert read(ply("binary_little_endian", 6, properties) + rows, "scan.ply")[0] == []
     (stroke,) = contact_file.read(tmp_path / "scan.ply").strokes
-    assert len(stroke.points) == 5  # one of them is there twice
+    assert len(stroke.points) == 5  # one of the six is there twice
 
 
 def test_times_put_contacts_in_order(read):
@@ -232,7 +232,7 @@ def test_what_was_exported_and_is_read_gives_the_same_patch(
 
 
 def test_comments_that_are_not_ours_say_nothing(contact_file, tmp_path):
-    """Neither those of other programs, nor those of version 1, nor those below the header."""
+    """They are comments of other programs, of version 1, and below the header."""
     told = "# point 1 2 3\n# noise 5\n"
     titles = "# made by a robot\n", "# Tactile Patch contacts, version 1, lengths in no unit\n", ""
     for text in (titles[0] + told + PLAIN, titles[1] + PLAIN, titles[2] + told + PLAIN, PLAIN + told):
@@ -369,7 +369,7 @@ def rows_of(count, digits=17):
 
 @pytest.mark.parametrize("change", [("c,", "c,"), ("c,", '"c",'), ("c,", " c , "), (".", ",")])
 def test_rows_are_read_many_at_a_time_and_take_little_memory(read, contact_file, monkeypatch, change):
-    """One by one, only where something is to be said of one."""
+    """A row is looked at by itself only where an error has to name it."""
     count = 50_000
     points, text = rows_of(count)
     text = text.replace(",", ";").replace(".", ",") if change[0] == "." else text.replace(*change)

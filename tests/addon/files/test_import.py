@@ -24,7 +24,7 @@ def contours_of(surface, noise=0.02):
 
 @pytest.fixture
 def measured(extension, empty, tmp_path):
-    """Writes contacts of a surface without the point; a path."""
+    """A function that writes contacts of a surface, without the reference point, and returns the path."""
 
     def write(surface=SURFACE, name="scan.csv", normals=True, unit="", shuffle=False):
         contours = contours_of(surface)
@@ -86,7 +86,7 @@ def test_the_reference_point_may_be_given(empty, measured):
     _, report = imported(empty, path, point=list(near))
     assert report["frame"]["origin"] == pytest.approx(near, rel=1e-6)
     assert "misses" not in report
-    assert "misses" in imported(empty, path)[1]  # A point is of one file, not of the next.
+    assert "misses" in imported(empty, path)[1]  # a point that was given is not kept for the next import
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_units(empty, measured, named, unit, scale, factor):
 
 
 def wiped(extension, path, marked, noise=0.02, also=()):
-    """Writes rows of contacts on the torus as a robot's raster, strokes or curves; the path."""
+    """Writes rows of contacts as of a robot's raster on the torus, as strokes or curves; returns the path."""
     rows = []
     for c in SURFACE.track(surfaces.planes((0, 35, 90, 120)), extent=12.0, step=0.4, noise=noise, rng=1):
         rows += [Contour(c.points[i::3] - 1e-3 * i) for i in range(3)]
@@ -152,7 +152,7 @@ def test_strokes_beside_contours_are_fitted_and_go_out_again(extension, empty, t
     path = wiped(extension, tmp_path / "both.csv", True, also=contours_of(SURFACE))
     _, report = imported(empty, path, point=list(SURFACE.point))
     assert (report["curves"], report["strokes"]) == (3, 12)
-    assert report["contacts"] > 100  # of the strokes 36 to 100 means
+    assert report["contacts"] > 100  # 72 of the curves, and 36 to 100 means of the strokes
     out = tmp_path / "out.csv"
     empty.ops.tactile.export_contacts(filepath=str(out))
     _, again = imported(empty, str(out))
@@ -183,11 +183,11 @@ def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):
     for number in range(3):
         centers = points[(curve == number) & (contact >= 0)].reshape(-1, 6, 3).mean(axis=1)
         steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
-        assert steps.max() < 2.3  # the point is no contact
+        assert steps.max() < 2.3  # it is 2 across the reference point, which is no contact
 
 
 def test_what_a_file_says_of_its_patch_counts_unless_something_else_is_given(empty, measured, tmp_path):
-    """The other side than the bulge tells, and a point beside where the curves meet."""
+    """The file names the side that the bulge speaks against, and a point beside where the curves meet."""
     path = Path(measured(normals=False))
     point, down = SURFACE.point + 0.01 * SURFACE.normal, -SURFACE.normal
     told = "".join(
@@ -326,7 +326,7 @@ def test_nothing_goes_out_without_a_patch(empty, measured, tmp_path):
 
 
 def test_what_is_shown_is_not_what_is_kept(extension, empty, measured, tmp_path):
-    """Editing the contours or the patch changes nothing of what goes out; moving the patch moves it."""
+    """What is exported stays the same when contours or patch are edited, and moves when the patch is moved."""
     patch, report = imported(empty, measured())
     before = extension.reconstruction_of(patch)
     for mesh in (patch.data, patch.children[0].data):
@@ -388,7 +388,7 @@ def test_fit_from_the_shell(command, empty, measured, tmp_path):
         code, out, err = command("fit", path, *FIT, "--output", tmp_path / output)
         assert (code, err) == (0, "")
         report = report_in(out)
-        # In the unit of the file.
+        # Lengths are in the unit of the file.
         assert report["k1"] == pytest.approx(SURFACE.k1, abs=2e-3)
         assert report["unit"] == "mm"
         assert (tmp_path / output).is_file()

@@ -36,7 +36,7 @@ ROWS = np.linspace(-1.0, 1.0, 17)
 
 @pytest.fixture
 def write(extension, empty, tmp_path):
-    """Writes strokes as a file of that name; the path."""
+    """A function that writes strokes to a file of a given name and returns the path."""
 
     def write(name, strokes, **told):
         contact_file = extension.tactile_addon.files.contact_file
@@ -48,7 +48,7 @@ def write(extension, empty, tmp_path):
 
 @pytest.fixture
 def three_files(write):
-    """A ball in thirds, each by a point of its own."""
+    """Three files, each with a third of the contacts of a ball and with a reference point of its own."""
     points, normals = ball()
     thirds = np.array_split(np.random.default_rng(0).permutation(len(points)), 3)
     return [

@@ -13,7 +13,7 @@ pytest.importorskip("bpy", reason="needs Blender as a Python module: run make te
 
 PLACE = ["--location", "0.3", "-2e-1", "1.9", "--extent", "0.6", "--step", "0.01"]
 OLD = "what was there before"
-# Options, and the kinds of their files.
+# The options that write files, and the kinds of these files.
 WRITERS = [
     (["--json"], "json"),
     (["--contacts"], "csv"),
@@ -25,7 +25,7 @@ WRITERS = [
 
 @contextmanager
 def full(size):
-    """No file gets larger than that, as on a full disk."""
+    """Lets no file grow beyond a size in bytes, as on a full disk."""
     _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -165,7 +165,7 @@ def test_no_two_outputs_are_one_file_and_measured_files_and_the_open_scene_are_i
 @pytest.mark.parametrize("option", ["--json", "--output", "--verify", "--contacts"])
 @pytest.mark.parametrize("device", ["/dev/full", "/dev/null", "."])
 def test_devices_and_folders_are_refused(command, files, option, device):
-    """By a link to them: a Blender that saves a scene as /dev/null puts a file in its place."""
+    """A link names them: a Blender that saved a scene as /dev/null would put a file in its place."""
     (files / "out.ply").symlink_to(device)
     code, _, err = command("reconstruct", files / "ball.ply", *PLACE, option, files / "out.ply")
     assert code == 2

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A probe that is a child of its target: where it and its patch are when that is moved, scaled or deleted."""
+"""A probe that is a child of its target: where both it and its patch are when the target changes."""
 
 import numpy as np
 import pytest
@@ -180,7 +180,7 @@ def test_undo_of_a_move_and_of_a_scale_brings_probe_and_patch_back(empty, suzann
     states = [seen()]
     for motion in (MOTION, Matrix.Diagonal((1.5, 1.0, 0.8, 1.0)), MOTION):
         empty.data.objects["Suzanne"].matrix_basis = motion @ empty.data.objects["Suzanne"].matrix_basis
-        empty.ops.ed.undo_push(message="moved")  # before any handler, as of a number in a panel
+        empty.ops.ed.undo_push(message="moved")  # before any handler runs, as when a number is set in a panel
         empty.context.view_layer.update()
         states.append(seen())
     for name, number in (("undo", 2), ("undo", 1), ("undo", 0), ("redo", 1), ("redo", 2), ("redo", 3)):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Probes while a handle is dragged, as in a window: what is dear waits for the end of the gesture."""
+"""Probes while a handle is dragged, as in a window: what takes long waits for the end of the gesture."""
 
 import math
 from itertools import pairwise
@@ -13,7 +13,7 @@ pytest.importorskip("bpy", reason="needs Blender as a Python module: run make te
 
 @pytest.fixture
 def gesture(extension, monkeypatch):
-    """Updates are those of a gesture; what it returns ends one."""
+    """Makes all updates those of a gesture; returns a function that ends the gesture."""
     probes = extension.tactile_addon.probes
     update = probes.touch_again.update
     monkeypatch.setattr(
@@ -24,7 +24,7 @@ def gesture(extension, monkeypatch):
 
 @pytest.fixture
 def ridge(empty):
-    """A sheet, 2 wide, that is nearly flat beside a ridge along y, the active object."""
+    """The active object: a sheet, 2 wide, that is nearly flat beside a ridge along y."""
     empty.ops.mesh.primitive_grid_add(x_subdivisions=200, y_subdivisions=200, size=2.0)
     obj = empty.context.object
     co = np.empty((len(obj.data.vertices), 3), dtype=np.float32)
@@ -48,7 +48,7 @@ def report_of(patch):
 
 
 def slide(bpy, probe, patch, xs):
-    """Drags the point along x; the reports on the way."""
+    """Drags the point along x and returns the reports on the way."""
     reports = []
     for x in xs:
         probe.location.x = x
@@ -63,13 +63,13 @@ def test_an_automatic_extent_follows_while_the_point_is_dragged(empty, ridge, ge
     first = report_of(patch)
     reports = slide(empty, probe, patch, np.linspace(-0.58, 0.0, 30))
     doubts = [report["message"] for report in reports if report["status"] != "ok"]
-    assert len(doubts) <= 2  # of what shorter curves would not tell better
+    assert len(doubts) <= 2  # they are about what shorter curves would not tell better
     assert all("principal directions" in message for message in doubts)
     assert not any(report["is_verified"] for report in reports)
     extents = [report["extent"] for report in reports]
     assert extents[-1] < 0.5 * first["extent"]
-    assert not any(b > 1.1 * a for a, b in pairwise(extents))  # it does not flicker
-    assert probe.empty_display_size == pytest.approx(0.6 * extents[-1])  # handles and patch are as large
+    assert not any(b > 1.1 * a for a, b in pairwise(extents))  # the extent does not flicker
+    assert probe.empty_display_size == pytest.approx(0.6 * extents[-1])  # the handles keep the size of the patch
     back = slide(empty, probe, patch, np.linspace(-0.02, -0.6, 30))
     assert back[-1]["extent"] > 1.5 * extents[-1]
     assert probe.tactile_probe.extent == 0.0
@@ -86,7 +86,7 @@ def test_at_the_end_of_a_gesture_the_patch_is_that_of_a_fresh_touch(empty, ridge
     probe, patch = pick(empty, ridge, -0.6)
     slide(empty, probe, patch, np.linspace(-0.5, -0.1, 9))
     assert not report_of(patch)["is_verified"]
-    copy = probe.copy()  # which has no patch, so nothing to begin near
+    copy = probe.copy()  # it has no patch, so no earlier touch to start from
     empty.context.collection.objects.link(copy)
     gesture(empty, probe)
     gesture(empty, copy)

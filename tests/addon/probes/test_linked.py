@@ -14,7 +14,7 @@ WRITERS = ("add_plane", "add_planes", "update", "delete", "verify", "register")
 
 @pytest.fixture
 def library(empty, tmp_path):
-    """A file with a probe and its patch, which is linked into the open scene with its target."""
+    """The path of a file whose probe, patch and target are linked into the open scene."""
     empty.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=2.0)
     empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6, plane_count=4)
     path = str(tmp_path / "library.blend")
@@ -94,7 +94,7 @@ def test_the_override_of_a_probe_is_touched_with_its_own_numbers_and_keeps_them(
     with empty.data.libraries.load(library, link=True) as (_, into):
         into.objects = ["Sphere Patch"]
     assert len(into.objects[0]["tactile"]["planes"]) == 4
-    if whole:  # what a system override has of its own is not kept
+    if whole:  # Blender does not save the changes of a system override
         path = str(tmp_path / "own.blend")
         empty.ops.wm.save_as_mainfile(filepath=path)
         empty.ops.wm.open_mainfile(filepath=path)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Patches and time: other frames, other scenes, and edits that no handler was told of.
 
-A patch follows, or says that it is one of an earlier touch; never that all is well where it is not.
+A patch follows, or says that it is from an earlier touch; it never says that all is well where it is not.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ def probe(empty, ball):
 
 
 def curves_of(action):
-    """In Blender 5 they are in a channel bag."""
+    """The animation curves of an action, which Blender 5 keeps in a channel bag."""
     if hasattr(action, "fcurves"):
         return action.fcurves
     return action.layers[0].strips[0].channelbags[0].fcurves
@@ -220,7 +220,7 @@ def test_a_renamed_target_gives_its_probe_to_another_that_is_chosen(empty, ball)
     assert probe.parent == other
     assert said(probe) == ("outdated", STALE)
     place = record_of(probe)["frame"]["origin"].to_list()
-    other.location.x += 1.0  # the patch is none of this one's, and stays
+    other.location.x += 1.0  # the patch is not of this ball, so it stays
     empty.context.view_layer.update()
     assert record_of(probe)["frame"]["origin"].to_list() == place
     assert record_of(probe)["source"] == "Globe"

@@ -51,7 +51,7 @@ def values(obj, name="position", key="vector", width=3):
 
 
 def state(patch):
-    """What a touch writes: the report but for the clock, and the meshes."""
+    """What a touch writes: the report without its times, and the meshes."""
     report = report_of(patch)
     del report["seconds"]
     colors = values(patch, "curvature_color", "color", 4)
@@ -94,7 +94,7 @@ def test_a_target_that_is_no_mesh_and_a_scale_that_is_none_are_messages(empty, b
 
 
 def state_but_status(patch):
-    """State without what a failed touch says of the patch of the one before."""
+    """The state without the status and message, which a failed touch changes in an earlier patch."""
     report, *meshes = state(patch)
     for key in ("status", "message"):
         del report[key]
@@ -106,7 +106,7 @@ def in_world(obj):
 
 
 def datablocks(bpy):
-    """What there is, by the numbers that datablocks keep as long as they live."""
+    """The names of all datablocks, by the numbers that these keep as long as they live."""
     collections = ("objects", "meshes", "materials", "collections", "node_groups", "images", "curves")
     return {
         name: {block.session_uid: block.name for block in getattr(bpy.data, name)} for name in collections
@@ -118,7 +118,7 @@ def names(bpy):
 
 
 def mark(patch):
-    """Moves a vertex by hand to where it stays until the patch is rewritten."""
+    """Moves a vertex to a place where it stays until the patch is rewritten."""
     patch.data.vertices[7].co.z = 55.0
 
 
@@ -165,11 +165,11 @@ def test_a_pick_makes_a_probe_with_its_patch(empty, ball):
     assert (empty.context.view_layer.objects.active, empty.context.selected_objects) == (probe, [probe])
     settings, report = probe.tactile_probe, report_of(patch)
     assert (settings.is_probe, settings.target, settings.live) == (True, ball, True)
-    assert settings.extent == 0.0  # the surface's own
+    assert settings.extent == 0.0  # 0 leaves the extent to the surface
     assert 0.5 * RADIUS < report["extent"] <= 1.001 * RADIUS
     assert report["vertices"] > 100
     assert report["vertex_distance_mean"] < 3.0 * report["height_std"]
-    # On the ray from the center through the location; azimuth 0 is along x.
+    # The probe is on the ray from the center through the location, and azimuth 0 is along its x axis.
     assert place(probe) == pytest.approx(RADIUS * np.array(TOP.normalized()), abs=0.01)
     assert np.array(report["axes"])[:, 0] == pytest.approx(axis(probe, 0), abs=1e-4)
 
@@ -256,7 +256,7 @@ def test_every_setting_rewrites_the_patch_in_place(empty, ball, name, change, me
     if (name, method) != (
         "degree",
         "bayes",
-    ):  # which is of (1), not of the surface
+    ):  # the degree is that of (1), not of this surface
         assert found.shape != points.shape or np.abs(found - points).max() > 1e-5
     inputs = ("plane_count", "azimuths", "tilts", "extent", "step", "noise", "seed", "method", "degree")
     inputs = {key: getattr(settings, key) for key in (*inputs, "weight", "solver")}
@@ -362,7 +362,7 @@ def test_what_does_not_concern_the_probe_leaves_its_patch_alone(empty, ball):
     cube.data.vertices[0].co.x = 5.0
     cube.data.update()
     update(empty)
-    ball.data.update()  # to the same shape
+    ball.data.update()  # the shape stays the same
     update(empty)
     ball.show_wire, probe.empty_display_size, probe.tactile_probe.active_plane = True, 3.0, 1
     update(empty)
@@ -407,7 +407,7 @@ def test_a_probe_that_is_not_live_leaves_its_patch_where_it_is_when_it_comes_bac
     probe.tactile_probe.live = False
     setattr(probe, name, away)
     update(empty)
-    if name != "scale":  # under such a one nothing can be placed
+    if name != "scale":  # nothing can be placed under such a scale
         assert in_world(patch) == pytest.approx(there, abs=1e-5)
     setattr(probe, name, back)
     update(empty)
@@ -485,7 +485,7 @@ def test_without_a_target_the_probe_says_so_and_keeps_its_patch(
         update(empty)
         assert sentence in probe.tactile_probe.message
         if left == SET[1:] and "Sphere" in names(empty):  # the handler itself deletes nothing
-            assert not empty.app.timers.is_registered(deleted.remove)  # nothing runs one here
+            assert not empty.app.timers.is_registered(deleted.remove)  # timers do not run without a window
             deleted.remove()  # as Blender does once it is idle, in a window
         assert names(empty) == left
         assert state_but_status(patch) == before
@@ -608,14 +608,14 @@ def test_a_probe_comes_to_another_file(empty, ball, tmp_path, capfd, append):
     path = str(tmp_path / "saved.blend")
     empty.ops.wm.save_as_mainfile(filepath=path)
     empty.ops.wm.read_homefile(use_empty=True)
-    if append:  # with its target, in the scene; the patch is made here
+    if append:  # its target comes with it into the scene; the patch is made here
         empty.ops.wm.append(directory=f"{path}/Object/", filename="Sphere Probe")
         update(empty)
         probe = empty.data.objects["Sphere Probe"]
         assert_touches(probe, *probe.children)
         probe.tactile_probe.extent = 0.5
         assert_touches(probe, *probe.children)
-    else:  # linked, with its target: kept up to date in its own file
+    else:  # it is linked with its target, and kept up to date in its own file
         with empty.data.libraries.load(path, link=True) as (_, into):
             into.objects = ["Sphere Probe"]
         empty.context.scene.collection.objects.link(empty.data.objects["Sphere Probe"])
@@ -897,7 +897,7 @@ def test_what_no_probe_depends_on_costs_none_of_them_anything(empty, ball, count
         counted("probes.touch_again", "_made"),
         counted("probes.change_handlers", "may_be_outdated"),
     )
-    empty.ops.object.empty_add()  # who is there has changed: whether their targets are is looked at
+    empty.ops.object.empty_add()  # an object more: it is looked at whether all targets are still there
     assert (calls["is_outdated"], calls["update"]) == (0, 0)
     calls["may_be_outdated"] = looked["_made"] = 0
     other = empty.context.object

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random sequences of what people do: after each step patch and fresh touch agree, or the patch says not.
+"""Random sequences of what people do: each leaves a patch as a fresh touch has it, or one that says it is not.
 
 TACTILE_STEPS=1000 TACTILE_SEED=... takes more steps than the 50 of each run, with other dice.
 """
@@ -17,7 +17,7 @@ STEPS, SEED = int(os.environ.get("TACTILE_STEPS", "50")), int(os.environ.get("TA
 
 
 def tidy(extension):
-    """What Blender does by itself in a window, and not here."""
+    """Does what Blender does by itself in a window, but not here."""
     bpy.context.view_layer.update()
     extension.tactile_addon.probes.deleted.remove()
     bpy.context.view_layer.update()

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Undo and redo of what happens to a probe's target and patch, in the order in which a window has it.
 
-There an operator's step of undo is stored before any handler sees what it has done, as here where it
-stores the step itself.
+A window stores an operator's step of undo before any handler sees what the operator has done. `by_hand`
+does so here.
 """
 
 from types import SimpleNamespace
@@ -71,7 +71,7 @@ def in_panel(bpy, owner, name, value):
 
 
 def rest(bpy):
-    """A step of undo without a change: what the next one leaves alone is kept in memory by undo."""
+    """Stores a step of undo without a change: undo keeps in memory what the next step leaves alone."""
     bpy.ops.ed.undo_push(message="rest")
 
 

@@ -56,7 +56,7 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball):
     assert patches[0].tactile_range == pytest.approx(2e-6, rel=1e-6)
     patches[0].tactile_range = 0.0
     assert patches[0]["tactile"]["color_limit"] == own[0]
-    patches[1].tactile_colors = "mean_curvature"  # whose range is another
+    patches[1].tactile_colors = "mean_curvature"  # this quantity has another range
     assert "tactile_color_range" not in patches[1]
 
 

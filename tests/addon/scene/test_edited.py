@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches that were edited by hand or script, and numbers that Blender's are too coarse for."""
+"""Patches that were edited by hand or script, and numbers that Blender's single precision cannot hold."""
 
 import numpy as np
 import pytest
@@ -45,12 +45,12 @@ def test_an_edited_patch_is_a_sentence_everywhere_and_is_touched_again(empty, pr
     patch.tactile_colors = "mean_curvature"
     found = patch["tactile"].to_dict() if hasattr(patch["tactile"], "to_dict") else patch["tactile"]
     assert repr(found) == repr(kept)
-    probe.tactile_probe.extent = 0.5  # what the handler does with it
+    probe.tactile_probe.extent = 0.5  # a handler answers this with another touch
     assert probe.tactile_probe.message == ""
     assert patch["tactile"]["extent"] == 0.5
     assert empty.ops.tactile.verify() == {"FINISHED"}
     edit(patch)
-    probe.location = (0.0, 0.0, 9.0)  # where there is no patch
+    probe.location = (0.0, 0.0, 9.0)  # no surface is near, so no patch is made
     empty.context.view_layer.update()
     assert "The location is" in probe.tactile_probe.message
     probe.location = (0.3, -0.2, 1.9)

@@ -16,7 +16,7 @@ SET = ["Sphere", "Sphere Contours", "Sphere Patch", "Sphere Probe"]
 
 @pytest.fixture
 def there(empty, ball):
-    """Objects by what they are, looked up anew each time."""
+    """A function that looks up the probe, the patch or the contours, anew each time."""
     empty.ops.tactile.pick(target="Sphere", location=(0.3, -0.2, 1.9), extent=0.6)
     empty.ops.ed.undo_push(message="picked")
     return lambda what: empty.data.objects[f"Sphere {what}"]
@@ -27,7 +27,7 @@ def names(bpy):
 
 
 def tidy(extension):
-    """What Blender does once it is idle, in a window; without one, no timer runs."""
+    """Does what Blender does in a window once it is idle; without a window no timer runs."""
     extension.tactile_addon.probes.deleted.remove()
 
 
@@ -99,7 +99,7 @@ def test_undo_of_what_came_after_leaves_no_contours_of_a_patch_that_was_deleted(
     by_hand(empty, empty.ops.object.delete)
     tidy(extension)
     select(empty, empty.data.objects["Sphere"])
-    step(empty, "undo")  # to what was stored before the contours went
+    step(empty, "undo")  # back to the step that was stored before the contours were removed
     tidy(extension)
     assert names(empty) == [SET[0], SET[3]]
     assert [mesh.name for mesh in empty.data.meshes] == ["Sphere"]
