@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
@@ -45,6 +44,7 @@ class Place:
     """A place on a rim, its normal and the way away from its patch, (3,) each, and the radius of the patch.
 
     tried : where touches that went on from it were, (3,) each
+    felt : by the share of REACHES, what no patch covers on the disk there; nothing if its middle is covered
     """
 
     point: Vector
@@ -52,6 +52,7 @@ class Place:
     ahead: Vector
     radius: float
     tried: tuple[Vector, ...] = ()
+    felt: dict[float, list[Contact]] = field(default_factory=dict)
 
 
 class Next(NamedTuple):
@@ -141,7 +142,7 @@ class Frontier:
         found = still_open([place for _, _, place in sorted(self.queue)], charts)
         for place in still_open(self.left, charts):
             yield
-            if self.beyond([place])[0] is not None:
+            if self.beyond([replace(place, felt={})])[0] is not None:
                 found.append(place)
         return found
 
@@ -158,27 +159,29 @@ class Frontier:
             left = [i for i, touch in enumerate(found) if touch is None]
             if not left:
                 break
-            disks = [self.disk(places[i], share) for i in left]
-            for i, hits, new in zip(left, disks, self._uncovered(disks), strict=True):
-                if len(new) and new[0] == 0:
-                    found[i] = self._touch(places[i], share, hits, new)
+            self._feel([places[i] for i in left], share)
+            for i in left:
+                found[i] = self._touch(places[i], share)
         return found
 
-    def _uncovered(self, disks: Sequence[list[Contact]]) -> list[NDArray[np.intp]]:
-        """The indices of those contacts of each disk that no patch covers."""
+    def _feel(self, places: Sequence[Place], share: float) -> None:
+        """Notes what is uncovered on the disk of each place; what patches cover stays covered."""
         assert self.charts is not None
+        disks = [place.felt[share] if share in place.felt else self.disk(place, share) for place in places]
         flat = np.array([contact for hits in disks for contact in hits]).reshape(-1, 2, 3)
-        free = ~covered(self.charts, flat[:, 0], flat[:, 1])
         ends = np.cumsum([len(hits) for hits in disks])
-        return [np.flatnonzero(some) for some in np.split(free, ends[:-1])]
+        free = np.split(~covered(self.charts, flat[:, 0], flat[:, 1]), ends[:-1])
+        for place, hits, new in zip(places, disks, free, strict=True):
+            place.felt[share] = [hits[i] for i in np.flatnonzero(new)] if new[:1].any() else []
 
-    def _touch(self, place: Place, share: float, hits: list[Contact], new: NDArray[np.intp]) -> Next | None:
-        """The touch in the middle of the new ones among a disk's contacts, if it brings enough."""
+    def _touch(self, place: Place, share: float) -> Next | None:
+        """The touch in the middle of what is uncovered on a disk that was felt, if it brings enough."""
+        hits = place.felt[share]
         disk = math.pi * (min(1.0, DISK_REACHES * share) * place.radius) ** 2
-        area = len(new) / (DISK_PLACES + 1) * disk
+        area = len(hits) / (DISK_PLACES + 1) * disk
         if area <= max(SLIVER * disk, self.least):
             return None
-        point, outward = hits[new[_between(np.array([hits[i][0] for i in new]), place.tried)]]
+        point, outward = hits[_between(np.array([point for point, _ in hits]), place.tried)]
         return Next(np.array(point), np.array(outward), area, place)
 
     def felt(self, hit: Hit | None, way: Vector) -> Contact | None:
@@ -236,8 +239,7 @@ def still_open(places: Sequence[Place], charts: Charts | None) -> list[Place]:
 
 
 def _is_near(place: Place, touch: Next) -> bool:
-    room = TOUCHES_APART * max(place.radius, touch.place.radius)
-    return math.dist(place.point, touch.point) < room
+    return math.dist(place.point, touch.point) < TOUCHES_APART * max(place.radius, touch.place.radius)
 
 
 def _between(points: Array, tried: Sequence[Vector]) -> int:
