@@ -12,7 +12,7 @@ from tools import blender
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
 
-# The short one asks the same every time, so that a test does not fail for what somebody else has changed.
+# The quick and short ones draw the same examples every time, so that no test fails by chance.
 COMMON = {"deadline": None, "suppress_health_check": list(HealthCheck)}
 settings.register_profile("quick", max_examples=15, derandomize=True, database=None, **COMMON)
 settings.register_profile("short", max_examples=60, derandomize=True, database=None, **COMMON)
@@ -53,7 +53,7 @@ def ball(empty):
 
 @pytest.fixture
 def command(extension, capfd):
-    """Runs the command with these words: exit code, standard output, standard error."""
+    """A function that runs the command with words and returns exit code, standard output and error."""
 
     def run(*words):
         try:
@@ -67,7 +67,7 @@ def command(extension, capfd):
 
 @pytest.fixture
 def files(empty, ball, tmp_path):
-    """The ball as a .ply, .stl, .obj and .blend."""
+    """A folder with the ball as .ply, .stl, .obj and .blend."""
     empty.ops.wm.ply_export(filepath=str(tmp_path / "ball.ply"))
     empty.ops.wm.stl_export(filepath=str(tmp_path / "ball.stl"))
     empty.ops.wm.obj_export(filepath=str(tmp_path / "ball.obj"), forward_axis="Y", up_axis="Z")

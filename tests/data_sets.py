@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-# Blocks of half a second on these objects, so that something can happen in the middle.
+# A block takes half a second on these objects, so that something can happen in the middle.
 FEW = ("--touches", "30", "--block", "10", "--limit", "120")
 
 

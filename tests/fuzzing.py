@@ -9,7 +9,7 @@ HANG = 120  # seconds, which no example comes near
 
 
 def in_time(test):
-    """Makes a failure of a hang, in each of a test's examples."""
+    """Makes each example of a test fail where it hangs."""
 
     def give_up(*_):
         raise TimeoutError(f"not done after {HANG} s")

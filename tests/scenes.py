@@ -10,7 +10,7 @@ PLACE = ["--location", "0.3", "-2e-1", "1.9", "--extent", "0.6"]
 
 
 def made(operator, record="tactile", **arguments):
-    """The object with such a record that an operator makes, and the record."""
+    """Runs an operator; returns the object with such a record that it makes, and the record."""
     before = set(bpy.data.objects)
     assert operator(**arguments) == {"FINISHED"}
     (obj,) = (obj for obj in set(bpy.data.objects) - before if record in obj)
@@ -18,7 +18,7 @@ def made(operator, record="tactile", **arguments):
 
 
 def values(mesh, name, key="value", width=1):
-    """Those of an attribute, (n,) or (n, width)."""
+    """The values of an attribute, (n,) or (n, width)."""
     attribute = mesh.attributes[name]
     out = np.empty(len(attribute.data) * width)
     attribute.data.foreach_get(key, out)
@@ -30,7 +30,7 @@ def positions(mesh):
 
 
 def datablocks(bpy):
-    """Their names, by kind."""
+    """The names of datablocks, by kind."""
     kinds = ("objects", "meshes", "materials", "collections", "node_groups", "images", "curves")
     return {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
 
@@ -42,7 +42,7 @@ def by_hand(bpy, operator, **arguments):
 
 
 def step(bpy, name):
-    """Undo or redo."""
+    """Runs undo or redo, whichever is named."""
     getattr(bpy.ops.ed, name)()
     bpy.context.view_layer.update()
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole objects to touch, by signed distances known in closed form; and what a mesh of them is."""
+"""Whole objects to touch, by signed distances known in closed form; and the topology of a mesh."""
 
 import math
 from collections.abc import Callable
@@ -15,7 +15,7 @@ HAIR = 1e-12
 class Solid:
     """Answers rays by walking as far as its signed distance allows, from outside or from inside.
 
-    distance : of a point (x, y, z), negative inside, never too large
+    distance : of a point (x, y, z), negative inside, and never larger than the true one
     start, outward : a point on it, and the normal there
     """
 
@@ -98,7 +98,7 @@ class Block(Solid):
 
 
 def egg(across=0.6, along=1.0):
-    """An ellipsoid around z; its distance is of first order, and a tenth less."""
+    """An ellipsoid around z; its distance is that of first order less a tenth, so as not to be too large."""
 
     def distance(x, y, z):
         r = math.hypot(x / across, y / across, z / along)

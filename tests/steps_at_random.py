@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Anything that people may do to probes, patches and their target, at random, and what must hold then.
 
-Shared by tests/test_random_steps.py, without a window, and tests/gui/random_steps.py, in one.
+Shared by tests/addon/probes/test_random_steps.py, without a window, and tests/gui/random_steps.py, in one.
 """
 
 import random
@@ -11,14 +11,14 @@ import sys
 import bpy
 
 TARGET = "Ball"
-# So fine that by which of two faces a point on their edge is touched makes no difference.
+# The sphere is so fine that it makes no difference which of two faces a touch on their edge meets.
 SPHERE = {"segments": 192, "ring_count": 96, "radius": 2.0, "location": (0.0, 0.0, 0.0)}
 TOP = (0.3, -0.2, 1.9)
-CLOSE = 2e-3  # of 1 / radius, and of the radius: what a fresh touch may differ by
+CLOSE = 2e-3  # a fresh touch may differ by this share of 1 / radius, and of the radius
 
 
 def begin():
-    """A ball whose size and shape are animated, with a probe."""
+    """Makes a ball whose size is animated by a modifier, and a probe on it."""
     bpy.ops.mesh.primitive_uv_sphere_add(**SPHERE)
     ball = bpy.context.object
     ball.name = TARGET
@@ -47,7 +47,7 @@ def belongings():
 
 
 def _target():
-    """What is touched, whatever its name has become."""
+    """The object to touch, which may have been renamed; None if there is none."""
     meshes = (obj for obj in bpy.context.scene.objects if obj.type == "MESH" and obj.name.startswith(TARGET))
     return next((obj for obj in meshes if "tactile" not in obj and "tactile_contours" not in obj), None)
 
@@ -60,7 +60,7 @@ def _select(obj):
 
 
 def _push(what):
-    bpy.ops.ed.undo_push(message=what)  # before any handler, as of a number in a panel
+    bpy.ops.ed.undo_push(message=what)  # before any handler runs, as when a number is set in a panel
 
 
 def _set_number(dice):
@@ -116,7 +116,7 @@ def _pick(dice):
         bpy.context.object.name = TARGET
         return
     _select(target)
-    # On a face: at a vertex its normal is that of one or another of its faces, by rounding.
+    # The place is within a face: at a vertex rounding decides which of its faces gives the normal.
     place = target.matrix_world @ dice.choice(target.data.polygons).center
     new, parent = len(probes()) < 3, dice.random() < 0.7
     bpy.ops.tactile.pick(
@@ -136,7 +136,7 @@ def _update(dice):
 
 
 def _copy(dice):
-    """A probe, alone or with its patch."""
+    """Duplicates a probe, alone or with its patch."""
     if len(probes()) < 3:
         chosen, patch = dice.choice(probes()), None
         if dice.random() < 0.5:
@@ -194,7 +194,7 @@ OF_PROBES = {
     "copy": _copy,
     "rename": _rename,
 }
-RELOAD = "reload"  # which a window has to do by itself: it ends all timers
+RELOAD = "reload"  # the caller does this one, because in a window it ends all timers
 
 
 def choose(dice: random.Random):
@@ -203,13 +203,13 @@ def choose(dice: random.Random):
 
 
 def take(name, dice):
-    """One step; an operator may refuse it, with a sentence."""
+    """Takes one step, which an operator may refuse with a sentence."""
     try:
         if bpy.context.mode != "OBJECT" and name not in ("undo", "undone", "redo"):
             bpy.ops.object.mode_set("EXEC_DEFAULT", True, mode="OBJECT")
         (ANY | OF_PROBES)[name](dice)
     except RuntimeError as error:
-        # By itself, or by its poll, for undo may leave another object in Edit Mode.
+        # An operator refuses by itself, or by its poll, as undo may leave another object in Edit Mode.
         refused = "Error: ", "Operator "
         if "Traceback" in str(error) or not str(error).startswith(refused):
             raise

@@ -23,7 +23,7 @@ UPRIGHT, TILTED = planes((13, 73, 133)), planes((13, 73, 133), (12, -18, 8))
 
 @dataclass(frozen=True, eq=False)
 class Exact:
-    """A level set F = 0, F > 0 outside, that answers rays; and a point on it where all is known.
+    """A level set F = 0, F > 0 outside, that answers rays, with a point on it where the curvatures are known.
 
     level : maps x, y, z (arrays or floats) to F
     gradient : maps a point (3,) to grad F (3,)
@@ -51,7 +51,7 @@ class Exact:
         return core.reconstruct(self.point, contours, outward=self.normal, **options)
 
     def ray_cast(self, origin, direction, distance):
-        """First crossing along the ray: bracketed on 40 samples, then bisected by regula falsi (Illinois)."""
+        """The first crossing along the ray, bracketed in one of 40 parts; then regula falsi (Illinois)."""
         (x, y, z), (u, v, w) = map(float, origin), map(float, direction)
         t = float(distance) * SHARES
         f = self.level(x + u * t, y + v * t, z + w * t)
@@ -96,7 +96,7 @@ def plane():
 
 
 def ellipsoid(a, b, c, u=0.0, v=0.0):
-    """Semi-axes a, b, c; the point at longitude u, latitude v. K and H by the textbook formula."""
+    """It has semi-axes a, b, c and is touched at longitude u, latitude v; K and H are the textbook's."""
     axes2 = np.array([a, b, c]) ** 2
     p = np.array([a * np.cos(u) * np.cos(v), b * np.sin(u) * np.cos(v), c * np.sin(v)])
     s = np.sum((p / axes2) ** 2)
@@ -127,7 +127,7 @@ def cylinder(r):
 
 
 def torus(big, small, angle, outside=1.0):
-    """Around z, touched at `angle` of the tube: 0 the outer equator, pi the inner. outside=-1: the hole."""
+    """It is around z, touched at `angle` of the tube, pi being inside. With outside=-1 its hole is solid."""
     rho = big + small * np.cos(angle)
     kappas = sorted([-outside / small, -outside * np.cos(angle) / rho])
 
@@ -145,7 +145,7 @@ def torus(big, small, angle, outside=1.0):
 
 
 def bottle_neck():
-    """The paper's: kappa -0.0423 around the neck and 0.0172 along it, the skin of a torus's hole."""
+    """The paper's, with -0.0423 around the neck and 0.0172 along it: the skin of a torus's hole."""
     small = 1.0 / 0.0172
     return torus(small + 1.0 / 0.0423, small, np.pi, outside=-1.0)
 
@@ -202,7 +202,7 @@ def quartic():
 
 
 def revolution(radius, slope, height, longitude=0.4):
-    """x^2 + y^2 = radius(z)^2, slope its derivative, touched at a height."""
+    """x^2 + y^2 = radius(z)^2, where slope is the derivative of radius, touched at a height."""
     r, h = radius(height), 1e-4
     bend = (slope(height + h) - slope(height - h)) / (2.0 * h)
     steep = np.sqrt(1.0 + slope(height) ** 2)

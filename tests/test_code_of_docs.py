@@ -31,7 +31,7 @@ ELSEWHERE += (
     "python -m cluster ",
     "blender --background scene.blend --python examples/",
 )
-RADIUS, TOP = 20.0, np.array([0.0, 0.0, 20.0])  # of the ball that contacts are of
+RADIUS, TOP = 20.0, np.array([0.0, 0.0, 20.0])  # of the ball that the contacts are on
 
 
 def curves():
@@ -55,7 +55,7 @@ def write(path, numbered):
 
 
 def suzanne(bpy):
-    """A scene with her, active, and a copy named Scan; returns a place on her forehead, the cursor."""
+    """Makes a scene with her, active, and a copy named Scan; returns the cursor's place on her forehead."""
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.mesh.primitive_monkey_add(size=2.0)
     obj, place = bpy.context.object, (0.32, -0.19, 0.84)
@@ -94,7 +94,7 @@ def folder(empty, scans, tmp_path, monkeypatch):
 
 
 def names(page):
-    """What Python samples leave to the reader."""
+    """The variables that Python samples leave to the reader."""
     pairs = list(curves())
     measured = pairs if page.endswith("contact_data.md") else [points for points, _ in pairs]
     contours = [core.Contour(points) for points, _ in pairs]
@@ -109,7 +109,7 @@ def names(page):
 
 
 def commands(code):
-    """The lines of a shell, its loops unrolled."""
+    """The commands of a sample for the shell, with its loops unrolled."""
     lines = iter(line.strip() for line in code.splitlines() if line.strip())
     for line in lines:
         loop = re.fullmatch(r"for (\w+) in (.*); do", line)
@@ -129,7 +129,7 @@ def run_shell(bpy, command, line):
     words = shlex.split(line)
     at = words.index("-c")
     assert words[0] == "blender" and words[at + 1] == "tactile", line
-    bpy.ops.wm.read_homefile(use_empty=True)  # each line is a Blender of its own
+    bpy.ops.wm.read_homefile(use_empty=True)  # each line starts a Blender of its own
     if words[1] == "-b":
         bpy.ops.wm.open_mainfile(filepath=str(Path(words[2]).resolve()))
     code, out, err = command(*words[at + 2 :])
@@ -155,7 +155,7 @@ def test_samples_run(page, empty, command, folder):
     scope, out = names(page), None
     for kind, code in PAGES[page]:
         if kind == "python":
-            # The lines of a shell before it leave a scene in the unit of their file.
+            # Commands for the shell before it leave the scene in the unit of their file.
             empty.context.scene.unit_settings.system = "METRIC"
             empty.context.scene.unit_settings.scale_length = 1.0
             exec(compile(code, f"{page}, a sample", "exec"), scope)

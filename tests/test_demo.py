@@ -43,7 +43,7 @@ def test_a_rendered_pixel_has_the_color_that_the_bar_has_for_its_curvature(exten
     curvature = np.array([value.value for value in patch.data.attributes["gaussian_curvature"].data])
     corners = np.array([vertex.co for vertex in patch.data.vertices])
     edges = np.array([edge.vertices for edge in patch.data.edges])
-    # At vertices, and in the middle of neighbors, where the color is between theirs.
+    # Colors are compared at vertices, and halfway between neighbors, where they are means.
     for ends in [*np.arange(len(corners))[:, None], *edges]:
         place, values = corners[ends].mean(axis=0), curvature[ends]
         clear = np.linalg.norm(contours - place[:2], axis=1).min() > 0.05 * patch["tactile"]["radius"]
@@ -52,7 +52,7 @@ def test_a_rendered_pixel_has_the_color_that_the_bar_has_for_its_curvature(exten
             on_bar = [pixel(bar, (0.1, demo.BAR_REACH * value / limit, 0.0)) for value in values]
             compared.append(np.abs(pixel(patch, place) - np.mean(on_bar, axis=0)).max())
     assert len(compared) > 200
-    # Half a pixel of the bar is a 900th of its range, half a pixel of the patch more where K is steep.
+    # Half a pixel of the bar is a 900th of its range; on the patch it is more where K changes fast.
     assert np.median(compared) <= 2 / 255
     assert np.max(compared) <= 10 / 255
 
@@ -72,7 +72,7 @@ def test_the_labels_and_the_bar_say_the_range(extension):
 def test_a_mesh_file_can_be_touched(extension, scans, name):
     patch = demo.touch(extension, str(scans / name))
     report = patch["tactile"].to_dict()
-    assert report["vertices"] > 10  # as many as lie below a patch whose size is that of the features there
+    assert report["vertices"] > 10  # few, as a patch is no larger than the features there
     assert report["vertex_distance_mean"] < 0.05 * report["radius"]
 
 

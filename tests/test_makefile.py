@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 
 def test_peers_are_installed_one_by_one_with_their_markers_and_blender_s_numpy(tmp_path):
     stamp, ready = tmp_path / "peers", tmp_path / "ready"
-    # Newer than what the environment is made from, whatever order a checkout wrote its files in.
+    # This is newer than what the environment is made from, in whatever order a checkout wrote its files.
     ready.touch()
     command = ["make", f"PEERS={stamp}", f"READY={ready}", "VENV_PY=echo", str(stamp)]
     printed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout

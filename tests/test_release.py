@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A release is one only where version, changelog, citation and tag agree; its zips have what fits them."""
+"""A release needs version, changelog, citation and tag to agree; each zip has the wheels that fit it."""
 
 import hashlib
 import subprocess
@@ -22,7 +22,7 @@ def git(folder, *arguments):
 
 @pytest.fixture
 def checkout(tmp_path):
-    """A commit that is tagged 1.2.0, and all agrees."""
+    """A checkout whose version, changelog, citation and tag agree on 1.2.0."""
     (tmp_path / "blender_manifest.toml").write_text('version = "1.2.0"\n')
     (tmp_path / "CITATION.cff").write_text("title: T\nversion: 1.2.0\n")
     (tmp_path / "CHANGELOG.md").write_text(CHANGES.format("2026-11-22"))
@@ -87,7 +87,7 @@ def test_the_manual_that_ships_leads_nowhere_else(tmp_path):
 
 def test_a_zip_of_a_series_has_its_wheels_and_its_blenders_and_no_other(tmp_path, monkeypatch):
     manifest = tomllib.loads(build.MANIFEST.read_text(encoding="utf-8"))
-    monkeypatch.setattr(build.shutil, "copy2", lambda source, target: None)  # wheels of 40 MB each
+    monkeypatch.setattr(build.shutil, "copy2", lambda source, target: None)  # the wheels have 40 MB each
     ranges = []
     for python, series in build.SERIES.items():
         wheels = [wheel for wheel in manifest["wheels"] if f"-cp{python}-" in wheel]
@@ -96,7 +96,7 @@ def test_a_zip_of_a_series_has_its_wheels_and_its_blenders_and_no_other(tmp_path
         ranges.append((staged["blender_version_min"], staged.get("blender_version_max")))
         assert staged["wheels"] == wheels
         assert staged["version"] == manifest["version"]
-    # Each Blender from the manifest's own least on is in one of them.
+    # Each Blender from the least one of the manifest on is in one of these ranges.
     assert ranges[0][0] == manifest["blender_version_min"]
     assert [least for least, _ in ranges[1:]] == [most for _, most in ranges[:-1]]
     assert ranges[-1][1] is None

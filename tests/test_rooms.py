@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The house: each room imports from itself and from the rooms before it, and nothing in a circle."""
+"""Each room imports only from itself and from the rooms before it, and no imports form a circle."""
 
 import ast
 import re
@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-# Ground floor first. What is in no room is below all rooms where it is listed, and above them where not.
+# The rooms of each package, in order. A module that is listed counts as a room; one that is in no room and
+# not listed may import from all of them.
 ROOMS = {
     "core": (
         "arguments",
@@ -34,14 +35,14 @@ MOST_FILES, MOST_LINES = 9, 250
 
 
 def modules(package):
-    """Dotted names from the package on, and paths."""
+    """The dotted name, from the package on, and the path of each module."""
     for path in sorted((ROOT / package).rglob("*.py")):
         yield ".".join(path.relative_to(ROOT).with_suffix("").parts), path
 
 
 @cache
 def imports(name, path):
-    """Dotted names of all that a module imports relatively, wherever in it."""
+    """Dotted names of all that a module imports relatively, anywhere in it."""
     inside, found = name.split("."), []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level:

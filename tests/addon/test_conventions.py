@@ -29,7 +29,7 @@ def test_all_has_a_tooltip_of_one_sentence_without_a_full_stop(empty):
     empty.ops.mesh.primitive_cube_add()
     seen = 0
     for rna, properties in interfaces(empty):
-        internal = rna is not None and rna.identifier == "TACTILE_OT_drag"  # behind the handles
+        internal = rna is not None and rna.identifier == "TACTILE_OT_drag"  # only the handles call it
         for thing in [*filter(None, [rna]), *([] if internal else properties)]:
             if thing is not rna or "_OT_" in rna.identifier:
                 seen += 1
@@ -91,12 +91,12 @@ def test_online_manual_opens_the_page_that_comes_along_at_the_place(extension, e
     folder = Path(unquote(urlsplit(prefix).path))
     manual = (folder / "viewport.html").read_text(encoding="utf-8")
     for _, page in pages:
-        assert "#" not in page  # which Windows drops
+        assert "#" not in page  # Windows would drop it
         (section,) = re.findall(r"url=viewport.html#(.+?)\"", (folder / page).read_text(encoding="utf-8"))
         assert f'id="{section}"' in manual
     for picture in re.findall(r'src="([^"]+)"', manual):
         assert (folder / picture).is_file()
-    assert "CC BY 4.0" in manual  # of the scan in a picture
+    assert "CC BY 4.0" in manual  # the license of the scan in a picture
     assert (prefix, pages) in list(empty.utils.manual_map())
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Any scene and any file into the installed extension: a patch, or a sentence and nothing changed."""
+"""The installed extension in any scene, with any file: it makes a patch or says why not."""
 
 import contextlib
 import math
@@ -61,7 +61,7 @@ def object_state(obj):
 
 
 def digest(bpy):
-    """All datablocks of the file with their data, by their numbers, which no two ever share."""
+    """All datablocks of the file with their data, by their numbers, which no two datablocks ever share."""
     found = {}
     for blocks in finite_blocks(bpy):
         for block in blocks:
@@ -113,10 +113,10 @@ def raw(bpy, draw):
 
 
 def coincident(bpy, draw):
-    """A ball with a face drawn together, and a second one inside out on top of it.
+    """A ball with one face collapsed or flattened, and a second one inside out on top of it.
 
-    By hand: which corner and which face come first in Blender's own ball is another each time, and where
-    faces coincide the first is felt. What is drawn after a touch must not depend on that.
+    Blender's own ball has another order of corners and faces each time, and where faces coincide the first
+    one is felt. The ball is made by hand because what Hypothesis draws later must not depend on that.
     """
     polar, azimuths = np.meshgrid(np.pi / 24 * np.arange(25), np.pi / 24 * np.arange(48), indexing="ij")
     x, y, z = np.sin(polar) * np.cos(azimuths), np.sin(polar) * np.sin(azimuths), np.cos(polar)
@@ -168,7 +168,7 @@ MODIFIERS = (
 
 
 def one_of(things, draw):
-    """One of what there is; what is drawn does not depend on how many there are."""
+    """One of these things; what Hypothesis draws does not depend on how many there are."""
     things = list(things)
     return things[draw(st.integers(0, 99)) % len(things)]
 
@@ -276,7 +276,7 @@ WRONGS = (nowhere, transform, sheared, far, modified, hidden, instanced, edited,
 
 
 def make(bpy, data):
-    """A scene with something to touch in it; its name."""
+    """Makes a scene with something to touch in it and returns the name of that."""
     draw = data.draw
     bpy.ops.wm.read_homefile(use_empty=True)
     thing = draw(st.sampled_from(THINGS))
@@ -285,7 +285,7 @@ def make(bpy, data):
     if obj is None:
         return ""
     obj.name = draw(NAMES)
-    name = obj.name  # a probe lets go of a target that is in no collection, and then it is gone
+    name = obj.name  # taken now, because an object that is in no collection may be gone later
     wrongs = draw(st.lists(st.sampled_from(WRONGS), max_size=2, unique=True))
     for wrong in wrongs:
         wrong(bpy, obj, draw)
@@ -321,7 +321,7 @@ MAP_INPUTS = {n: v for n, v in INPUTS.items() if n not in ("location", "outward"
 
 
 def inputs(draw, good=TOUCH, odd=INPUTS):
-    """Arguments of a touch: a good place on the balls, but for some; or of a map."""
+    """Good arguments of a touch on the balls, or of a map, with up to two odd ones among them."""
     names = draw(st.lists(st.sampled_from(sorted(odd)), max_size=2, unique=True))
     return good | {name: draw(odd[name]) for name in names}
 
@@ -330,7 +330,7 @@ def assert_sentence(words):
     """One line that says something, in words: no exception's name, no traceback."""
     assert words.startswith("Error: "), words
     said = words.removeprefix("Error: ").rstrip("\n")
-    # Blender itself adds where a warning came from.
+    # Blender itself adds a "Location: " to warnings of scripts.
     assert "Traceback" not in said
     assert "Location: " not in said
     assert 20 < len(said) < 500, said
@@ -342,7 +342,7 @@ def assert_sentence(words):
 
 
 def is_finite(mesh):
-    """Whether all numbers of a mesh are, its attributes' too."""
+    """Whether all numbers in the attributes of a mesh, its positions among them, are finite."""
     for attribute in mesh.attributes:
         if attribute.data_type in ("FLOAT", "FLOAT_VECTOR", "FLOAT_COLOR"):
             key, width = {
@@ -358,14 +358,14 @@ def is_finite(mesh):
 
 
 def examine(patch):
-    """The status of a patch; it is of finite numbers."""
+    """Asserts that a patch consists of finite numbers and returns its status."""
     report = patch["tactile"].to_dict()
     assert report["status"] in ("ok", "uncertain", "not_converged")
     assert report["message"].endswith(".")
     numbers = [v for v in report.values() if isinstance(v, float)]
     numbers += [*report["coefficients"], *np.ravel(report["axes"]), *report["frame"]["origin"]]
     assert np.isfinite(numbers).all(), report
-    # A probe that is not live takes its patch along to wherever it is, beyond all numbers too.
+    # A patch cannot be kept in its place under a probe whose own place is no usable number.
     lost = patch.parent is not None and not np.abs(np.array(patch.parent.matrix_world)).max() < 1e15
     assert lost or np.isfinite(np.array(patch.matrix_world)).all()
     for obj in (patch, *patch.children):
@@ -375,7 +375,7 @@ def examine(patch):
 
 
 def others(before, after, allowed):
-    """Datablocks that are not as before, but for users of what new ones share."""
+    """Datablocks that are not as before, except for kinds that new datablocks may share."""
     return {
         uid: (state, after.get(uid))
         for uid, state in before.items()
@@ -400,7 +400,7 @@ def test_a_touch_in_any_scene(empty, data):
         return
     assert result == {"FINISHED"}
     after = digest(bpy)
-    # A patch's materials and collection may be shared with those before it.
+    # A patch may share its materials and its collection with earlier ones.
     assert others(before, after, ("Material", "Collection", "Scene")) == {}
     new = [block for uid, block in after.items() if uid not in before]
     assert sorted(kind for kind, *_ in new if kind in ("Object", "Mesh")) == [
@@ -415,7 +415,7 @@ def test_a_touch_in_any_scene(empty, data):
 
 
 def examine_map(painted):
-    """Its record adds up, and its mesh is of finite numbers."""
+    """Asserts that the record of a map adds up and that its mesh consists of finite numbers."""
     record, mesh = painted["tactile_map"].to_dict(), painted.data
     assert record["touched"] == record["points"] == record["patches"] + sum(record["refused"].values()) > 0
     assert 0 <= record["in_doubt"] <= record["patches"]
@@ -436,7 +436,7 @@ def test_a_stability_map_in_any_scene(empty, data):
     bpy = empty
     target = make(bpy, data)
     arguments = inputs(data.draw, MAP, MAP_INPUTS)
-    if "step" in arguments:  # thousands of touches of thousands of contacts are no hang, but take as long
+    if "step" in arguments:  # thousands of touches with thousands of contacts each take as long as a hang
         arguments |= MAP
     before, chosen = digest(bpy), selection(bpy)
     try:
@@ -495,7 +495,7 @@ def unlive(bpy, probe, draw):
 
 
 def press(bpy, probe, draw):
-    with contextlib.suppress(RuntimeError):  # of a poll
+    with contextlib.suppress(RuntimeError):  # a poll may refuse it
         draw(
             st.sampled_from([bpy.ops.tactile.add_plane, bpy.ops.tactile.remove_plane, bpy.ops.tactile.update])
         )()
@@ -507,7 +507,7 @@ CHANGES = (shift, shift, number, number, number, retarget, reshape, delete, rena
 @given(st.data())
 @in_time
 def test_a_probe_in_any_scene(empty, capfd, data):
-    """Whatever becomes of it: its patch is one of finite numbers, or its message says why it has none."""
+    """After any change its patch consists of finite numbers, or its message says why there is none."""
     bpy = empty
     target = make(bpy, data)
     arguments = inputs(data.draw)
@@ -554,7 +554,7 @@ OPTIONS = (
 
 @pytest.fixture(scope="module")
 def balls(extension, tmp_path_factory):
-    """The bytes of a ball as a file of each kind, and a folder for what becomes of them."""
+    """The bytes of a ball as a file of each kind, and a folder for spoiled copies of them."""
     import bpy
 
     folder = tmp_path_factory.mktemp("files")
@@ -568,7 +568,7 @@ def balls(extension, tmp_path_factory):
 
 
 def spoiled(data, kind, draw):
-    """The bytes of a file as they are, cut, changed, or others."""
+    """The bytes of a file as they are, cut, changed, or replaced by others."""
     how = draw(st.sampled_from(["whole", "whole", "whole", "cut", "empty", "junk", "digits", "header"]))
     event(f"{kind}: {how}")
     if how == "cut":
@@ -623,7 +623,7 @@ def test_any_command_line(extension, balls, capfd, data):
 
 
 def test_a_million_faces(empty):
-    """What is large is not odd."""
+    """A mesh that is only large gets a good patch."""
     empty.ops.mesh.primitive_grid_add(x_subdivisions=1000, y_subdivisions=1000, size=4.0)
     assert empty.ops.tactile.reconstruct(location=(0.3, -0.2, 0.0), extent=0.6) == {"FINISHED"}
     assert examine(empty.context.object) == "ok"

@@ -18,7 +18,7 @@ VOID = ("meta", "path", "circle", "rect", "br")
 
 
 class Page(HTMLParser):
-    """Whether each tag is closed, the rows of tables, the headings, and how many of each tag there are."""
+    """Asserts that each tag is closed; keeps rows of tables, headings, addresses and counts of tags."""
 
     def __init__(self, text):
         super().__init__()
@@ -70,7 +70,7 @@ def test_the_page_of_a_patch_is_whole_and_its_shares_are_those_of_its_area(empty
     assert rows["noise"] == "0.002"
     assert rows["planes"] == "0° leaning 0°, 60° leaning 0°, 120° leaning 0°"
     assert rows["Blender"] == empty.app.version_string
-    # The area of the triangles whose corners are all within the band is near to what is said.
+    # The page counts the area around each vertex that is within the band: a third of each triangle there.
     off = np.array([value.value for value in patch.data.attributes["deviation"].data])
     areas = np.zeros(len(off))
     for polygon in patch.data.polygons:

@@ -41,7 +41,7 @@ def cluster():
 
 @pytest.fixture
 def command(cluster, capfd):
-    """Runs `touch` with these words on that cluster: exit code, standard output, standard error."""
+    """A function that runs `touch` on that cluster and returns exit code, standard output and error."""
     from cluster.command_line import main
 
     def run(*words, scheduler=cluster.scheduler.address):
@@ -56,7 +56,7 @@ def command(cluster, capfd):
 
 @pytest.fixture(scope="session")
 def plain(cluster, objects, tmp_path_factory):
-    """The data set of these objects that nothing has disturbed, by two workers."""
+    """The data set of these objects as two workers make it when nothing disturbs them."""
     from cluster.command_line import main
 
     folder = tmp_path_factory.mktemp("plain")
@@ -67,7 +67,7 @@ def plain(cluster, objects, tmp_path_factory):
 
 @pytest.fixture
 def in_the_middle():
-    """Has something done as soon as a data set in the making has some blocks."""
+    """A function that has something done as soon as a data set in the making has some blocks."""
     threads = []
 
     def plan(folder, act, blocks=1):

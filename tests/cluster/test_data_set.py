@@ -101,7 +101,7 @@ def test_a_second_run_does_what_is_missing(command, objects, tmp_path, plain):
     second.unlink()
     (tmp_path / "touches" / ".left-aside.parquet").write_bytes(b"half of a block")
     times = [path.stat().st_mtime_ns for path in (first, third)]
-    code, output, error = command(objects, *FEW, "--output", tmp_path)  # and objects are added
+    code, output, error = command(objects, *FEW, "--output", tmp_path)  # objects are added as well
     assert code == 0 and "2 of 9 blocks are there already" in error
     assert "3 objects, 90 touches" in output
     assert [path.stat().st_mtime_ns for path in (first, third)] == times
@@ -185,7 +185,7 @@ def test_a_list_names_files_beside_it(objects):
     listed.write_text("pebble.ply\n\na\n")
     expected = [str(objects / name) for name in ("a/egg.ply", "pebble.ply")]
     assert files_of([listed]) == expected
-    assert files_of([listed, objects / "a" / "egg.ply"]) == expected  # each once
+    assert files_of([listed, objects / "a" / "egg.ply"]) == expected  # each file is there once
     listed.unlink()
 
 

@@ -19,7 +19,7 @@ pq = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed: ru
 psutil = pytest.importorskip("psutil", reason="distributed is not installed: run make test-cluster")
 
 ROOT = Path(__file__).parents[2]
-# An ending of the file's header that Blender's importer does not survive.
+# A file whose header announces more faces than Blender's importer survives.
 CRASHES = """ply
 format ascii 1.0
 element vertex 3
@@ -37,7 +37,7 @@ end_header
 
 
 def hands():
-    """The processes that have Blender, below this one."""
+    """The processes below this one that have Blender."""
     found = []
     for process in psutil.Process().children(recursive=True):
         try:
@@ -56,7 +56,7 @@ def started(*words):
         start_new_session=True,
         preexec_fn=partial(
             signal.signal, signal.SIGINT, signal.SIG_DFL
-        ),  # a job in the background ignores it
+        ),  # a job in the background would ignore SIGINT
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -85,7 +85,7 @@ def test_a_worker_killed_in_the_middle_costs_its_block(
     assert code == 0 and killed
     assert rows_of(tmp_path) == rows_of(plain)
     assert nothing_is_aside(tmp_path)
-    wait_for(lambda: not any(p.is_running() and p.status() != "zombie" for p in killed))  # its Blender too
+    wait_for(lambda: not any(p.is_running() and p.status() != "zombie" for p in killed))  # Blender too
 
 
 def test_blender_killed_in_the_middle_is_tried_again_and_logged(
@@ -126,7 +126,7 @@ def dask(name, *words, path=ROOT):
 
 @contextmanager
 def scheduler(port, path=ROOT, workers=1):
-    """The address of a scheduler that has workers, and what ends them all."""
+    """The address of a scheduler that has workers, and a function that ends them all."""
     address = f"tcp://127.0.0.1:{port}"
     running = [dask("scheduler", "--host", "127.0.0.1", "--port", str(port), path=path)]
     running += [dask("worker", address, "--nthreads", "1", path=path) for _ in range(workers)]
@@ -228,7 +228,7 @@ def test_broken_and_empty_files_and_one_that_blender_dies_of_are_error_rows(comm
         line for line in (tmp_path / "set" / "log.txt").read_text().splitlines() if "crash.ply: B" in line
     ]
     assert len(tried) == 2
-    # They stay as they are, unless their rows are taken away.
+    # The error rows stay as they are, unless their files are deleted.
     assert command(*words)[0] == 3
     (bad / "half.ply").write_bytes(whole)
     for path in (tmp_path / "set" / "touches").glob("*-error.parquet"):
@@ -248,14 +248,14 @@ def test_a_process_that_takes_too_long_is_ended(objects, plain, tmp_path):
     survey = ("survey", str(objects / "pebble.ply"), manifest.versions())
     hand = HandProcess()
     _, (facts,) = hand.ask(100.0, *survey)
-    with pytest.raises(LostError) as busy:  # some thousand touches, in half a second
+    with pytest.raises(LostError) as busy:  # half a second is too short for 5000 touches
         hand.ask(0.5, "touch", facts, asked, 0, str(tmp_path / "block.parquet"))
     assert str(busy.value).startswith("It took longer than the limit of 0.5 s\n")
-    assert "most recent call first" in str(busy.value)  # where it was, if that can be told
+    assert "most recent call first" in str(busy.value)  # this says where the process was
     assert hand.is_worn and not list(tmp_path.iterdir())
     hand = HandProcess()
     hand.ask(100.0, *survey)
-    os.kill(hand._process.pid, signal.SIGSTOP)  # as where not even a watchdog runs any more
+    os.kill(hand._process.pid, signal.SIGSTOP)  # a stopped process cannot run its watchdog either
     with pytest.raises(LostError, match=r"It took longer than the limit of 0.1 s"):
         hand.ask(0.1, *survey)
     assert hand.is_worn
@@ -304,7 +304,7 @@ def test_a_full_disk_ends_the_run_and_loses_nothing(command, objects, plain, tmp
     assert least > 15_000
 
     run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")
-    # No file may become larger, for this process and those below it: all is as on a disk without room.
+    # This process and those below it may write no larger file, which is as on a disk without room.
     psutil.Process(run.pid).rlimit(psutil.RLIMIT_FSIZE, (10_000, 10_000))
     _, error = run.communicate(timeout=100)
     assert run.returncode == 1, error
@@ -318,7 +318,7 @@ def test_a_full_disk_ends_the_run_and_loses_nothing(command, objects, plain, tmp
 def test_an_interrupted_run_ends_cleanly_and_goes_on_later(command, objects, plain, tmp_path, ended):
     run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")
     wait_for(lambda: blocks_of(tmp_path))
-    os.killpg(run.pid, signal.SIGSTOP)  # lest it is done before it is interrupted
+    os.killpg(run.pid, signal.SIGSTOP)  # otherwise it may be done before it is interrupted
     below = psutil.Process(run.pid).children(recursive=True)
     assert len(blocks_of(tmp_path)) < 9
     (os.killpg if ended == signal.SIGINT else os.kill)(run.pid, ended)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The samples of docs/data_sets.md that read a data set run, where what they read it with is installed."""
+"""The samples of docs/data_sets.md that read a data set run, wherever the packages they import are there."""
 
 import re
 from importlib.util import find_spec
@@ -31,6 +31,6 @@ def test_a_sample_reads_the_data_set(code, plain, tmp_path, monkeypatch, capsys)
         assert local.shape[1] == 3 and curvatures[0] <= curvatures[1]
         assert local[:, :2].norm(dim=1).max() == pytest.approx(1.0, abs=1e-6)
         loader = scope["torch"].utils.data.DataLoader(scope["Touches"](), batch_size=None, num_workers=2)
-        assert len(list(loader)) == len(touches)  # each once
+        assert len(list(loader)) == len(touches)  # the two workers read each touch once
     else:
         assert "pebble" in capsys.readouterr().out

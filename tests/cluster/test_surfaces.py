@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole objects, a row each: their surfaces and graphs, always the same, and what is refused."""
+"""Data sets of whole objects: their surfaces and graphs, always the same, and what is refused."""
 
 import subprocess
 import sys
@@ -19,11 +19,11 @@ bpy.context.object.scale = (-1.0, 1.0, 1.0)
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
 """
 WORDS = ("--tolerance", "0.4%", "--limit", "120")
-AROUND = 1.0  # of the torus, whose tube is 0.4
+AROUND = 1.0  # the radius of the torus; that of its tube is 0.4
 
 
 def whole(folder, *words):
-    """Runs `whole` on a folder of objects, into one beside it."""
+    """Runs `whole` on the folder "objects" in this one and writes into "set" beside it."""
     from cluster.command_line import main
 
     return main(["whole", str(folder / "objects"), *WORDS, "--output", str(folder / "set"), *words])
@@ -66,7 +66,7 @@ def test_a_surface_is_where_the_object_is(rows):
         assert (np.einsum("ni,ni->n", normals, outward) > 0.0).mean() > 0.99
     ball = rows["ball"]
     count, faces = len(ball["vertices"]) // 3, len(ball["triangles"]) // 3
-    assert ball["is_closed"] and ball["uncovered"] == 0 and count - faces // 2 == 2  # Euler's
+    assert ball["is_closed"] and ball["uncovered"] == 0 and count - faces // 2 == 2  # Euler's number
 
 
 def test_a_graph_has_the_patches_and_who_is_beside_whom(rows):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the window's scripts share: lines for run.sh, pictures, what is in the file, where the view looks."""
+"""What the scripts for a window share: lines for run.sh, pictures, what is in the file, and the view."""
 
 import math
 import os
@@ -12,11 +12,11 @@ import gui
 from mathutils import Vector
 
 FOLDER = Path(os.environ["GUI_SHOT"]).parent
-# Where they are in a window of 1280 by 800 with the sidebar open.
+# Places in a window of 1280 by 800 with the sidebar open.
 PICK_BUTTON, ASIDE = (893, 128), (300, 640)
-VIEWPORT = "1052x692+0+28"  # and the viewport itself
-MOST_BYTES = 300_000  # of a picture of the docs
-ARROW = 1.15  # of the extent: where the handles are
+VIEWPORT = "1052x692+0+28"  # the viewport in that window
+MOST_BYTES = 300_000  # the size of a picture of the docs at most
+ARROW = 1.15  # extents from the point to the handles
 
 
 def check(what, good, detail=""):
@@ -37,13 +37,13 @@ def look(point, direction, distance, perspective="PERSP"):
     view.view_location = point
     view.view_rotation = Vector(direction).to_track_quat("Z", "Y")
     view.view_distance = distance
-    # The material preview does not draw "in front": half of the patch is hidden in the source there.
+    # The material preview does not draw "in front": there the source hides half of the patch.
     area.spaces.active.shading.type = "SOLID"
     area.spaces.active.shading.color_type = "VERTEX"
 
 
 def open_tab():
-    """The sidebar, and in it the extension's tab."""
+    """Opens the sidebar, and in it the extension's tab."""
     gui.sidebar()
     yield 1
     gui.sidebar("Tactile")
@@ -51,7 +51,7 @@ def open_tab():
 
 
 def until(reached, seconds=40):
-    """Waits until something is so: a window without a graphics card may take its time."""
+    """Waits until `reached`, as a window without a graphics card may take its time."""
     for _ in range(10 * seconds):
         yield 0.1
         if reached():
@@ -77,7 +77,7 @@ def picture(name):
 
 
 def picture_of_docs(name):
-    """The viewport, to be looked at and copied to docs."""
+    """Takes a picture of the viewport, to be looked at and copied to docs."""
     file = FOLDER / f"{name}.jpg"
     subprocess.run(["import", "-window", "root", "-crop", VIEWPORT, "-quality", "88", file], check=True)
     check(f"{file.name} is small", file.stat().st_size < MOST_BYTES, file.stat().st_size)
@@ -113,21 +113,21 @@ def state(owner=None):
 
 
 def same(a, b):
-    """Whether two states are one; None is that of no probe."""
+    """Whether two states are the same; None is the state without a probe."""
     if a is None or b is None:
         return a is b
     return all(abs(v - w) < 1e-5 for v, w in zip(a, b, strict=True))
 
 
 def is_complete():
-    """Whether no gesture goes on, and the patch has what is filled in after one."""
+    """Whether no gesture goes on, and the patch has what the end of a gesture fills in."""
     return not any(window.modal_operators for window in bpy.context.window_manager.windows) and (
         patch() is not None and patch()["tactile"]["is_verified"]
     )
 
 
 def extent(owner):
-    """How far a probe feels: as it says, or as the surface allows."""
+    """The extent of a probe: the one given, or the one that was found."""
     return owner.tactile_probe.extent or patch(owner)["tactile"]["extent"]
 
 
@@ -140,7 +140,7 @@ def handle(azimuth, reach=ARROW):
 
 
 def consistent(when, owner=None):
-    """The report's planes are the probe's, and the patch lies where the probe is."""
+    """Checks that the report's planes are the probe's, and that the patch lies where the probe is."""
     owner = owner or probe()
     record = patch(owner)["tactile"].to_dict()
     count = owner.tactile_probe.plane_count
@@ -153,7 +153,7 @@ def consistent(when, owner=None):
 
 
 def undo_redo(what, before):
-    """One step back and one forth, by keyboard, once the gesture that was made has settled."""
+    """Checks one step back and one forth, by keyboard, once the gesture that was made has settled."""
     yield from until(is_complete)
     after = state()
     gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
@@ -203,11 +203,11 @@ SAID = {
 
 
 def disturbed(what, start, is_clean, made, **inputs):
-    """What the user may do while something touches all over a target; it stops, and nothing of it is left.
+    """Checks that what a user may do to a target ends touching it all over, of which nothing is left.
 
-    start, is_clean, made : start it with inputs; whether it is over without a trace; what it has made
+    start, is_clean, made : start it with inputs; tell whether it is over without a trace, and what it made
     """
-    # Undo first: the others leave words below the mouse, which take keys.
+    # Undo comes first: the others leave a message below the mouse, which takes keys.
     for disturb, words in SAID.items():
         name = f"{what}, {disturb.__name__}"
         bpy.ops.ed.undo_push(message="Before")
@@ -221,7 +221,7 @@ def disturbed(what, start, is_clean, made, **inputs):
         disturb()
         yield 1
         picture(f"{what}_{disturb.__name__}")
-        yield from until(is_clean, 60)  # whether it was changed is looked at in the end
+        yield from until(is_clean, 60)  # a change of the mesh is noticed only in the end
         check(f"{name}: it stops", is_clean())
         if words:
             check(f"{name}: ... with a sentence", words in last_report(), last_report())

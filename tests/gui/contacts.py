@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py, with the extension installed.
 
-File > Import as its menu has it, the menu of a dropped .ply, the dialog of a dropped .csv, undo by
-keyboard. A drop itself comes from the desktop: here it is the operator that Blender runs for it. The
-pictures are for eyes: drop.png, drop_menu.png and the window at the end.
+It checks File > Import, the menu of a dropped .ply, the dialog of a dropped .csv, and undo by keyboard. A
+drop comes from the desktop, so here the operator that Blender runs for it stands for it. Three pictures are
+to be looked at: drop.png, drop_menu.png and the window at the end.
 """
 
 import math
@@ -22,7 +22,7 @@ FOLDER = Path(os.environ["GUI_SHOT"]).parent
 
 
 def drop(name):
-    """What Blender does once a file is let go over the viewport."""
+    """Does what Blender does once a file is let go over the viewport."""
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.wm.drop_import_file("INVOKE_DEFAULT", directory=str(FOLDER), files=[{"name": name}])
@@ -45,7 +45,7 @@ def write_contacts():
 
 
 def write_rasters():
-    """Writes the rows of a bump, without normals, as two files; what names them."""
+    """Writes the rows of a bump, without normals, as two files; returns the arguments that name them."""
     for name, rows in (("even.csv", range(0, 17, 2)), ("odd.csv", range(1, 17, 2))):
         lines = ["curve,x,y,z"]
         for row in rows:
@@ -66,7 +66,7 @@ def made():
 
 
 def joined_by_dialog(given):
-    """Agreed to in the dialog the work is done in slices, which Esc ends."""
+    """Once the dialog is confirmed, files are joined in slices, which Esc ends."""
     before = data_blocks()
     for stop in (True, False):
         window, area, region = gui.find()

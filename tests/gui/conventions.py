@@ -32,7 +32,7 @@ from common import (
     until,
 )
 
-# Where they are in a window of 1280 by 800 with the sidebar open.
+# Places in a window of 1280 by 800 with the sidebar open.
 MENU, HUD, HUD_EXTENT = (330, 40), (148, 703), (255, 450)
 MOVE_BUTTON, AZIMUTH, ADD_BUTTON, REMOVE_BUTTON = (837, 128), (828, 226), (1001, 205), (1001, 226)
 EXTENSION = "bl_ext.user_default.tactile_patch"
@@ -47,7 +47,7 @@ def search_and_menus():
     yield 0.5
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
-        bpy.ops.wm.search_menu("INVOKE_DEFAULT")  # what F3 does, a key that Xvfb has not
+        bpy.ops.wm.search_menu("INVOKE_DEFAULT")  # this is what F3 does, a key that Xvfb lacks
     yield 1
     gui.xdo("type", "--delay", 100, "pick reference")
     yield 1
@@ -73,7 +73,7 @@ def click_on(place):
 
 
 def adjust(place):
-    """A pick, with another extent afterwards, saved as a preset; all one step of undo."""
+    """A pick whose extent is adjusted and saved as a preset is one step of undo."""
     before = data_blocks()
     gui.click(*PICK_BUTTON)
     yield 0.5
@@ -95,7 +95,7 @@ def adjust(place):
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region, active_operator=operator):
         bpy.ops.wm.operator_preset_add(name="Short", operator="TACTILE_OT_pick")
-    folders = bpy.utils.preset_paths("operator/tactile.pick")  # the extension's own too
+    folders = bpy.utils.preset_paths("operator/tactile.pick")  # the extension's too
     (path,) = filter(Path.is_file, (Path(folder, "Short.py") for folder in folders))
     text = path.read_text()
     good = "op.extent = 0.25" in text and not any(f"op.{name}" in text for name in ("location", "target"))
@@ -107,7 +107,7 @@ def adjust(place):
 
 
 def gestures(place):
-    """Each one step of undo: another place, a number by dragging, the whole probe turned, a plane more."""
+    """Each is one step of undo: another place, a number dragged, the whole probe turned, a plane more."""
     before = state()
     gui.click(*MOVE_BUTTON)
     yield 0.5
@@ -172,7 +172,7 @@ def look_beside_the_panel(point, direction, distance):
 
 
 def large(place):
-    """Twice the resolution, with the viewport filling the window."""
+    """At twice the resolution scale, with the viewport filling the window, picks and handles still work."""
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.screen.screen_full_area()

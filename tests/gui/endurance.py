@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in a window of Blender on the scene of make_scene.py: what is left behind after hundreds of times.
+"""Run in a window of Blender on the scene of make_scene.py: what hundreds of touches leave behind.
 
-Touches, taken back, brought again and loaded anew, leave as many datablocks as before and take no memory;
-disabling the extension takes away all that it has added.
+Touches that are taken back, brought again and loaded anew leave as many datablocks and as much memory as
+before; disabling the extension takes away all that it has added.
 """
 
 import os
@@ -20,9 +20,9 @@ from common import check, data_blocks, open_tab
 
 MODULE = "bl_ext.user_default.tactile_patch"
 CYCLES, RELOAD, WARM_UP, TIMES = 200, 10, 100, 50
-# Undo holds 32 steps at most and a reload empties it, so from one reload to the next memory goes up and
-# down alike. A patch with its contours and its evaluated copy is 1 MB: one that stayed at each cycle
-# would be 100 MB after the warm-up, in which Blender and the driver fill their caches.
+# Undo holds 32 steps at most and a reload empties it, so memory rises and falls alike from one reload to the
+# next. A patch with its contours and its evaluated copy takes 1 MB: if one stayed at each cycle, they would
+# take 100 MB after the warm-up, in which Blender and the driver fill their caches.
 MOST_MEGABYTES = 20.0
 SCENE = str(Path(os.environ["GUI_SHOT"]).with_suffix(".blend"))
 
@@ -69,7 +69,7 @@ def touches():
         if number % RELOAD == RELOAD - 1:
             used.append(resident())
             bpy.ops.wm.open_mainfile(filepath=SCENE)
-            yield 60  # `go_on` comes first
+            yield 60  # `go_on` plays on before that
             if counts() != before:
                 check(f"cycle {number}: after reload", False, (counts(), before))
     check(f"after {CYCLES} touches, taken back and brought again, the file is as it was", counts() == before)
@@ -80,7 +80,7 @@ def touches():
 
 @persistent
 def go_on(*_):
-    """Opening a file ends all timers, the one that plays the steps too."""
+    """Plays on, because opening a file ends all timers, the one that plays the steps too."""
     gui.play(STEPS)
 
 
@@ -109,14 +109,14 @@ def registered():
 
 
 def own():
-    """What only the extension can tell of: how often it draws, its commands, whether its timer runs."""
+    """What only the extension can tell: how many drawings and commands it has, whether its timer runs."""
     addon, live = (sys.modules[f"{MODULE}.tactile_addon{name}"] for name in ("", ".probes.change_handlers"))
     return len(addon._drawings), len(addon._commands), bpy.app.timers.is_registered(live._settle)
 
 
 def enabling():
-    """The first round is compared with the last; and the extension is not mentioned where it is disabled."""
-    bpy.ops.tactile.pick("EXEC_DEFAULT", True, target="Suzanne", new=True)  # whose timer may be waiting
+    """The first round is as the last, and while disabled the extension is registered nowhere."""
+    bpy.ops.tactile.pick("EXEC_DEFAULT", True, target="Suzanne", new=True)  # its timer may be waiting
     seen = []
     for _ in range(TIMES):
         addon_utils.disable(MODULE)
@@ -137,9 +137,9 @@ def enabling():
 
 def steps():
     yield from open_tab()
-    bpy.data.objects["Suzanne"].modifiers["Subdivision"].levels = 1  # undo evaluates it again, each time
+    bpy.data.objects["Suzanne"].modifiers["Subdivision"].levels = 1  # each undo evaluates it again
     bpy.ops.wm.save_as_mainfile(filepath=SCENE)
-    bpy.ops.wm.open_mainfile(filepath=SCENE)  # without what nobody uses
+    bpy.ops.wm.open_mainfile(filepath=SCENE)  # this drops what nobody uses
     yield 60
     yield from touches()
     bpy.app.handlers.load_post.remove(go_on)

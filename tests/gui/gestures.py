@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: an automatic extent while a point is dragged.
 
-On the scan of a pear where there is one, else on Suzanne. Pictures are to be looked at, beside the scene.
+It uses the scan of a pear where there is one, else Suzanne. Its pictures are beside the scene.
 """
 
 import sys
@@ -15,7 +15,7 @@ from mathutils import Vector
 sys.path.insert(0, str(Path(__file__).parent))
 from common import ASIDE, FOLDER, check, extent, is_complete, look, open_tab, patch, picture, probe, until
 
-SIDE, ACROSS = Vector((0.3, -1.0, 0.25)), 26  # where from, and pixels of each move
+SIDE, ACROSS = Vector((0.3, -1.0, 0.25)), 26  # where the view is from, and pixels of two moves
 SLIDES = 12
 
 
@@ -32,7 +32,7 @@ def target():
 
 
 def below(obj, direction):
-    """Where a ray against `direction` from outside first meets an object."""
+    """The center of an object, and where a ray against `direction` from outside first meets it."""
     corners = [obj.matrix_world @ Vector(corner) for corner in obj.bound_box]
     center, size = sum(corners, Vector()) / 8, max(obj.dimensions)
     hit, place, *_ = obj.ray_cast(

@@ -34,7 +34,7 @@ from common import (
 
 SCAN = os.environ.get("TACTILE_SCAN", "")
 TARGET = Path(SCAN).stem or "Suzanne"
-SIZE = 2.7  # of Suzanne
+SIZE = 2.7  # the largest dimension of Suzanne
 UPRIGHT = 0.75  # extents from the point to the handle of the tilt
 
 
@@ -43,12 +43,12 @@ def suzanne():
 
 
 def unit():
-    """What a unit is on Suzanne, for a target of another size."""
+    """The length on the target that corresponds to 1 on Suzanne."""
     return max(suzanne().dimensions) / SIZE if SCAN else 1.0
 
 
 def scan():
-    """Has another mesh in the place of Suzanne, and the 3D cursor on it."""
+    """Puts another mesh in the place of Suzanne, and the 3D cursor on it."""
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
     if SCAN == "million":
@@ -102,7 +102,7 @@ def fresh():
 
 
 def gap():
-    """Between patch and probe, and between probe and target's surface, in extents."""
+    """How far the patch is off the probe, or the probe off the target's surface, in extents."""
     local = suzanne().matrix_world.inverted() @ probe().matrix_world.translation
     evaluated = suzanne().evaluated_get(bpy.context.evaluated_depsgraph_get())
     _, near, _, _ = evaluated.closest_point_on_mesh(local)
@@ -305,7 +305,7 @@ def handles():
 
 
 def tilt_seen_steeply(axes):
-    """A drag where the handle of the tilt is, seen so that a pixel would tilt the active plane by much."""
+    """Drags at the handle of the tilt, seen so that a pixel would tilt the active plane by much."""
     select(probe())
     settings, up = probe().tactile_probe, axes.col[2].xyz
     azimuth = settings.azimuths[settings.active_plane]

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A first result in a window as it comes: colors at once, a verdict, numbers with what they mean.
+"""Run in a window of Blender on the scene of make_scene.py: what the panel shows of a first result.
 
-And what else the panel has: what freezes or hides a patch, a point of a map, the tool of the
-toolbar, and what is said while a large mesh is touched first.
+These are colors at once, a verdict, and numbers with what they mean. It also checks what freezes or hides a
+patch, a point of a map, the tool of the toolbar, and what is said when a large mesh is touched first.
 """
 
 import sys
@@ -16,7 +16,7 @@ from mathutils import Vector
 sys.path.insert(0, str(Path(__file__).parent))
 from common import PICK_BUTTON, check, is_complete, last_report, look, open_tab, patch, picture, probe, until
 
-# Where they are in a window of 1280 by 800 with the sidebar open.
+# Places in a window of 1280 by 800 with the sidebar open.
 NUMBER, SENSOR = (790, 524), (815, 321)
 CONTOURS, HANDLES, MAP_PROBE = (825, 477), (950, 477), (893, 284)
 
@@ -59,7 +59,7 @@ def first():
 
 
 def numbers():
-    """Numbers are not dragged here: Blender takes the pointer back while it is, and xdotool moves it away."""
+    """Numbers are not dragged here, as Blender then takes the pointer back, and xdotool moves it away."""
     settings = probe().tactile_probe
     settings.live = False
     gui.click(*SENSOR)

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in a window of Blender: random sequences of what people do, of steps_at_random.py, and drags by mouse.
+"""Run in a window of Blender: the random steps of steps_at_random.py, and drags by mouse.
 
-After each step patch and a fresh touch agree, or the patch says that it is outdated. TACTILE_STEPS=1000
+After each step a patch agrees with a fresh touch, or says that it is outdated. TACTILE_STEPS=1000
 TACTILE_SEED=... take more steps than the 50 of each run, with other dice.
 """
 
@@ -49,7 +49,7 @@ def settled():
 
 
 def drag():
-    """The center of a probe, by mouse, seen nearly head on."""
+    """Drags the center of a probe by mouse, seen nearly head on."""
     seen = [probe for probe in steps.probes() if steps.patch_of(probe) is not None and probe.visible_get()]
     if not seen:
         return
@@ -70,7 +70,7 @@ def drag():
 
 
 def reload():
-    """Opening a file ends all timers, this script's too: it goes on in a new one."""
+    """Saves and opens the file; this ends all timers, this script's too, so it goes on in a new one."""
     file = str(FOLDER / "random.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
 
@@ -92,11 +92,11 @@ def is_well():
 
 
 def walk():
-    """The steps that are left."""
+    """Takes the steps that are left."""
     yield from settled()
     while is_well() and len(taken) < STEPS:
         taken.append(dice.choice(["drag", *9 * [None]]) or steps.choose(dice))
-        print(len(taken), taken[-1], flush=True)  # the last line before a crash
+        print(len(taken), taken[-1], flush=True)  # after a crash the last line names the step
         if taken[-1] == steps.RELOAD:
             yield from reload()
         elif taken[-1] == "drag":

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender without the extension: it comes from a repository, is updated and makes a patch.
 
-A local server has the repository, which Blender's own tool has made of a zip without wheels, for the Python
-of this Blender is its distribution's. The older version is that zip with another number in its manifest.
+A local server has the repository, which Blender's own tool has made of a zip without wheels, because this
+Blender uses the Python of its distribution. The older version is that zip with another number in its
+manifest.
 """
 
 import os
@@ -60,7 +61,7 @@ def installed():
 
 
 def drop_link():
-    """What Blender does with the page's link where it is dropped: a dialog, and Return confirms it."""
+    """Does what Blender does where the page's link is dropped: it opens a dialog, which Return confirms."""
     (link,) = re.findall(r'href="\./(offered\.zip[^"]*)"', (REPOSITORY / "index.html").read_text("utf-8"))
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
@@ -77,7 +78,7 @@ def steps():
         newest = tomllib.loads(file.read("blender_manifest.toml").decode())["version"]
     offer(zip_path, OLD)
     page = (REPOSITORY / "index.html").read_text(encoding="utf-8")
-    link = "offered.zip?repository="  # which is what Blender looks for in a link that is dropped
+    link = "offered.zip?repository="  # Blender looks for this in a link that is dropped
     check("the repository has a page with a link to drop", link in page, page)
     bind = ["--bind", "127.0.0.1", "--directory", str(REPOSITORY)]
     server = subprocess.Popen(["python3", "-m", "http.server", str(PORT), *bind], stderr=subprocess.DEVNULL)

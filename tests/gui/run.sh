@@ -2,11 +2,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-# run.sh ZIP [CHECK]: what only a real Blender can show, with the zip without wheels installed in it: the
+# run.sh ZIP [CHECK]: checks what only a real Blender can show, with the zip without wheels installed in it: the
 # command line, the example script, the menu entry, probes, verification, whole objects and stability maps by
 # mouse and keyboard in a window, what hundreds of touches leave behind, and installing from a repository.
-# The pictures are in build/gui, to be looked at. With CHECK only what has this in its name, as "random steps";
-# TACTILE_OUT is another folder than build/gui, for runs beside each other.
+# The pictures in build/gui are to be looked at. CHECK runs only the steps with this in their name, such as
+# "random steps". TACTILE_OUT names another folder than build/gui, so that two runs can go on at once.
 set -euo pipefail
 [ $# = 1 ] || [ $# = 2 ] || { echo "usage: run.sh ZIP [CHECK]" >&2; exit 2; }
 only=${2:-}
@@ -22,7 +22,7 @@ rm -rf "$out" "$BLENDER_USER_RESOURCES" "$out-user-repository"
 mkdir -p "$out"
 cp "$zip" "$out/tactile_patch.zip"
 
-# step WHAT COMMAND...: the command prints its checks; it fails as a whole where it ends otherwise than with 0.
+# step WHAT COMMAND...: runs a command, which prints its checks; the step fails if the exit code is not 0.
 step() {
   local what=$1 code=0
   shift

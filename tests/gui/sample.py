@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on examples/sample.blend: the probe's panel, its note, and the preset Paper.
 
-The picture is for eyes.
+Its pictures are to be looked at.
 """
 
 import os

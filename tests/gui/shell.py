@@ -38,7 +38,7 @@ def curvatures(report):
 
 
 def report_of(what, *args):
-    """The one line of JSON that blender with these arguments prints; None, with a failed check, without."""
+    """The line of JSON that blender prints with these arguments; None and a failed check if there is none."""
     code, stdout, stderr = blender(*args, "--json", "-")
     lines = [line for line in stdout.splitlines() if line.startswith("{")]
     good = code == 0 and len(lines) == 1 and "Traceback" not in stdout + stderr
@@ -53,7 +53,7 @@ def report_of(what, *args):
 
 def check_files(first):
     """Touches one point of one surface, from a file of each kind."""
-    # Extent and step too: where none is given they follow the object's bounding box, which files may turn.
+    # Extent and step are given, because automatic ones follow the bounding box, which files may turn.
     same = ["--location", *first["frame"]["origin"], "--extent", first["extent"], "--step", first["step"]]
     for background in ([], ["-b"]):
         for kind in ("blend", "ply", "stl", "obj"):

@@ -29,7 +29,7 @@ from common import (
     until,
 )
 
-# Where they are in a window of 1280 by 800 with the sidebar open.
+# Places in a window of 1280 by 800 with the sidebar open.
 MAP_BUTTON = (943, 311)
 SLICES = []  # seconds of each call of the operator's modal
 
@@ -44,14 +44,14 @@ def maps():
 
 
 def is_clean():
-    """No timer, no status text, no map: the status bar draws as Blender has it."""
+    """Whether no map is being made, and the status bar draws as Blender has it."""
     from bl_ui.space_statusbar import STATUSBAR_HT_header as bar
 
     return not running() and bar.draw.__module__.startswith("bl_ui")
 
 
 def start(**inputs):
-    """Starts a map as the dialog does once it is agreed to."""
+    """Starts a map by confirming the dialog."""
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.tactile.stability_map("INVOKE_DEFAULT", True, **inputs)
@@ -146,7 +146,7 @@ def by_escape():
 
 
 def load_file():
-    """Opening a file ends all timers, this script's too: it goes on in `reopened`."""
+    """Opens a file meanwhile; this ends all timers, this script's too, so it goes on in `reopened`."""
 
     @persistent
     def go_on(*_):
@@ -167,7 +167,7 @@ def reopened():
 
 
 def scan():
-    """A scan, and the same at 200 % resolution scale; the last picture is run.sh's."""
+    """A map of a scan, and the same at 200 % resolution scale, of which run.sh takes the picture."""
     file = FOLDER / "pear.ply"
     gui.sidebar()
     yield 0.5

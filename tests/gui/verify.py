@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: a patch verified against meshes, by mouse.
 
-The button of the panel, undo and redo by keyboard, another mesh by selection, the Object menu; progress
-and Esc on a large mesh, of registration too; and pictures of the table, at 100 and at 200 % resolution scale.
+It checks the button of the panel, undo and redo by keyboard, another mesh by selection and the Object menu;
+progress and Esc on a large mesh, of registration too. Pictures show the table at 100 and at 200 % resolution
+scale.
 """
 
 import sys
@@ -17,7 +18,7 @@ from mathutils import Matrix
 sys.path.insert(0, str(Path(__file__).parent))
 from common import FOLDER, check, data_blocks, last_report, look, open_tab, picture, picture_of_docs, until
 
-# Where they are in a window of 1280 by 800 with the sidebar open.
+# Places in a window of 1280 by 800 with the sidebar open.
 BUTTON, OBJECT_MENU, ASIDE = (893, 449), (330, 40), (300, 180)
 TABLE = "verification"
 
@@ -71,7 +72,7 @@ def another_mesh():
     activate(patch(), other)
     bpy.ops.ed.undo_push(message="Scan")
     yield 1
-    # Its menu, where the space bar searches.
+    # The space bar searches in the Object menu.
     gui.xdo("mousemove", *OBJECT_MENU, "sleep", 0.3, "click", 1, "sleep", 0.5, "key", "space", "sleep", 0.5)
     gui.xdo("type", "--delay", 100, "verify against")
     yield 1
@@ -162,7 +163,7 @@ def large():
 
 
 def scan():
-    """A scan in millimeters of the scene; the last picture, at 200 %, is run.sh's."""
+    """A scan, with the scene in millimeters; run.sh takes the last picture, at 200 %."""
     file = FOLDER / "pear.ply"
     if file.is_file():
         for obj in bpy.data.objects:
@@ -178,7 +179,7 @@ def scan():
     activate(patch())
     patch().tactile_colors = "deviation"
     bpy.ops.tactile.verify("EXEC_DEFAULT", True)
-    gui.xdo("mousemove", *BUTTON, "sleep", 0.2, "click", 5)  # the whole table
+    gui.xdo("mousemove", *BUTTON, "sleep", 0.2, "click", 5)  # scrolls to the whole table
     gui.xdo("mousemove", *ASIDE)
     yield 1
     picture_of_docs("verify")

@@ -37,10 +37,10 @@ from common import (
     until,
 )
 
-# Where they are in a window of 1280 by 800 with the sidebar open.
+# Places in a window of 1280 by 800 with the sidebar open.
 EXTENT_FIELD, MOVE_BUTTON, DELETE_BUTTON, COLORS_BUTTON = (943, 180), (837, 128), (1001, 128), (893, 451)
 OBJECT_MENU = (330, 40)
-VIEW = 6.0  # extents, that the view is away from the probe
+VIEW = 6.0  # extents from the probe to the eye
 
 
 def pick(target):
@@ -209,7 +209,7 @@ def type_a_number():
 
 def add_planes():
     before, planes = state(), probe().tactile_probe.plane_count
-    # The entry is found by typing, as the space bar allows.
+    # The space bar lets the entry be found by typing.
     gui.xdo("mousemove", *OBJECT_MENU, "sleep", 0.3, "click", 1, "sleep", 0.5, "key", "space", "sleep", 0.5)
     gui.xdo("type", "--delay", 100, "planes while")
     yield 1
@@ -226,7 +226,7 @@ def add_planes():
 
 
 def save_and_reload():
-    """Opening a file ends all timers, this script's too: it goes on in `reopened`."""
+    """Saves and opens the file; this ends all timers, this script's too, so it goes on in `reopened`."""
     before = state()
     file = str(FOLDER / "probes.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
@@ -377,7 +377,7 @@ def delete_by_keys():
 
 
 def orthographic_and_tiny():
-    """A millimeter of a thing, scaled unevenly, with a modifier, seen without perspective."""
+    """A scan about a millimeter large, scaled unevenly, with a modifier, seen without perspective."""
     file = FOLDER / "pear.ply"
     if not file.is_file():
         return
@@ -418,7 +418,7 @@ def orthographic_and_tiny():
     for perspective in ("ORTHO", "PERSP"):
         look(center, (0.2, -1, 0.3), 0.003, perspective)
         yield 0.5
-        at = [round(v) for v in gui.view_point(found.location)]  # where a contact is in front
+        at = [round(v) for v in gui.view_point(found.location)]  # a contact is in front there
         digest, count = found.tactile_probe.digest, len(bpy.data.objects)
         gui.click(*MOVE_BUTTON)
         yield 0.5
@@ -452,7 +452,7 @@ def rendering():
 
 
 def looks():
-    """Colors, their button, a light theme and large letters; the last picture is run.sh's."""
+    """Colors, their button, a light theme and large letters; run.sh takes the last picture."""
     if patch() is None:  # there was no scan
         bpy.ops.tactile.pick(target="Suzanne")
     shading = gui.find()[1].spaces.active.shading

@@ -29,8 +29,8 @@ from common import (
 )
 
 SLICES = []  # seconds of work in each call of the operator's modal
-WORDS = []  # what the status bar said after it
-MIDDLE = (520, 380)  # of the viewport, where the object is
+WORDS = []  # what the status bar said after each call
+MIDDLE = (520, 380)  # the middle of the viewport, where the object is
 
 
 def running():
@@ -43,7 +43,7 @@ def surfaces():
 
 
 def start(**inputs):
-    """Starts it as the dialog does once it is agreed to."""
+    """Starts to touch all over by confirming the dialog."""
     window, area, region = gui.find()
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.tactile.touch_all_over("INVOKE_DEFAULT", True, **inputs)
@@ -56,7 +56,7 @@ def start(**inputs):
 def measure_slices():
     """Notes how long each call of modal takes, which is how long a redraw waits.
 
-    In seconds of the thread: beside other programs a call that is cut short takes no less.
+    These are seconds of the thread's work, which other programs do not lengthen.
     """
     operator = bpy.types.TACTILE_OT_touch_all_over
     inner = operator.modal
@@ -73,7 +73,7 @@ def measure_slices():
 
 
 def make_target():
-    """A scan where it is at hand, or an egg; nothing else is to be seen."""
+    """Makes the target, a scan if there is one, else an egg, and hides all other objects."""
     for obj in bpy.data.objects:
         obj.hide_set(True)
     if (FOLDER / "pear.ply").is_file():
@@ -92,7 +92,7 @@ def make_target():
 
 def by_dialog():
     before = data_blocks()
-    yield from start(target="Target", tolerance=0.0)  # its own choice
+    yield from start(target="Target", tolerance=0.0)  # 0 leaves the choice to the operator
     check("the dialog starts it", running())
     yield from until(lambda: any("Touches" in obj.name for obj in bpy.data.objects), 20)
     yield 1
@@ -173,10 +173,10 @@ def by_escape():
 
 
 def while_it_is_meshed():
-    """Esc has nothing left to keep then: it drops it."""
+    """Esc drops the surface while it is meshed, because nothing is complete then that could be kept."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
     before = data_blocks()
-    yield from start(target="Target", tolerance=0.0)  # not that of before
+    yield from start(target="Target", tolerance=0.0)  # not the last tolerance
     for _ in range(1200):
         yield 0.05
         if WORDS[-1] == "Meshing":
@@ -189,7 +189,7 @@ def while_it_is_meshed():
 
 
 def afterwards():
-    """What becomes of the surface: renamed, saved and opened, deleted, and its target too."""
+    """The surface is renamed, saved and read; then its target is deleted, and the surface itself."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Target"]
     yield from start(target="Target", most=6)
     yield from until(lambda: not running(), 60)
@@ -226,7 +226,7 @@ def afterwards():
 
 
 def is_clean():
-    """It is over, and neither the growing patches nor what is in the status bar are left."""
+    """Whether it is over, the growing patches are gone, and the status bar draws as Blender has it."""
     from bl_ui.space_statusbar import STATUSBAR_HT_header as bar
 
     growing = [obj for obj in bpy.data.objects if obj.name.endswith("Touches")]

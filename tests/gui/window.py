@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py, with the extension installed.
 
-What background runs cannot test: the 3D cursor set by mouse, the entry of the Object menu, undo and
-redo by keyboard, and what is seen. The pictures are for eyes: suzanne.png, and the window at the end,
+It checks what background runs cannot: the 3D cursor set by mouse, the entry of the Object menu, undo and
+redo by keyboard, and what is seen. Two pictures are to be looked at: suzanne.png, and the window at the end,
 which shows a scan where pear.ply is beside the scene.
 """
 

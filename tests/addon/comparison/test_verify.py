@@ -200,7 +200,7 @@ def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patc
     at = positions(ball.data)
     away = np.linalg.norm(at - np.array(patch["tactile"]["frame"]["origin"]), axis=1)
     at *= 1.0 + 0.05 * np.clip(1.0 - away / 0.5, 0.0, 1.0)[:, None]
-    ball.data.vertices.foreach_set("co", at.ravel())  # set through the attribute, Blender would keep its old tree
+    ball.data.vertices.foreach_set("co", at.ravel())  # by the attribute, Blender would keep its old tree
     ball.data.update()
     found = verified(empty, patch)
     assert patch["tactile"]["status"] == "uncertain"

@@ -326,7 +326,7 @@ def test_nothing_goes_out_without_a_patch(empty, measured, tmp_path):
 
 
 def test_what_is_shown_is_not_what_is_kept(extension, empty, measured, tmp_path):
-    """What is exported stays the same when contours or patch are edited, and moves when the patch is moved."""
+    """Edits of the contours or the patch do not change what is exported; a move of the patch moves it."""
     patch, report = imported(empty, measured())
     before = extension.reconstruction_of(patch)
     for mesh in (patch.data, patch.children[0].data):

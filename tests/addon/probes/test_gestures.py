@@ -69,7 +69,7 @@ def test_an_automatic_extent_follows_while_the_point_is_dragged(empty, ridge, ge
     extents = [report["extent"] for report in reports]
     assert extents[-1] < 0.5 * first["extent"]
     assert not any(b > 1.1 * a for a, b in pairwise(extents))  # the extent does not flicker
-    assert probe.empty_display_size == pytest.approx(0.6 * extents[-1])  # the handles keep the size of the patch
+    assert probe.empty_display_size == pytest.approx(0.6 * extents[-1])  # the handles fit the patch
     back = slide(empty, probe, patch, np.linspace(-0.02, -0.6, 30))
     assert back[-1]["extent"] > 1.5 * extents[-1]
     assert probe.tactile_probe.extent == 0.0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random sequences of what people do: each leaves a patch as a fresh touch has it, or one that says it is not.
+"""Random sequences of what people do: after each a patch agrees with a fresh touch or says it does not.
 
 TACTILE_STEPS=1000 TACTILE_SEED=... takes more steps than the 50 of each run, with other dice.
 """

@@ -69,7 +69,7 @@ def test_the_verdict_on_an_earlier_patch_is_none(wording):
 )
 @pytest.mark.parametrize("meters", [0.0065, 0.065, 0.1, 2.0, 65.0])
 def test_a_number_is_dragged_by_the_size_of_the_object(empty, extension, meters, scale, unit):
-    """As far as Blender lets it: between a micrometer and a millimeter a pixel there is nothing."""
+    """The pace is only near that size: Blender has none between a micrometer and a millimeter a pixel."""
     settings = empty.context.scene.unit_settings
     settings.scale_length = scale
     if unit == "NONE":
@@ -90,7 +90,7 @@ def test_a_number_that_is_left_to_the_surface_shows_what_it_has(empty, extension
     settings = empty.context.object.tactile_probe
     fields = extension.tactile_addon.probes.number_fields.fields(max(settings.target.dimensions))
     (patch,) = empty.context.object.children
-    assert getattr(settings, fields["extent"]) == pytest.approx(patch["tactile"]["extent"])  # as found
+    assert getattr(settings, fields["extent"]) == pytest.approx(patch["tactile"]["extent"])  # as it was found
     assert settings.extent == getattr(settings, fields["noise"]) == 0.0
     setattr(settings, fields["extent"], 0.2 * size)
     assert settings.extent == pytest.approx(0.2 * size)
@@ -119,7 +119,7 @@ def test_what_was_found_stands_beside_auto(said, empty, ball):
 def test_rows_are_told_apart_by_how_they_begin(said, ball):
     _, report = ball
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT)
-    labels = [label for label, value in rows if value]  # and no heading
+    labels = [label for label, value in rows if value]  # a heading has no value
     assert len({label[:5] for label in labels}) == len(labels) == len(set(labels))
     assert max(map(len, labels)) <= 11
 
@@ -155,7 +155,7 @@ def test_lengths_in_messages_are_in_the_unit_of_the_scene(extension, empty):
 
 
 class Layout:
-    """What a panel draws, as (text, whether it is drawn as usual) in `drawn`; parts of it share the list."""
+    """Keeps what a panel draws in `drawn`, as (text, whether it is not gray); its parts share the list."""
 
     def __init__(self, whole=None):
         self.drawn, self.whole, self.active = [] if whole is None else whole.drawn, whole, True
@@ -198,7 +198,7 @@ def test_a_value_that_has_no_room_beside_its_label_stands_below_it(extension, wi
 
 
 def drawn_of(bpy, extension, obj):
-    """What the panel of the result draws of an object: (text, whether it is drawn as usual)."""
+    """What the panel of the result draws of an object: (text, whether it is not gray)."""
     context = SimpleNamespace(
         view_layer=bpy.context.view_layer,
         scene=bpy.context.scene,

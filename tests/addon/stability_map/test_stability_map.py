@@ -21,7 +21,7 @@ QUANTITIES = ("error", "height_std", "reach", "condition_number", "blind_share")
 
 
 def stability_map(bpy, **arguments):
-    """Runs the operator; the painted copy and its record."""
+    """Runs the operator and returns the painted copy and its record."""
     return made(bpy.ops.tactile.stability_map, "tactile_map", **arguments)
 
 
@@ -38,7 +38,7 @@ def edited(bpy, **cuts):
 
 
 def test_a_ball_is_alike_all_over(empty):
-    # Facets twice as large are texture to some touches and none to others.
+    # Some touches would take facets twice as large for texture, and others would not.
     empty.ops.mesh.primitive_uv_sphere_add(segments=256, ring_count=128, radius=2.0)
     painted, record = stability_map(empty, spacing=0.4, extent=0.5, degree=4)
     assert record["points"] == record["touched"] == record["patches"]
@@ -56,7 +56,7 @@ def test_a_ball_is_alike_all_over(empty):
 
 
 def test_what_a_map_says_is_what_a_touch_says(empty, ball):
-    """At every vertex, so that one of them is touched with the same inputs by the other operator."""
+    """The map touches every vertex, so that the other operator can touch one of them with the same inputs."""
     inputs = {"extent": 0.8, "step": 0.08, "plane_count": 4, "degree": 5}
     painted, _ = stability_map(empty, spacing=0.01, **inputs)
     for vertex in (700, 1200):
@@ -71,7 +71,7 @@ def test_what_a_map_says_is_what_a_touch_says(empty, ball):
 
 @pytest.fixture
 def ridge(empty):
-    """A sheet, 2 wide, with a ridge along y; the active object."""
+    """The active object: a sheet, 2 wide, with a ridge along y."""
     obj = grid(empty, 100)
     co = positions(obj.data)
     co[:, 2] = 0.05 * (co[:, 0] ** 2 + co[:, 1] ** 2) + 0.12 * np.exp(-((co[:, 0] / 0.15) ** 2))
@@ -91,7 +91,7 @@ def test_touches_that_choose_their_extent_are_those_of_the_other_operator(empty,
         ridge, depsgraph, planes, **lengths, **fit
     )
     yields = sum(1 for _ in touched.steps())
-    assert yields > 5 * len(touched.chosen)  # a window redraws meanwhile
+    assert yields > 5 * len(touched.chosen)  # a window can redraw in between
     within = [
         (number, vertex)
         for number, vertex in enumerate(touched.chosen)
@@ -108,7 +108,7 @@ def test_touches_that_choose_their_extent_are_those_of_the_other_operator(empty,
 
 
 def test_an_automatic_extent_fits_the_place(empty, ridge):
-    """Beside a ridge it is long, on it short: so fewer patches are in doubt there."""
+    """The extent is long beside a ridge and short on it, so fewer patches are in doubt."""
     painted, record = stability_map(empty, target=ridge.name, spacing=0.1)
     fixed, given = stability_map(empty, target=ridge.name, spacing=0.1, extent=0.5)
     assert (record["extent"], record["step"]) == (0.0, 0.0)
@@ -125,7 +125,7 @@ def test_a_map_with_an_automatic_extent_says_so(empty, ridge, extension):
     stability_map_room = extension.tactile_addon.stability_map
     rows = dict(stability_map_room.map_report.map_table_rows(record))
     assert rows["spacing, extent, step"] == "0.5 m, auto, auto"
-    assert stability_map_room.map_object.inputs_of(painted)["extent"] == 0.0  # of a probe on the map
+    assert stability_map_room.map_object.inputs_of(painted)["extent"] == 0.0  # a probe on the map gets this
 
 
 def test_a_cube_has_patches_on_its_faces_and_none_on_its_edges(empty):
@@ -175,7 +175,7 @@ def test_a_sheet_is_refused_at_its_border_and_around_a_hole(empty):
 
 
 def test_each_of_nested_walls_is_compared_with_itself(empty, ball):
-    """Balls of which the inner is nearer than the extent."""
+    """The wall of the inner ball is nearer to that of the outer one than the extent."""
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=1.9)
     ball.select_set(True)
     empty.ops.object.join()
@@ -188,7 +188,7 @@ def test_each_of_nested_walls_is_compared_with_itself(empty, ball):
 
 
 def test_a_bump_between_the_curves_shows_as_error(empty):
-    """What no curve has felt makes no doubt, but it is an error."""
+    """What no curve has felt raises no doubt, but it is an error."""
     obj = grid(empty, 120)
     co = positions(obj.data)
     away = np.hypot(co[:, 0] - 0.26, co[:, 1] - 0.15)
@@ -202,7 +202,7 @@ def test_a_bump_between_the_curves_shows_as_error(empty):
 
 
 def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
-    ball.data.attributes.new("error", "BOOLEAN", "FACE")  # in the way, and of another type
+    ball.data.attributes.new("error", "BOOLEAN", "FACE")  # the name is taken, and by another type
     ball.data.materials.append(empty.data.materials.new("Own"))
     before = (ball.data.attributes.keys(), ball.data.materials.keys(), positions(ball.data).tolist())
     faces = [tuple(face.vertices) for face in ball.data.polygons]
@@ -220,7 +220,7 @@ def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
     assert np.array(painted.matrix_world) == pytest.approx(np.array(ball.matrix_world), abs=1e-5)
     assert empty.context.view_layer.objects.active == painted
     mesh = painted.data
-    assert len(mesh.polygons) == 4 * len(ball.data.polygons) - 128 * 2  # triangles make three
+    assert len(mesh.polygons) == 4 * len(ball.data.polygons) - 128 * 2  # of a quad four, of a triangle three
     for name in QUANTITIES:
         assert mesh.attributes[name].data_type == "FLOAT"
         assert np.isfinite(values(mesh, name)).all()
@@ -258,7 +258,7 @@ def test_touched_points_are_a_spacing_apart_and_leave_no_gap():
     tree = cKDTree(points[chosen])
     assert not tree.query_pairs(0.1)
     assert tree.query(points)[0].max() < 0.15
-    # A part of them covers all of it as well.
+    # The first quarter of them covers the whole sphere as well.
     part = cKDTree(points[chosen[: len(chosen) // 4]])
     assert part.query(points)[0].max() < 0.6
 
@@ -282,7 +282,7 @@ def test_one_undo_step(empty, ball):
     empty.context.preferences.edit.use_global_undo = True
     empty.ops.ed.undo_push(message="Ball")
     before = datablocks(empty)
-    # By its name with "EXEC_DEFAULT" and undo, as a button calls it.
+    # A button calls it so: with "EXEC_DEFAULT" and undo.
     empty.ops.tactile.stability_map("EXEC_DEFAULT", True, spacing=1.0)
     assert "Sphere Stability" in empty.data.objects
     empty.ops.ed.undo()
@@ -294,7 +294,7 @@ def test_a_vertex_without_a_face_is_not_touched(empty, ball):
     ball.data.vertices[-1].co = (0.0, 0.0, 2.5)
     painted, record = stability_map(empty, spacing=0.5)
     assert record["refused"]["nothing"] == 0
-    assert values(painted.data, "reason")[-1] == PATCH  # of the nearest touch
+    assert values(painted.data, "reason")[-1] == PATCH  # it has the reason of the nearest touch
 
 
 def test_faces_of_no_area_are_nothing_to_feel(empty):
@@ -363,7 +363,7 @@ def make_disabled(bpy, obj):
 
 
 def make_disabled_with_a_probe(bpy, obj):
-    """Which keeps it in Blender's evaluation, without a mesh."""
+    """The probe keeps the object in Blender's evaluation, but without a mesh."""
     bpy.ops.tactile.pick(target=obj.name, location=(0.0, 0.0, 2.0))
     obj.hide_viewport = True
 
@@ -395,7 +395,7 @@ def test_what_cannot_be_touched_is_refused_with_a_sentence(empty, ball, spoil, s
 
 def test_a_map_and_a_patch_lead_back_to_what_was_touched(empty, ball):
     _, record = stability_map(empty, spacing=1.0)
-    again, _ = stability_map(empty, spacing=1.0)  # the map is active, and no target
+    again, _ = stability_map(empty, spacing=1.0)  # the map is active, but is not touched itself
     assert again["tactile_map"]["source"] == record["source"] == "Sphere"
     empty.ops.tactile.reconstruct(location=(0.0, 0.0, 2.0))
     assert empty.context.object["tactile"]["source"] == "Sphere"

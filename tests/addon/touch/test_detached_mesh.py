@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is touched in slices notices what becomes of its target meanwhile; maps and whole objects alike.
+"""Touches in slices, for maps and whole objects, notice what happens to their target meanwhile.
 
 What an operator does then is in tests/gui/stability.py and tests/gui/whole_object.py.
 """
@@ -12,7 +12,7 @@ pytest.importorskip("bpy", reason="needs Blender as a Python module: run make te
 
 @pytest.fixture
 def taken(empty, ball, extension):
-    """The ball as it was."""
+    """The mesh of the ball as it was before it is disturbed."""
     mesh = extension.tactile_addon.touch.detached_mesh.DetachedMesh
     return mesh(ball, empty.context.evaluated_depsgraph_get())
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parts with edges, and planes: what a touch promises there, and what it says of nothing."""
+"""Parts with edges, and planes: what a touch promises there, and that rounding is said to be 0."""
 
 import math
 
@@ -39,7 +39,7 @@ def test_the_patch_ends_at_the_edges_of_its_face(empty, cube, location, extent):
     (patch,) = empty.context.object.children
     reach = max(
         abs(value) for v in patch.data.vertices for value in (patch.matrix_world @ v.co)[:2]
-    )  # the cube's is 1
+    )  # the faces of the cube reach to 1
     assert reach < 1.005
     assert empty.ops.tactile.verify() == {"FINISHED"}
     assert patch["tactile"]["verification"]["overlap"] > 0.99

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""No more than a scene needs, in Blender: extents, steps and planes that choose themselves."""
+"""Automatic extents, steps and planes in Blender: no more of them than a touch needs."""
 
 import math
 import re
@@ -90,7 +90,7 @@ def test_a_probe_keeps_the_planes_that_were_added(empty, sheet):
     empty.context.view_layer.update()
     assert settings.digest == digest
     assert patch["tactile"].to_dict() == report
-    settings.azimuths[0] += 0.1  # and goes on being live
+    settings.azimuths[0] += 0.1  # the probe goes on being live
     assert patch["tactile"]["planes"][0][0] == pytest.approx(math.degrees(0.1))
 
 
@@ -132,7 +132,7 @@ def test_no_patch_across_an_edge_or_a_rib(empty, extension, scans, name, noise):
     for at in faces[chosen, :3]:
         try:
             touched = add_on.touch.touch_object.touch(obj, depsgraph, at, planes, **inputs)
-        except ValueError:  # on a crease or beside one: no patch
+        except ValueError:  # there is no patch on a crease or beside one
             continue
         touched = add_on.touch.touch_object.completed(touched)
         if touched.report["status"] == "ok":

@@ -32,7 +32,7 @@ def reconstruct(bpy, **arguments):
 
 
 def test_enabling_the_extension_imports_no_scipy():
-    """A process of its own looks, for the tests import scipy."""
+    """A process of its own looks, because the tests import scipy themselves."""
     code = (
         "import sys, bpy, addon_utils; addon_utils.enable('bl_ext.user_default.tactile_patch');"
         "assert hasattr(bpy.types, 'TACTILE_OT_reconstruct'), 'not enabled';"
@@ -63,7 +63,7 @@ def test_the_patch_of_a_ball(empty, ball):
     assert point / np.linalg.norm(point) == pytest.approx(np.array(TOP) / np.linalg.norm(TOP), abs=0.01)
     assert report["frame"]["normal"] == pytest.approx(point / RADIUS, abs=0.02)
     assert report["source"] == "Sphere"
-    # The source is as it was.
+    # The ball itself has not changed.
     assert np.array_equal(positions(ball.data), source)
     assert not ball.data.attributes.get("gaussian_curvature")
     assert not ball.data.materials
@@ -89,7 +89,7 @@ def test_the_patch_object_holds_what_it_says(extension, empty, ball):
     assert r.patch.height(x, y) == pytest.approx(expected, rel=1e-12)
     assert values(mesh, "gaussian_curvature")[0] == pytest.approx(report["gaussian_curvature"], rel=1e-5)
     assert values(mesh, "mean_curvature")[0] == pytest.approx(report["mean_curvature"], rel=1e-5)
-    # Deviation: how far the patch is outside the ball, but for the ball's facets.
+    # The deviation is how far the patch is outside the ball, except for the ball's facets.
     world = np.column_stack([x, y, z]) @ axes.T + frame["origin"]
     assert values(mesh, "deviation") == pytest.approx(np.linalg.norm(world, axis=1) - RADIUS, abs=1e-3)
     assert np.abs(values(mesh, "deviation")).max() > 1e-4
@@ -98,7 +98,7 @@ def test_the_patch_object_holds_what_it_says(extension, empty, ball):
     faces = np.array([face.vertices for face in mesh.polygons])
     mean_std = np.average(std[faces].mean(axis=1), weights=[face.area for face in mesh.polygons])
     assert report["height_std"] == pytest.approx(mean_std, rel=0.2)
-    # The vertices are those that the reconstruction asks for.
+    # The mesh is the one that the reconstruction makes.
     points, triangles = r.mesh()
     assert np.column_stack([x, y, z]) == pytest.approx(points, abs=1e-6)
     assert len(faces) == len(triangles)
@@ -148,7 +148,7 @@ def test_the_contours_are_an_object_of_their_own(empty, ball):
     contact, contour = values(lines.data, "contact"), values(lines.data, "contour")
     assert np.unique(contour).tolist() == [-1, 0, 1, 2]  # -1 is the rim of the patch
     assert np.unique(contact).tolist() == list(range(-1, 21))
-    # The middle of an octahedron is its contact; the reference point is the eleventh.
+    # Each contact is the middle of an octahedron, and the reference point is the eleventh contact.
     points = positions(lines.data)
     centers = points[contact >= 0].reshape(-1, 6, 3).mean(axis=1)
     assert centers[10] == pytest.approx(0.0, abs=1e-6)
@@ -227,7 +227,7 @@ def test_extent_and_step_suit_the_object_where_they_are_not_given(empty, ball):
 
 
 def test_the_chosen_extent_does_not_depend_on_how_the_object_is_turned(empty, ball):
-    """The planes turn along, which are otherwise laid out by the axes of the world."""
+    """The planes turn with the object here; otherwise the axes of the world would lay them out."""
     ball.scale = (1.0, 2.0, 0.5)
     extents, along = [], None
     for angle in (0.0, 0.7):
@@ -311,7 +311,7 @@ SQUASH = Matrix.LocRotScale((5.0, -3.0, 1.0), Euler((0.3, 0.9, -0.5)), (1.5, 0.7
     ids=["non-uniform", "mirrored", "small", "large"],
 )
 def test_any_transform_is_touched_as_it_looks(empty, ball, matrix):
-    """Against a mesh with the transform applied to its vertices."""
+    """The patch is compared with that of a mesh that has the transform applied to its vertices."""
     applied = ball.copy()
     applied.data = ball.data.copy()
     applied.data.transform(matrix)

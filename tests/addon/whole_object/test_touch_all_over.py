@@ -18,7 +18,7 @@ from scenes import datablocks, made, positions, values
 
 
 def touched(bpy, **arguments):
-    """Runs the operator; the surface and its record."""
+    """Runs the operator and returns the surface and its record."""
     return made(bpy.ops.tactile.touch_all_over, "tactile_object", **arguments)
 
 
@@ -84,7 +84,7 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball):
 
 
 def faces_of(bpy, vertices, faces):
-    """An active object of these."""
+    """Makes an object of these vertices and faces, active, and returns it."""
     mesh = bpy.data.meshes.new("Faces")
     mesh.from_pydata(vertices, [], faces)
     obj = bpy.data.objects.new("Faces", mesh)
@@ -131,7 +131,7 @@ def test_a_scaled_object_is_touched_as_it_is(empty, ball, scale):
 
 
 def test_another_process_touches_the_same(files):
-    """To the last bit, whatever the order of its sets; from a file, as the faces of a new sphere vary."""
+    """It does to the last bit, in any order of sets. The ball is a file, as the faces of new spheres vary."""
     code = (
         "import sys, bpy, addon_utils; addon_utils.enable('bl_ext.user_default.tactile_patch');"
         "from bl_ext.user_default.tactile_patch.tactile_addon import command_line;"

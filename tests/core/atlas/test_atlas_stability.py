@@ -16,7 +16,7 @@ def explored(solid, **options):
 
 
 class Outlying:
-    """Every tenth ray hits beside the surface."""
+    """A solid that every tenth ray meets beside its surface."""
 
     def __init__(self, solid, off):
         self.solid, self.off, self.count = solid, off, 0
@@ -66,7 +66,7 @@ def test_a_tenth_of_outlying_contacts_is_ignored():
 
 
 class BadNormals:
-    """Normals are off by a fifth of a radian."""
+    """A solid whose normals are off by a fifth of a radian (root mean square)."""
 
     def __init__(self, solid):
         self.solid, self.rng = solid, np.random.default_rng(0)

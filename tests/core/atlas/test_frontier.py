@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where touches go on from: beyond rims, elsewhere after one in vain, never inward; and what is uncovered."""
+"""Where touches go on: beyond rims, elsewhere after one in vain, never inward; and what is left uncovered."""
 
 from dataclasses import replace
 
@@ -84,7 +84,7 @@ class Nothing:
 
 
 def test_a_patch_that_faces_inward_is_no_touch(monkeypatch):
-    """As of a fit at an edge that turned over to its other side: here each but the first."""
+    """A fit at an edge may turn over to the other side; here each one but the first does."""
 
     def turned(surface, points, outward, **options):
         found = yield from exploring(surface, points, -np.asarray(outward), **options)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Touches all over exact objects: what is found of them, where it is closed, and how far it is off."""
+"""Exact objects touched all over: what is found of them, whether it is closed, and how far it is off."""
 
 import json
 from dataclasses import replace
@@ -131,7 +131,7 @@ def test_touches_bend_around_the_edges_of_a_block(block):
 
 
 def test_contacts_mend_holes_at_sharp_edges(block, monkeypatch):
-    """Across an edge patches alone do not tell whether it is convex."""
+    """Patches alone do not tell whether the edge between them is convex."""
     mended = block.mesh(0.06)
     monkeypatch.setattr(meshing, "told", lambda charts, _, points, room=0.0: blended(charts, points, room))
     alone = block.mesh(0.06)
@@ -141,7 +141,7 @@ def test_contacts_mend_holes_at_sharp_edges(block, monkeypatch):
 
 
 def test_edges_that_were_felt_on_both_sides_are_closed(block):
-    """Patches end short of them, and the vertices there are beyond all rims."""
+    """Patches end short of these edges, so the vertices there are beyond the rims of all patches."""
     assert solids.topology(block.mesh(0.1).triangles).open == 0
 
 
@@ -155,8 +155,8 @@ def felt_plane(charts):
 
 @pytest.mark.parametrize("std", [np.inf, 1e-3])
 def test_beyond_all_rims_the_nearest_contacts_tell_the_side(ball, std, monkeypatch):
-    """A patch that goes on as it is beyond its rim does not know that the surface turned."""
-    places = np.array([[0.0, 0.0, 0.06], [0.0, 0.0, -0.06], [0.2, 0.0, 0.06]])  # the last: far to the side
+    """A patch that is continued beyond its rim does not know that the surface turns there."""
+    places = np.array([[0.0, 0.0, 0.06], [0.0, 0.0, -0.06], [0.2, 0.0, 0.06]])  # the last is far to the side
     wrong = Blend(np.array([-0.5, 0.5, -0.5]), np.full(3, std), -np.eye(3), np.full(3, 1))
     monkeypatch.setattr(join, "blended", lambda *_: Blend(*(values.copy() for values in wrong)))
     found = join.told(ball.charts, felt_plane(ball.charts), places, room=0.5)
@@ -178,7 +178,7 @@ def test_where_no_patch_is_the_deviation_is_inf_unless_a_contact_is_near(ball):
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_contacts_alone_keep_creases_and_valleys_sharp(ball, way):
-    """Of a roof the inside is below both slopes, of a valley below either."""
+    """The inside of a roof is below both slopes, that of a valley below either."""
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-1.0, 1.0, 20), np.linspace(-1.0, 1.0, 21)))
     points = np.column_stack([x, y, -way * np.abs(x)])
     normals = np.column_stack([way * np.sign(x), 0.0 * x, np.ones(len(x))]) / np.sqrt(2.0)
@@ -308,7 +308,7 @@ def test_edges_in_steps_are_the_edges(ring):
 
 @pytest.mark.parametrize("answer", [None, False])
 def test_false_while_patches_are_joined_ends_the_touching(answer, monkeypatch):
-    """Without it, patches that are less certain than the tolerance are touched again: here the first are."""
+    """Otherwise patches less certain than the tolerance are touched again: here always the first three."""
     monkeypatch.setattr(Charts, "less_certain_than", lambda charts, tolerance: [0, 1, 2])
     solid, joins = solids.ball(), False
     steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=8e-3, noise=8e-3, rng=0)

@@ -36,7 +36,7 @@ def touched(surface, noise=0.0, seed=0):
 
 
 def measured(contours, std, seed=0):
-    """Contours with measured normals: turned by normal deviations about two axes across them."""
+    """Contours with measured normals, which have Gaussian noise in the two directions across them."""
     rng = np.random.default_rng(seed)
     found = []
     for c in contours:
@@ -150,7 +150,7 @@ def test_the_order_and_the_side_of_normals_make_no_difference():
 
 
 def test_slopes_are_the_derivatives_of_the_heights():
-    """Exact normals, by finite differences of a surface with these coefficients, are met exactly."""
+    """The coefficients of a surface satisfy the equations of its normals, here from finite differences."""
     rng = np.random.default_rng(3)
     local, b, h = rng.uniform(-0.8, 0.8, (1, 9, 3)), 0.2 * rng.normal(size=27), 1e-6
     x, y, _ = local[0].T
@@ -165,7 +165,7 @@ def test_slopes_are_the_derivatives_of_the_heights():
     slopes, steepness = slope_equations(normals[None], local, np.ones((1, 9)))
     assert slopes[0] @ b == pytest.approx(steepness[0], abs=1e-6)
     up = np.column_stack([dx, dy, -np.ones(9)])
-    # A change of slope counts by the angle that it turns the normal by: in units of 0.05 radians.
+    # A change of slope counts by the angle by which it turns the normal, in units of 0.05 radians.
     for direction in rng.normal(size=(5, 27)):
         misses = slopes[0] @ (1e-5 * direction)
         change = np.column_stack([
@@ -179,7 +179,7 @@ def test_slopes_are_the_derivatives_of_the_heights():
 
 
 def test_without_slopes_both_likelihoods_are_one():
-    """But for the free terms' weak prior."""
+    """They agree except for the weak prior of the free terms."""
     rng = np.random.default_rng(4)
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
@@ -298,7 +298,7 @@ def test_no_normal_is_taken_for_better_than_a_hundredth_of_a_radian():
 
 
 def test_a_contradiction_is_counted_in_deviations_of_the_mean_and_in_radians():
-    """Contacts know all about a plane; normals, good to .02 radians each, lean by .03."""
+    """Contacts determine a plane; each normal is good to 0.02 radians, and all lean by 0.03."""
     rng = np.random.default_rng(9)
     contacts = np.column_stack([rng.uniform(-0.8, 0.8, (40, 2)), np.zeros(40)])
     known = posterior.Posterior(

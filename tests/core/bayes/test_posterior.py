@@ -159,7 +159,7 @@ def test_height_and_its_deviation_are_those_of_the_surface_whatever_the_degree_o
     ],
 )
 def test_blind_directions_are_counted_and_named(planes, degree, blind, terms):
-    """m planes through the normal hide (d - m + 1)(d - m + 2) / 2 of the terms to degree d (DESIGN, 2)."""
+    """m planes through the normal hide (d - m + 1)(d - m + 2) / 2 of the terms to degree d."""
     r = touched(surfaces.torus(40, 20, 0.6), planes, noise=0.02, degree=degree)
     assert r.posterior.blind(degree) == blind
     named = f"{blind} of {terms} coefficients {'is' if blind == 1 else 'are'} invisible to these planes"
@@ -300,7 +300,7 @@ def test_the_order_of_contacts_and_curves_makes_no_difference_but_for_the_axes_s
 
 
 def test_few_contacts_are_enough_for_a_finite_answer():
-    """Three contacts a curve, to one side of the point: 9 equations for 27 coefficients."""
+    """Four curves have three contacts each, to one side of the point: 12 equations for 27 coefficients."""
     s = np.array([0.3, 0.6, 1.0])
     curves = [
         Contour(np.column_stack([s * np.cos(a), s * np.sin(a), -0.1 * s**2])) for a in (0.0, 1.0, 2.0, 4.0)
@@ -311,7 +311,7 @@ def test_few_contacts_are_enough_for_a_finite_answer():
 
 
 def test_without_evidence_the_waviness_is_the_priors():
-    """Log-normal about 0.6."""
+    """The prior is log-normal about 0.6."""
     noises = np.full((1, 5), 0.01)
     found = evidence._averaged(np.zeros((1, 6, 5)), noises)
     w = evidence.WAVINESS
@@ -339,7 +339,7 @@ def test_a_degree_will_do_whose_patch_departs_by_half_a_deviation(ratio, degree)
 
 
 def test_an_outlying_contact_weighs_as_under_students_distribution():
-    """(4 + 1) / (4 + r^2) of r deviations: 1 at one of them; and all 1 where none is beyond five."""
+    """The weight at r deviations is (4 + 1) / (4 + r^2), so 1 at r = 1; where none is beyond 5 all are 1."""
     ratios = np.array([[0.0, 0.1, 1.0, 2.0, 0.5, 0.6, 0.2, 6.0], [0.0, 0.1, 1.0, 2.0, 0.5, 0.6, 0.2, 4.9]])
     weights = joint_fit._student_weights(2e-3 * ratios, np.ones((2, 8), dtype=bool), np.full(2, 2e-3))
     assert weights[0] == pytest.approx(5.0 / (4.0 + ratios[0] ** 2))
@@ -384,7 +384,7 @@ def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
 
 @pytest.mark.parametrize("planes", [THREE, surfaces.planes((0, 25, 70))], ids=["even", "uneven"])
 def test_deviations_of_curvatures_are_those_of_surfaces_drawn_from_the_posterior(planes):
-    """H = b_20 + b_02, k1 = 2 b_20, k2 = 2 b_02; K = k1 k2 / radius^2, its product's variance included."""
+    """H = b_20 + b_02, k1 = 2 b_20, k2 = 2 b_02; K = k1 k2, with the variance of the product."""
     r = touched(surfaces.torus(40, 20, 0.6), planes, noise=0.3)
     drawn = np.random.default_rng(8).multivariate_normal(r.posterior.mean, r.posterior.covariance, 200_000)
     k1, k2 = 2.0 * drawn[:, 2] / r.radius, 2.0 * drawn[:, 4] / r.radius
@@ -398,7 +398,7 @@ def test_deviations_of_curvatures_are_those_of_surfaces_drawn_from_the_posterior
 
 
 def prior_mean(k1, k2):
-    """Prior means of one surface."""
+    """The prior means of the coefficients of one surface."""
     return linear_system.prior_mean(np.array([k1]), np.array([k2]))[0]
 
 
@@ -416,7 +416,7 @@ def test_the_priors_mean_goes_on_as_spheres_and_cylinders_do(k):
 
 @pytest.mark.parametrize(("k1", "k2"), [(-0.6, 0.3), (0.2, 0.5)])
 def test_the_priors_mean_between_is_that_of_a_surface_that_goes_on_and_of_a_torus(k1, k2):
-    """Q |grad Q|^2 / 4 has k1 k2 (k1 + k2) / 8 of x^2 y^2, a sixth of degree likewise."""
+    """The quartic terms are those of Q |grad Q|^2 / 4, the sextic ones those of Q |grad Q|^4 / 8."""
     mean = prior_mean(k1, k2)
     assert mean[9:14] == pytest.approx([k1**3 / 8, 0.0, (k1 * k2**2 + k2 * k1**2) / 8, 0.0, k2**3 / 8])
     a, b = k1**2, k2**2
@@ -435,12 +435,12 @@ def test_the_suggested_plane_is_measured_as_the_contours_were_tracked():
         other, same = suggest_plane(r, s.normal, tangent)
         assert same == expected
         t = other.axes(s.normal, tangent)[:, 0]
-        assert abs(np.cross(t, along) @ s.normal) < 1e-3  # but for the fit's normal beside the true one
+        assert abs(np.cross(t, along) @ s.normal) < 1e-3  # the fit's normal is not quite the true one
 
 
 @pytest.mark.parametrize("step", [1.0, 4.0, 0.25])
 def test_what_is_expected_of_a_plane_is_the_posterior_with_its_contacts_added(step):
-    """It has as many contacts as the curves; of more than 24 means, of so much less noise."""
+    """It has as many contacts as each curve; in place of more than 24, it has 24 means with less noise."""
     s = surfaces.torus(40, 20, 0.6)
     r = s.fit(s.track(THREE, step=step, noise=0.05, rng=1))
     plane, expected = suggest_plane(r)

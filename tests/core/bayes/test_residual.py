@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The residual of real surfaces: its algebra, that it is gone where nobody asks for it, and its intervals."""
+"""The residual of real surfaces: its algebra, its intervals, and that exact surfaces have none."""
 
 import json
 
@@ -34,7 +34,7 @@ REACHES = np.linspace(-1.0, 1.0, 25)
 
 
 def rough(seed, size=0.02):
-    """A function of points (n, 2) in unit radius: a bowl and a Matern process of order 3/2, a rougher one."""
+    """Heights at points (n, 2) in units of the radius: a quadric plus a Matern process of order 3/2."""
     rng = np.random.default_rng(seed)
     waves = rng.normal(size=(400, 2)) * np.sqrt(3.0 / rng.chisquare(3.0, (400, 1))) / 0.5
     phases, k = rng.uniform(0.0, 2.0 * np.pi, 400), rng.uniform(-0.5, 0.5, 2)
@@ -97,7 +97,7 @@ def test_the_mean_alone_is_that_of_the_posterior(weight):
 def test_derivatives_are_those_of_the_height():
     residual, h = touched()[1].residual, 2e-5
     rng = np.random.default_rng(0)
-    # At places, where Matern's second derivatives are not smooth, beside them, and at the point.
+    # Places of the residual, where its second derivatives are not smooth, other points and the origin.
     points = np.vstack([residual.places[5:8], rng.uniform(-0.7, 0.7, (9, 2)), np.zeros((1, 2))])
     x, y = points.T
 
@@ -139,7 +139,7 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
 
 
 def test_the_patch_is_that_of_the_surface_over_a_disk():
-    """Its curvatures are those of a quartic fitted to heights of r; and their deviations cover the truth."""
+    """Its curvatures are those of a quartic fitted to the heights, and their deviations cover the truth."""
     covered = []
     for seed in range(25):
         height, r = touched(seed, azimuths=(0, 45, 90, 135))
@@ -173,7 +173,7 @@ def test_grid_points_that_are_not_tried_would_change_nothing(monkeypatch):
 
 
 def test_the_point_is_a_contact_like_the_others():
-    """On a rough surface, as on a mesh's vertex, it may be off what is around it as they are."""
+    """On a rough surface, as at a vertex of a mesh, it may be off the surface around it like any contact."""
     _, r = touched()
     noise = r.radius * r.residual.noise
     assert abs(r.height(0.0, 0.0)) < 3.0 * noise
@@ -319,7 +319,7 @@ def test_deviations_are_less_near_the_point_and_more_at_the_rim_and_a_contour_ta
     assert r.height_std(x, y) == pytest.approx(wanted, rel=1e-4)
     points, weights = r.domain.nodes
     assert weights @ r.geometry.widening(*points.T) == pytest.approx(1.0, abs=0.01)
-    # What is taken off a variance is as much of it as of the process's.
+    # A contour takes the same share off these variances as off those of the process.
     assert 0.0 < suggest_plane(r)[1] < r.mean_height_std
 
 
@@ -349,7 +349,7 @@ def test_the_derivatives_of_a_surface_with_a_residual_are_those_of_its_height_in
 
 
 def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
-    """But for 2 pi: with a residual of any size, and without one."""
+    """They agree up to the constant of 2 pi, with a residual of any size and without one."""
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     basis, heights = monomials(*flat.T, TERMS), rough(3)(flat)
     noises = np.array([1e-3, 2e-3, 4e-3])

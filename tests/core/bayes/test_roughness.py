@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a sextic leaves of contacts, as a share of their radius, and that noise is none of it."""
+"""Roughness is what a sextic leaves of contacts, as a share of their radius; noise does not count."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def contacts(height):
 
 
 def waves(size, seed=0):
-    """From contact to contact, which no polynomial follows."""
+    """Offsets of random sign at each contact, which no polynomial follows."""
     return size * np.random.default_rng(seed).choice([-1.0, 1.0], len(X))
 
 
@@ -29,7 +29,7 @@ def test_a_cap_is_smooth():
 
 @pytest.mark.parametrize("size", [0.003, 0.01, 0.03])
 def test_of_waves_it_is_their_size(size):
-    """Within what chance takes of 75 of them."""
+    """The tolerance allows for the chance in 75 offsets."""
     assert roughness(contacts(0.1 * X**2 + waves(size)), 0.0) == pytest.approx(size, rel=0.1)
 
 

@@ -72,7 +72,7 @@ def test_at_an_umbilic_d1_is_the_first_tangent():
 
 
 def papers_solution(angles, kappas):
-    """(2)-(4): theta, from d1 to the first tangent, by the tan formula; then kappas from two equations.
+    """Solves (2)-(4): theta, from d1 to the first tangent, by the tan formula; then kappas by two equations.
 
     The roots of 2 theta differ by 180 degrees: the other one swaps d1 and d2. alpha is the curvature that
     differs from both others.
@@ -106,7 +106,7 @@ def test_the_papers_tan_formula_and_two_equations_agree():
         assert max(*abs(kappa - ours[:2]), abs(np.sin(ours[2] - d1))) < 1e-9
         alpha_beta = np.abs(np.subtract.outer(curvatures, curvatures))[~np.eye(3, dtype=bool)].min()
         if alpha_beta < 1e-3:
-            continue  # its two equations are then nearly one
+            continue  # the paper's two equations are then nearly one
         papers = papers_solution(angles, curvatures)
         assert max(*abs(kappa - papers[:2]), abs(np.sin(papers[2] - d1))) < 1e-6
         compared += 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contours of very many contacts, with noise in all directions: as good as few, and as honest."""
+"""Contours of very many contacts, with noise in all directions: fits are no worse than of few."""
 
 from functools import cache
 
@@ -28,7 +28,7 @@ def curves_of(surface):
 
 
 def scattered(surface, count, noise, seed):
-    """So many contacts a curve, anywhere on it, off by `noise` in all directions."""
+    """`count` contacts a curve, anywhere on it, off by `noise` in all directions."""
     rng, found = np.random.default_rng(seed), []
     for curve, length in curves_of(surface):
         points = curve(np.sort(rng.uniform(0.0, length, count)))
@@ -37,7 +37,7 @@ def scattered(surface, count, noise, seed):
 
 
 def judged(surface, curves, noise):
-    """The mean error over the domain, and the share of it that the 90 % interval holds."""
+    """The mean error, the share of the domain where the 90 % interval holds, and error over deviation."""
     contours = [Contour(points) for points in curves]
     r = reconstruct(surface.point, contours, outward=surface.normal, noise=noise)
     points, heights = surfaces.heights_over(surface, r, 300)
@@ -113,7 +113,7 @@ def test_few_contacts_stay_as_they_are(count):
 @pytest.mark.parametrize("count", [151, 301, 2001])
 @pytest.mark.parametrize("bend", [1.0, 1.5, 3.0])
 def test_a_steep_curve_is_followed_by_its_tangent_at_the_point(count, bend):
-    """Down a paraboloid farther than across, where the longest axis of a contour is the normal."""
+    """The contours run farther down a paraboloid than across it, so their longest axis is the normal."""
     t, contours = np.linspace(-1.0, 1.0, count), []
     for a in np.radians((0.0, 60.0, 120.0)):
         contours.append(Contour(np.column_stack([t * np.cos(a), t * np.sin(a), -0.5 * bend * 2.0 * t**2])))
@@ -122,7 +122,7 @@ def test_a_steep_curve_is_followed_by_its_tangent_at_the_point(count, bend):
 
 
 def test_means_of_means_are_none():
-    """So an export that is read again has the same contacts: one before the point, and 299 after it."""
+    """An export that is read again has the same contacts; here one is before the point, and 299 follow."""
     t = np.concatenate([[-0.01], np.linspace(0.003, 1.0, 299)])
     fewer, size = thinned(Contour(np.column_stack([t, 0.0 * t, -0.2 * t**2])), np.zeros(3))
     assert (size, len(fewer.points)) == (3, MOST_CONTACTS)

@@ -188,7 +188,7 @@ def test_contours_take_lists_and_refuse_nonsense():
 )
 def test_a_surface_that_answers_nonsense_is_named(hit, message):
     class Odd(Facets):
-        """Gives this one answer to every ray down the surface but the first."""
+        """Gives this one answer to every ray down onto the surface but the first."""
 
         def ray_cast(self, origin, direction, distance):
             return (
@@ -234,7 +234,7 @@ def test_azimuth_of_a_direction_gives_the_plane_that_holds_it():
 
 @pytest.mark.parametrize("radius", [6.0, 10.0, 40.0])
 def test_contacts_are_a_step_apart_to_a_thousandth_however_bent_the_surface_is(radius):
-    """A step along the tangent of a circle ends 1 % too far where it is 0.28 of the radius."""
+    """A step of 0.28 of the radius along the tangent of a circle ends 1 % too far."""
     ball = surfaces.sphere(radius)
     (contour,) = ball.track([SamplingPlane(0.4)], extent=8.0, step=2.0)
     steps = np.linalg.norm(np.diff(contour.points, axis=0), axis=1)
@@ -266,7 +266,7 @@ def test_single_precision_may_round_by_a_hundredth_of_a_curves_size(spacings, go
 
 @pytest.mark.parametrize("step", [0.01, 100.0])
 def test_a_ray_that_slips_between_two_faces_is_cast_again_a_thousandth_of_a_step_beside(step):
-    """A plate of five steps to each side, which no ray meets at the very point."""
+    """A plate reaches five steps to each side, and no ray meets it at the reference point itself."""
 
     class Plate:
         def ray_cast(self, origin, direction, distance):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Extent and step by themselves: how far curves grow, what ends them, how many contacts they get."""
+"""Automatic extent and step: how far curves grow, what ends them, how many contacts they get."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ UP = (0.0, 0.0, 1.0)
 
 
 def bowl_with(height, gradient):
-    """A paraboloid, plus something of which the gradient is given; its level is the height above it."""
+    """A paraboloid plus `height`, whose gradient is given; the level is how far a point is above both."""
     return surfaces.Exact(
         lambda x, y, z: z + (x * x + y * y) / 80.0 - height(x, y),
         lambda p: np.array([*(p[:2] / 40.0 - gradient(*p[:2])), 1.0]),
@@ -28,7 +28,7 @@ def bowl_with(height, gradient):
 
 
 def rib(at, high, wide):
-    """A ridge along y, where x is `at`."""
+    """The paraboloid with a ridge along y, where x is `at`."""
     return bowl_with(
         lambda x, y: high * np.exp(-(((x - at) / wide) ** 2)),
         lambda x, y: (-2.0 * (x - at) / wide**2 * high * np.exp(-(((x - at) / wide) ** 2)), 0.0),
@@ -111,7 +111,7 @@ def fits_of(monkeypatch, surface, **more):
 
 def test_curves_in_next_to_no_doubt_grow_fast(monkeypatch):
     _, results = fits_of(monkeypatch, surfaces.plane())
-    assert len(results) == 3  # of 24, 54 and 96 contacts
+    assert len(results) == 3  # the fits have 24, 54 and 96 contacts
 
 
 def test_between_a_length_in_no_doubt_and_one_in_doubt_one_stretch_more_is_tried():
@@ -122,7 +122,7 @@ def test_between_a_length_in_no_doubt_and_one_in_doubt_one_stretch_more_is_tried
         r = max(np.hypot(x, y), 1e-9)
         return np.array([x, y]) / r * -2.0 * (r - 7.0) / 0.3**2 * high(x, y)
 
-    assert 5.0 < explore(bowl_with(high, gradient)).extent < 7.0  # a wall all round
+    assert 5.0 < explore(bowl_with(high, gradient)).extent < 7.0  # a wall of radius 7 is around the point
 
 
 class Strip:
@@ -135,7 +135,7 @@ class Strip:
 
 
 def test_a_touch_is_as_long_as_it_is_sure():
-    """Curves along a strip tell too little of it across, once they are that much longer."""
+    """Curves that are a fifth longer tell too little of the surface across the strip."""
     found = explore(Strip())
     assert found.result.status == "ok"
     assert explore(Strip(), extent=found.extent).result.status == "ok"
@@ -157,7 +157,7 @@ def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
 
 @pytest.mark.parametrize("largest_std", [None, 1.0])
 def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, monkeypatch):
-    """A longer one is as good as a short one in less doubt, where no deviation is asked for."""
+    """Where no deviation is asked for, a longer seed is as good as a short one in less doubt."""
     spreads, sure = {24: 1.7, 12: 1.4, 6: 1.3, 3: 1.1}, {24: False, 12: True, 6: True, 3: False}
 
     class Trial(growth.Grown):
@@ -360,7 +360,7 @@ class Counted:
 
 
 def test_nothing_is_felt_twice():
-    """On a plane: a quarter of the way, then all of it, whose contacts are those that are fitted."""
+    """A plane is felt a quarter of the way and then all of it, and the contacts felt then are fitted."""
     surface, whole = Counted(surfaces.plane()), Counted(surfaces.plane())
     found = explore(surface)
     core.track(whole, (0.0, 0.0, 0.0), UP, PLANES, extent=30.0, step=30.0 / 96.0)
@@ -397,7 +397,7 @@ def test_whether_contacts_are_enough_is_no_matter_of_the_unit(noise):
 
 
 def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
-    """The deviation, by another fit, with as many contacts more, between those there are."""
+    """A fit with as many contacts more, between those there are, tells how far the deviation falls."""
     surface = surfaces.torus(40, 20, 0.6)
     for step, noise in ((0.5, 0.05), (2.0, 0.05), (3.0, 0.2), (1.0, 0.01)):
         planes = surfaces.planes((0, 60, 120))
@@ -411,11 +411,11 @@ def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
 def test_how_far_to_feel_is_found_where_curves_end_by_themselves():
     ball = surfaces.sphere(20.0)
     found = core.explore(ball, ball.point, ball.normal)
-    assert 5.0 < found.extent < 30.0  # along the curve, of which a quarter circle is 31.4
+    assert 5.0 < found.extent < 30.0  # along the curve; a quarter circle is 31.4
     assert found.result.status == "ok"
 
     class Scaled:
-        """The ball sixteen times as large, which is another power of two."""
+        """The ball sixteen times as large, a factor that is a power of two."""
 
         def ray_cast(self, origin, direction, distance):
             hit = ball.ray_cast([v / 16.0 for v in origin], direction, distance / 16.0)

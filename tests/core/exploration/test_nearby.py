@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Touches near one that chose its extent: how long their half curves are, and how many fits they take."""
+"""Touches near one with an automatic extent: how long half curves are, and how many fits they take."""
 
 from itertools import pairwise
 
@@ -32,7 +32,7 @@ def ribbed(high=3.0, wide=3.0):
 
 
 def places(surface, xs):
-    """(point, normal) of a surface that is a graph, along x."""
+    """(point, normal) at each x, where y is 0, of a surface that is a graph."""
     for x in xs:
         point, normal = surface.ray_cast((x, 0.0, 50.0), (0.0, 0.0, -1.0), 100.0)
         yield point, normal
@@ -93,7 +93,7 @@ def test_beyond_the_ridge_the_patch_becomes_as_large_again():
     first = explore(surface, *next(places(surface, xs)))
     found = dragged(surface, xs[1:], core.reaches_of(first))
     assert found[-1].extent > 2.0 * first.extent
-    assert max(b.extent / a.extent for a, b in pairwise(found)) < 1.1  # it does not flicker
+    assert max(b.extent / a.extent for a, b in pairwise(found)) < 1.1  # the extent does not flicker
 
 
 def test_where_nothing_changes_the_patch_stays_and_takes_one_fit(monkeypatch):

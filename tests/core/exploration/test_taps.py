@@ -20,7 +20,7 @@ UP = (0.0, 0.0, 1.0)
 
 
 class Sector:
-    """A plane that lacks what is between two azimuths, no curve in it, and two radii; a floor or none."""
+    """A plane without what is between two radii and two azimuths, crossed by no curve; a floor or none."""
 
     def __init__(self, floor, nearest=3.0, farthest=math.inf, azimuths=(15.0, 45.0)):
         self.floor, self.radii, self.azimuths = floor, (nearest, farthest), np.radians(azimuths)
@@ -48,7 +48,7 @@ def explore(surface, point=(0.0, 0.0, 0.0), outward=UP, **more):
 
 
 def mean_error(surface, r):
-    """The mean |dz| on what is there of a plane with a floor beneath."""
+    """The mean |dz| over the domain, against the plane and, where that lacks, against the floor."""
     points, weights = r.domain.nodes
     x, y, z = r.frame.to_world(np.column_stack([points, r.height(*points.T)])).T
     return weights @ np.abs(z - np.where(surface.lacks(x, y), surface.floor, 0.0))
@@ -57,7 +57,7 @@ def mean_error(surface, r):
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 @pytest.mark.parametrize("floor", [-4.0, 2.5])
 def test_curves_become_shorter_beside_an_edge_that_none_crosses(floor, noise):
-    """The step to the floor begins at 3, and curves of 30 run along both sides of it."""
+    """The edge of the plane begins 3 from the point, and curves of 30 run along both sides of it."""
     surface = Sector(floor)
     r = explore(surface, noise=noise, rng=0).result
     assert (r.status, r.taps.off) == ("ok", 0.0)
@@ -101,7 +101,7 @@ def test_a_small_hole_is_told_and_is_no_doubt():
 
 @pytest.mark.parametrize("turn", [0.0, 10.0, 20.0, 30.0])
 def test_what_three_planes_cannot_show_is_noticed(turn):
-    """Along planes at its lines a monkey saddle is flat, and between them it is not."""
+    """A monkey saddle is flat in planes through its lines, and between them it is not."""
     s = surfaces.monkey_saddle()
     planes = surfaces.planes((turn, turn + 60.0, turn + 120.0))
     r = core.explore(s, s.point, s.normal, planes, farthest=40.0).result

@@ -74,7 +74,7 @@ def test_8_is_the_integral_of_the_absolute_gaussian_curvature(data_and_domain):
 
 
 def test_total_curvature_of_a_cap_is_the_area_of_its_normals():
-    """A cap of a sphere whose rim leans by b, sin b = L / r: 2 pi (1 - cos b). Six curves see all of it."""
+    """It is 2 pi (1 - cos b) if the rim leans by b, where sin b = L / r. Six curves see all of the cap."""
     ball = surfaces.sphere(25)
     planes = surfaces.planes(np.arange(0, 180, 30))
     r = ball.fit(ball.track(planes), method="least-squares")
@@ -110,7 +110,7 @@ def test_least_squares_finds_the_coefficients_that_made_the_data():
 @pytest.mark.parametrize("name", ["saddle", "quartic", "bottle neck"])
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_both_solvers_reach_the_same_surface(name, noise):
-    """Where (9) has one minimum. On convex surfaces it has several."""
+    """They do where (9) has one minimum. On convex surfaces it has several."""
     surface = PAPER_SIZE[name]
     contours = surface.track(surfaces.UPRIGHT, noise=noise, rng=0)
     fast, descent = (surface.fit(contours, method="tagc", solver=s) for s in ("fast", "descent"))
@@ -178,7 +178,7 @@ def test_on_a_cylinder_the_descent_crawls_and_a_step_cap_is_said(monkeypatch):
 
 
 def test_the_start_keeps_to_lines_between_neighboring_half_curves():
-    """On a cone of lines through the point, where the lines between them lie in planes, it is exact."""
+    """It is exact for straight half curves in one plane, as the lines between them lie in that plane."""
     angles = np.radians([0, 60, 120, 180, 240, 300])
     half_curves = [np.outer(np.arange(1, 8) / 7, [np.cos(a), np.sin(a), 0.0]) for a in angles]
     start = least_squares.tagc_start(least_squares.problem(0.0, 0.0, 4, np.vstack(half_curves)), half_curves)
@@ -186,7 +186,7 @@ def test_the_start_keeps_to_lines_between_neighboring_half_curves():
 
 
 def test_the_start_of_the_descent_joins_neighboring_half_curves_at_their_quarters():
-    """Contact by contact, outward, as far as the shorter one goes; the last with the first."""
+    """It joins them contact by contact, as far as the shorter one goes, and the last one with the first."""
     rng = np.random.default_rng(6)
     angles, counts = np.radians([0, 60, 120, 180, 240, 300]), (7, 5, 7, 6, 7, 7)
     halves = [
@@ -204,9 +204,9 @@ def test_the_start_of_the_descent_joins_neighboring_half_curves_at_their_quarter
 
 
 def test_figure_3_and_4_of_the_paper():
-    """The bottle neck: 57 points, the reference point thrice among them, 0.05 mm noise, nine more curves.
+    """The bottle neck: 57 points with the reference point thrice among them, 0.05 mm noise, nine more curves.
 
-    The paper: unconstrained 0.0461 mm on the data and 13.0041 mm off it, TAGC 0.0514 and 0.0859 mm;
+    The paper finds: unconstrained 0.0461 mm on the data and 13.0041 mm off it, TAGC 0.0514 and 0.0859 mm;
     total absolute curvature 16.6 against 0.033.
     """
     neck = surfaces.bottle_neck()
@@ -243,7 +243,7 @@ def test_figure_3_and_4_of_the_paper():
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_the_descent_comes_down_a_bowl_of_any_size(scale):
-    """Its first step is of length 1, and here too far."""
+    """Its first step has the length 1, which is too far here."""
 
     class Bowl:
         def fields(self, a):

@@ -76,7 +76,7 @@ def test_nodes_take_means_over_the_domain(ends):
 
 @pytest.mark.parametrize("short", [0.02, 0.1, 0.2])
 def test_beside_a_short_end_the_boundary_turns_back_nowhere(short):
-    """The spline does, so its azimuth does not say how far out the boundary is."""
+    """The spline itself does turn back, so an azimuth alone does not say how far out it is."""
     ends = circle(SIXTH) * np.array([1, 1, short, 1, 0.6, 1])[:, None]
     domain = closed_spline_domain(ends, 1.0)
     radii = np.linalg.norm(domain.boundary(3600), axis=1)
@@ -138,7 +138,7 @@ def test_the_domain_of_scattered_contacts_is_their_hull():
 
 
 def cut(angles, distance):
-    """Ends of half curves of length 1 on what ends at x = distance, and which of them end there."""
+    """Ends of half curves of length 1 on a surface that ends at x = distance, and which of them end there."""
     ends = circle(angles)
     ahead = np.cos(np.radians(angles))
     is_cut = ahead > distance
@@ -166,7 +166,7 @@ def test_the_domain_ends_where_the_surface_does(distance, turn):
 def test_beside_no_brink_the_boundary_is_round():
     ends, brinks = cut(SIXTH, 0.3)
     domain, round_one = closed_spline_domain(ends, 1.0, brinks), closed_spline_domain(ends, 1.0)
-    turns = np.radians(np.arange(120, 241))  # where no end is one
+    turns = np.radians(np.arange(120, 241))  # where no end is a brink
     places = np.column_stack([np.cos(turns), np.sin(turns)])
     radii = np.linalg.norm(domain.points_at(places), axis=1)
     assert radii == pytest.approx(1.0, abs=0.01)

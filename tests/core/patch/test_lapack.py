@@ -28,7 +28,7 @@ def test_refuses_what_is_not_positive_definite(run):
 
 
 def test_one_thread_during_a_call_and_as_many_as_before_afterwards():
-    # pip's scipy, which releases ship, has an OpenBLAS of its own; were it renamed, nothing else would tell.
+    # pip's scipy, which releases ship, has an OpenBLAS of its own; only this test tells if it is renamed.
     get, set_to = lapack._threads()
     before = get()
     set_to(2)

@@ -112,7 +112,7 @@ def test_closest_points_beat_every_point_of_a_fine_net():
 
 
 def test_distances_to_a_cylinder_are_known():
-    """0 on the patch, the height above its straight line, and none of none."""
+    """They are 0 on the patch and the height above its straight line; no points have no distances."""
     patch = MongePatch(-0.05, 0.0, np.empty(0))
     assert distances(patch, np.column_stack([X, Y, patch.height(X, Y)])) == pytest.approx(0.0, abs=1e-15)
     assert distances(patch, [[0.0, 3.0, 2.0]]) == pytest.approx([2.0])
@@ -157,7 +157,7 @@ def test_closest_points_are_found_from_far_above_and_from_nearly_the_center_of_c
 
 
 def test_closest_points_of_a_steep_trough():
-    """Where the Hessian of the distance is no bowl, the step is that of the tangent plane."""
+    """Where the Hessian of the distance is not positive definite, the tangent plane gives the step."""
     patch = MongePatch(-8.0, 2.0, np.empty(0))
     points = np.random.default_rng(3).uniform(-2.0, 2.0, (100, 3))
     ours, theirs = distances(patch, points), []

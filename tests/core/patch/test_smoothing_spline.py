@@ -11,7 +11,7 @@ HALF = 1.3
 
 
 def wavy(x, y):
-    """Heights and slopes of a surface that no quadric is."""
+    """Heights and slopes of a surface that is no quadric."""
     z = 0.2 * x**2 - 0.1 * x * y + 0.1 * np.sin(2.0 * x + y)
     slope = 0.2 * np.cos(2.0 * x + y)
     return z, 0.4 * x - 0.1 * y + slope, -0.1 * x + 0.5 * slope
@@ -40,7 +40,7 @@ def told(coefficients, x, y):
 
 
 def misses(spline, height, rng):
-    """What the spline is off, and the deviations of the nearest knots."""
+    """How far the spline is off at random points, and the deviations at the knots nearest to these."""
     x, y, _ = touched(height, rng, 200)[0].T
     off = told(spline.coefficients, x, y)[0] - height(x, y)[0]
     knots = np.rint((np.array([x, y]) / HALF + 1.0) * 0.5 * (SIDE - 1)).astype(int)

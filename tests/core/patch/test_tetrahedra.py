@@ -11,11 +11,11 @@ from core.exploration.side_by_side import result_of
 from core.patch.tetrahedra import crossed_twice, cut, split, tetrahedra_of
 from tests import solids
 
-APART = 0.8  # of the centers of two unit balls from the plane between them
+APART = 0.8  # how far the centers of two unit balls are from the plane between them
 
 
 def lens(points, sign=1.0):
-    """The field of what is in both of two balls, whose rim is sharp; with -1, of a hollow like it."""
+    """The field of the lens that two balls share, whose rim is sharp; with -1, of a hollow like it."""
     off = points[:, None] + APART * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     away = np.linalg.norm(off, axis=2)
     wall = (np.arange(len(points)), away.argmax(axis=1))
@@ -38,7 +38,7 @@ def volumes(points, tetrahedra):
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("edge", [0.03, 0.04, 0.1])
 def test_a_sharp_rim_has_no_holes(edge, sign, monkeypatch):
-    """Near a sharp rim a wall, or of a hollow the gap, is thinner than any edge."""
+    """Near a sharp rim the wall of the lens, or the gap of the hollow, is thinner than any edge."""
     size = meshing.CELL * edge
     points, tetrahedra = lattice(size)
     field = lens(points, sign)
@@ -78,7 +78,7 @@ def test_edges_may_be_crossed_twice_where_the_surface_turns_between_their_ends()
     points = np.array([[0.0, 0.0, 0.6], [0.0, 0.0, -0.6], [0.0, 0.0, 0.0], [0.3, 0.0, 0.7]])
     field = lens(points)
     found = crossed_twice(np.array([[0, 1, 2, 3]]), points, field.distance, field.normal)
-    assert found.tolist() == [[0, 1], [1, 3]]  # not to the point inside, not beside each other
+    assert found.tolist() == [[0, 1], [1, 3]]  # no edge to the point inside, and none between neighbors
 
 
 def test_a_wall_that_may_be_an_error_of_the_field_splits_nothing(monkeypatch):

@@ -46,7 +46,7 @@ PATCHES = {
 
 
 def deviations(patch, points, triangles, steps=9):
-    """Between triangles and patch, in height, at a dense set of points of each."""
+    """How far triangles are off the patch, in height, at a dense set of points of each."""
     shares = [(i, j, steps - i - j) for i in range(steps + 1) for j in range(steps + 1 - i)]
     x, y, z = np.einsum("wk,tkd->dtw", np.array(shares) / steps, points[triangles])
     return np.abs(patch.height(x, y) - z)
@@ -65,7 +65,7 @@ def boundary_tree(domain):
 
 
 def faces(triangles):
-    """The triangles, whatever their order and that of their corners."""
+    """Sorted numbers of triangles, which do not depend on the order of triangles and of corners."""
     return np.sort(np.sort(triangles, axis=1) @ [10**12, 10**6, 1])
 
 
@@ -91,7 +91,7 @@ def test_a_mesh_is_as_near_as_asked_and_has_no_slivers(patch, domain, tolerance)
     assert deviations(patch, points, triangles).max() <= tolerance
     assert angles(points, triangles).min() > LEAST_ANGLE
     assert np.array_equal(np.unique(triangles), np.arange(len(points)))
-    # The rim: on the boundary, nowhere off it, and around the whole of the domain.
+    # The rim has its vertices and its edges on the boundary and goes around the domain once.
     rim = rim_of(points, triangles)
     azimuths = np.arctan2(*rim.T[::-1])
     assert np.count_nonzero(np.diff(azimuths, append=azimuths[0]) < 0.0) == 1
@@ -111,7 +111,7 @@ def test_a_plane_has_few_triangles_and_a_tight_saddle_many():
     }
     assert counts["plane"] < 600
     assert counts["plane"] < 0.5 * counts["saddle"] < 0.2 * counts["tight"]
-    # Four times as near takes four times as many, where it is curved.
+    # Where a patch is curved, a quarter of the tolerance takes four times as many triangles.
     fine = len(patch_mesh(PATCHES["quartic"], DOMAINS["even"], 2.5e-4)[1])
     assert fine == pytest.approx(4.0 * counts["quartic"], rel=0.3)
 

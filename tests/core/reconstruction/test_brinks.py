@@ -70,7 +70,7 @@ def test_strokes_beyond_an_edge_are_none_of_the_patch():
 
 @pytest.mark.parametrize("surface", [surfaces.sphere(25), surfaces.torus(40, 20, 0.6)], ids=["ball", "torus"])
 def test_a_surface_that_goes_on_has_no_brinks(surface):
-    """Where it only turns away, or is left for what a fit explains."""
+    """Long curves end where it turns away, which is no brink."""
     for extent in (8.0, 60.0):
         r = surface.fit(surface.track(surfaces.TILTED, extent=extent))
         assert r.domain.brinks is None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Anything into core: a result of finite numbers with a status, or a sentence that names what is wrong.
+"""core with any input: it gives finite numbers and a status, or a sentence that names what is wrong.
 
 Data that is random throughout is refused at once and finds little, so most of it is contours of true
 surfaces with one thing broken. `pytest --hypothesis-show-statistics` says how many reach a patch.
@@ -145,8 +145,8 @@ def examine(r):
     event(f"patch, {r.status}")
 
 
-# What is broken. Each changes a touch in place: a dict of point, outward, curves (arrays), of keyword
-# arguments for each Contour, and of options for reconstruct.
+# Each of these functions breaks one thing of a touch, in place. A touch is a dict of point, outward, curves
+# (arrays), keyword arguments for each Contour, and options for reconstruct.
 
 
 def nothing(draw, touch):
@@ -261,7 +261,7 @@ def number_kind(draw, touch):
 
 
 def contour_option(draw, touch):
-    """What else is said of a contour."""
+    """An odd keyword argument of each Contour."""
     name = draw(st.sampled_from(["plane_normal", "normals", "noise", "stops"]))
     values = {
         "plane_normal": ODD_VECTORS,
@@ -275,7 +275,7 @@ def contour_option(draw, touch):
 
 
 def option(draw, touch):
-    """An argument of reconstruct that is no good, or as good as."""
+    """An odd argument of reconstruct, valid or not."""
     name = draw(
         st.sampled_from(["outward", "point", "method", "solver", "degree", "noise", "weight", "curves"])
     )
@@ -344,7 +344,7 @@ def test_a_touch_with_one_thing_broken(touch):
 @given(touches())
 @in_time
 def test_many_touches_with_one_of_them_broken(touch):
-    """The broken one is what it is alone, and does the others no harm."""
+    """The broken one gives what it gives alone, and does the other no harm."""
     contours = refused(contours_of, touch)
     if contours is None:
         return
@@ -371,7 +371,7 @@ def test_many_touches_with_one_of_them_broken(touch):
         assert is_sentence(found), found
         return
     examine(found)
-    # In doubt, rounding may choose between two surfaces.
+    # Where a fit is in doubt, rounding may decide between two surfaces.
     if alone.status == "ok" == found.status and alone.method == "bayes":
         x, y = alone.domain.grid(60)[0].T
         turn = found.frame.axes.T @ alone.frame.axes
@@ -414,7 +414,7 @@ def test_arbitrary_measured_normals(shape, planes, data):
 
 
 def odd_hits(point, normal):
-    """What a surface might answer, beside the right answer."""
+    """What a surface might answer in place of the right answer."""
     unit = st.floats(0.0, 6.3).map(lambda a: (math.cos(a), 0.6 * math.sin(a), 0.8 * math.sin(a)))
     near = st.tuples(*[st.floats(-5.0, 5.0).map(lambda d, x=x: x + d) for x in point])
     return st.one_of(
@@ -437,13 +437,13 @@ def bad_hits(point, normal):
 
 
 class OddSurface:
-    """A true surface that answers some of the rays as it likes, by one of these strategies."""
+    """A true surface that answers every `rarely`-th ray with what `hits` draws."""
 
     def __init__(self, shape, data, rarely, hits):
         self.shape, self.data, self.rarely, self.hits, self.count = shape, data, rarely, hits, 0
 
     def ray_cast(self, origin, direction, distance):
-        with np.errstate(all="ignore"):  # far away
+        with np.errstate(all="ignore"):  # odd answers lead rays far away
             hit = self.shape.ray_cast(origin, direction, distance)
         self.count += 1
         if self.count % self.rarely or self.count > 60:

@@ -47,8 +47,9 @@ from core.contours.local_geometry import surface_normals
     ids=["plane", "sphere", "cylinder", "torus outer", "torus inner", "ellipsoid", "bottle neck", "quartic"],
 )
 def test_exact_surfaces_of_paper_size(surface, method, planes):
-    """The errors these methods have on 12 mm patches: 2 % of the radius, 2.5 % on the sphere, whose rim least
-    |K| flattens, 4 % where the ellipsoid's radius is down to 18 mm; the curvatures to 0.0025 / mm."""
+    """The bounds are these methods' errors on 12 mm patches: 2 % of the radius, 2.5 % on the sphere, whose
+    rim the least |K| flattens, 4 % where the ellipsoid's radius is down to 18 mm. Curvatures are as good as
+    0.0025 / mm."""
     contours = surface.track(planes)
     r = surface.fit(contours, method=method)
     flattened = method == "tagc" and surface.k2 - surface.k1 < 1e-6 and surface.k2 < 0.0
@@ -63,7 +64,7 @@ def test_exact_surfaces_of_paper_size(surface, method, planes):
 
 
 def test_a_quartic_along_its_own_curves_is_seen_by_least_squares_in_the_true_frame():
-    """Three curves hide three of the nine directions, whatever the noise: the condition number tells."""
+    """Three curves hide three of the nine directions even without noise, and the condition number tells."""
     s = surfaces.quartic()
     five = surfaces.planes((5, 41, 77, 113, 149))
     contours = s.track(five, extent=12, step=0.1)
@@ -118,7 +119,7 @@ def test_rotating_scaling_and_moving_the_data_moves_the_result(method, scale):
     )
     assert other.domain.area == pytest.approx(scale**2 * one.domain.area)
     if method == "least-squares":
-        # Its blind directions multiply rounding by the condition number, 1e4: on the data it is the same.
+        # Blind directions multiply rounding by the condition number, 1e4: it is the same only on the data.
         x, y = one.contacts[:, :2].T
     else:
         x, y = one.domain.grid(100)[0].T
@@ -142,7 +143,7 @@ def test_umbilics_turn_with_the_data_too(surface):
 
 
 def test_distances_of_mesh_vertices_over_the_domain():
-    """A ball's far side and its inner wall lie over the domain too, but are not the patch's."""
+    """A ball's far side and its inner wall lie over the domain too, but are no part of the patch."""
     ball = surfaces.sphere(25)
     contours = ball.track(UPRIGHT, extent=8, step=0.8)
     r = ball.fit(contours, weight=1e5)
@@ -333,7 +334,7 @@ def test_an_outward_direction_that_the_surface_turns_away_from_is_refused():
     tangents = curves_through(*stacked(p[None], [curves])).tangents[0]
     begins, ends = surface_normals(tangents, surface.normal), surface.fit(curves).frame.axes[:, 2]
     assert 1e-6 < np.linalg.norm(begins - ends) < 1e-2
-    # On the side of the one normal, and not on that of the other.
+    # Either direction is on the side of one of the two normals and not on that of the other.
     for outward in (begins - ends, ends - begins):
         with pytest.raises(DegenerateCurvesError, match="faces away from the outward direction"):
             reconstruct(p, curves, outward=outward)

@@ -86,7 +86,7 @@ KEYS = sorted(set(to_dict(RESULTS[0])) - {"status", "message"})
 @pytest.mark.parametrize("value", [None, "ball", float("nan"), [], {}, [[1.0]], [{}], -1], ids=str)
 def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
     if (key == "converged" and value is not None) or (key == "taps" and value is None):
-        return  # any value is true or not, and there may be no taps
+        return  # `converged` takes any value as true or false, and `taps` may be missing
     with pytest.raises(ValueError, match=r": expected "):
         from_dict(damaged([key], value))
 

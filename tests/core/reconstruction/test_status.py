@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When a patch is in doubt, that it says so, why, and what to do; and that it does not where all is well."""
+"""A patch that is in doubt says so, why, and what to do; one of which all is well does not."""
 
 from dataclasses import replace
 
@@ -113,7 +113,7 @@ def test_misses_are_distances_across_the_curve_with_their_scatter():
     distances, stds = np.mean(found, axis=0).T
     assert distances[0] == pytest.approx(0.05, abs=0.002)
     assert np.std(np.array(found)[:, 0, 0]) == pytest.approx(stds[0], rel=0.2)
-    assert (distances[2], stds[2]) == (0.0, 0.0)  # too few to tell
+    assert (distances[2], stds[2]) == (0.0, 0.0)  # two contacts are too few to tell
 
 
 def test_principal_directions_that_may_be_far_off():
@@ -154,7 +154,7 @@ def test_the_angle_told_is_a_quantile_of_the_posterior(surface, degrees):
 
 
 def cut_short(contours, point):
-    """The first of them reaches a fifth of the extent."""
+    """These contours, but the first reaches only a fifth of the extent."""
     near = np.linalg.norm(contours[0].points - point, axis=1) < 0.2 * EXTENT + 0.1
     return [Contour(contours[0].points[near], noise=contours[0].noise), *contours[1:]]
 
@@ -239,7 +239,7 @@ def test_single_precision_far_from_the_origin_is_refused_and_near_it_taken():
 
 
 def with_misses(r, misses, **more):
-    """That reconstruction, of curves that pass the point at these distances."""
+    """That reconstruction as if its curves passed the point at these (distance, deviation)."""
     found = replace(r, **more)
     vars(found)["misses"] = np.array(misses)
     return found
@@ -255,7 +255,7 @@ def test_a_curve_may_miss_the_point_by_half_a_percent_of_the_radius_or_five_devi
     misses = np.zeros((3, 2))
     misses[2] = share * r.radius, std * r.radius
     assert (with_misses(r, misses).status == "uncertain") == doubt
-    # A contact's noise is the least that curves scatter by, but for a third.
+    # The deviation of a miss is at least a third of a contact's noise.
     far = [[0.01 * r.radius, 0.0]] * 3
     assert with_misses(r, far, noise=0.01).status == "ok"
     assert with_misses(r, far, noise=0.006).status == "uncertain"

@@ -28,7 +28,7 @@ SURFACES = surfaces.FIVE
 
 @cache
 def wiped(name, count, rows=0, extent=EXTENT):
-    """About so many contacts (n, 3) on a surface around its point: anywhere, or in so many rows."""
+    """About `count` contacts (n, 3) on a surface around its point, anywhere or in `rows` rows."""
     surface, rng = SURFACES[name], np.random.default_rng(count + rows)
     flat = rng.uniform(-1.0, 1.0, (count, 2))
     if rows:
@@ -49,7 +49,7 @@ def crossed(name, **options):
 
 
 def judged(surface, r):
-    """The mean error over the domain, and the share of it that the 90 % interval holds."""
+    """The mean error over the domain, and the share of it where the 90 % interval holds."""
     points, heights = surfaces.heights_over(surface, r, 200)
     off = np.abs(r.height(*points.T) - heights)
     return off.mean(), (off < 1.645 * r.height_std(*points.T)).mean()
@@ -92,7 +92,7 @@ def test_intervals_of_strokes_alone_hold_and_rows_do_not_bias(count, rows, share
             within.append(judged(surface, r)[1])
             mean, true = 0.5 * (r.patch.k1 + r.patch.k2), 0.5 * (surface.k1 + surface.k2)
             steepness.append((mean - true) / r.mean_curvature_std)
-    # Few contacts, and means better than a polynomial is taken to describe a surface, leave intervals wide.
+    # Intervals are wide where contacts are few, or where means are better than a polynomial is trusted to be.
     assert 0.8 <= np.mean(within) <= (0.97 if (count, share) == (3000, 0.02) else 1.0)
     assert abs(np.mean(steepness)) < 4.0 / np.sqrt(len(steepness))
 
@@ -247,7 +247,7 @@ def test_means_of_neighbors_lie_on_a_quartic_and_take_all_contacts():
     few, size = means(contacts[: STRIPS**2], ALONG)
     assert size == 1
     assert np.array_equal(few, contacts[: STRIPS**2])
-    # All in one place, or in one row, are no other case.
+    # Contacts that are all in one place are no special case.
     assert np.isfinite(means(np.zeros((5000, 3)), ALONG)[0]).all()
 
 
@@ -317,7 +317,7 @@ def test_a_stroke_may_be_a_contour_and_brings_its_noise():
 
 
 def test_a_mean_takes_in_several_rows():
-    """Contacts that follow each other are off by one offset: of a row alone no mean would tell it."""
+    """All contacts of a row may share an offset, which the mean of one row alone would keep."""
     rng = np.random.default_rng(0)
     for rows, most in ((12, LEAST_STRIPS), (100, STRIPS)):
         x, y = np.meshgrid(np.linspace(-1.0, 1.0, 100), np.linspace(-1.0, 1.0, rows))

@@ -100,7 +100,7 @@ def test_contours_are_found_on_a_shape_without_symmetry():
 
 
 def test_the_residual_is_the_distance_of_the_contacts_to_the_mesh():
-    """On a ball's mesh a contact is as far from it as the facets are from the sphere, where it is right."""
+    """The mesh is a ball of another radius than the one that was touched, so contacts stay off it."""
     directions, faces = ball(2000)
     r = touch(surfaces.sphere(25.0))
     pose = register(r, 26.0 * directions, faces)[0]
@@ -130,7 +130,7 @@ def test_an_ellipsoid_has_four_places_as_good():
 
 
 def tube(sides, rings, long):
-    """A cylinder of radius 20 around z, open, of as many facets."""
+    """An open cylinder of radius 20 around z, with `sides` facets around it and `rings` rings of vertices."""
     turn, z = 2.0 * np.pi / sides * np.arange(sides), np.linspace(-long / 2.0, long / 2.0, rings)
     vertices = np.array([[20.0 * np.cos(t), 20.0 * np.sin(t), h] for h in z for t in turn])
     i, k = (a.ravel() for a in np.meshgrid(np.arange(sides), sides * np.arange(rings - 1)))
@@ -187,7 +187,7 @@ def test_a_pose_turns_moves_and_scales_with_the_mesh():
 
 
 def test_of_two_walls_the_normals_choose():
-    """A shell of 1 mm, whose inner wall is the outer one's likeness."""
+    """A shell of 1 mm, whose inner wall has the shape of the outer one."""
     surface, vertices, faces = bumpy()
     shell = np.vstack([vertices, 0.96 * vertices]), np.vstack([faces, faces[:, ::-1] + len(vertices)])
     for factor, side in ((1.0, 1.0), (0.96, -1.0)):
@@ -207,7 +207,7 @@ def test_noise_moves_a_pose_by_no_more_than_itself():
     assert place < 0.5
     assert angle < 2.0
     assert 0.07 < pose.residual < 0.13
-    # Noise in the mesh, a tenth of its edges' length, is found to be noise.
+    # Noise in the mesh, a tenth of the length of its edges, hardly moves the pose either.
     scanned = vertices + np.random.default_rng(1).normal(0.0, 0.1, vertices.shape)
     place, angle = off(register(r, scanned, faces)[0], r, surface.point)
     assert place < 0.5
@@ -255,7 +255,7 @@ def test_few_triangles_are_enough():
 def test_noise_shifts_a_pose_by_a_20th_of_the_radius_or_turns_it_by_2_degrees(
     monkeypatch, turning, shifting, slides
 ):
-    """Distances grow by so many times three least residuals where contacts turn or shift."""
+    """At these limits distances grow by `turning` or `shifting` times three least residuals."""
     growth = np.repeat([turning / np.radians(2.0), shifting / 0.05], 3) * 3e-3
     monkeypatch.setattr(
         pose_search, "mesh_distances", lambda *_: (np.zeros((1, 6, 1)), np.diag(growth)[None])
@@ -281,7 +281,7 @@ def test_the_coarse_search_forgives_a_tilt_and_a_shift_along_the_normal_and_noth
 
 
 def test_the_polynomials_of_the_coarse_search_are_of_one_side_of_a_thin_sheet():
-    """Two paraboloids of which one faces up and one down."""
+    """Two bent sheets, of which one faces up and one down."""
     points = np.array(np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-2, 2, 41))).reshape(2, -1).T
     heights = np.concatenate([0.05 + 0.1 * points[:, 0] ** 2, -0.05 + 0.3 * points[:, 1] ** 2])
     top, (x, y) = np.repeat([True, False], len(points)), np.tile(points, (2, 1)).T

@@ -11,7 +11,7 @@ from core.scan import sampling
 
 @pytest.mark.parametrize("spacing", [0.1, 0.2, 0.4])
 def test_the_count_of_spaced_points_is_known_before_they_are_chosen(spacing):
-    """Points all over the unit sphere; a disk of the spacing bends away from it by little."""
+    """Points all over the unit sphere; this is nearly flat over a disk as wide as the spacing."""
     rng = np.random.default_rng(0)
     points = rng.normal(size=(60_000, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
@@ -46,7 +46,7 @@ def test_scattered_points_are_even_by_area_and_on_their_faces():
     expected = len(flat) / 9.0
     assert (
         (counts - expected) ** 2 / expected
-    ).sum() < 26.1  # chi squared of eight, beyond which one in 1000 is
+    ).sum() < 26.1  # one in 1000 of chi squared with 8 degrees of freedom is larger
     y, z = found[upright, 1] / 2.0, found[upright, 2]
     assert min(y.min(), z.min()) >= 0.0 and (y + z).max() <= 1.0 + 1e-12
     assert abs(y.mean() - 1.0 / 3.0) < 0.03 and abs(z.mean() - 1.0 / 3.0) < 0.03

@@ -58,7 +58,7 @@ def seen(r, surface, vertices, normals):
 
 
 class Cut:
-    """What is of a surface on one side of a plane; with `roof`, something over the rest as well."""
+    """The part of a surface on one side of a plane; with `roof`, all of it, and a layer over the rest."""
 
     def __init__(self, surface, origin, direction, roof=None):
         self.surface, self.origin, self.direction, self.roof = surface, origin, direction, roof
@@ -126,7 +126,7 @@ def test_further_contours_see_what_the_contours_do_not():
     r = replace(touched(flat), geometry=geometry, contours=(Contour(_line_points()),))
     found = verify(r, flat, np.empty((0, 3)))
     assert found["fit_error"] == pytest.approx(0.0, abs=1e-12)
-    # |z| is a r^3 |sin 3t|, at 15, 30 and 45 degrees between the curves, at a twelfth of the radius and on.
+    # |z| is a r^3 |sin 3t|, here at 15, 30 and 45 degrees from a curve and at each twelfth of the radius.
     rim = np.array([r.domain._radius(np.radians([t]))[0] for t in (15, 30, 45)])
     steps = [
         EXTENT / 12.0 * np.arange(1, np.floor(12.0 * length / EXTENT * (1 + 1e-5)) + 1) for length in rim
@@ -176,7 +176,7 @@ def test_half_of_the_mesh(name):
         half = Cut(surface, r.frame.origin + 1e-6 * direction, direction)
         found = verify(r, half, np.empty((0, 3)))
         assert found["overlap"] == pytest.approx(0.5, abs=0.03)
-        assert (found["extra_contours"], found["extra_points"]) == (0, 0)  # none at the reference point
+        assert (found["extra_contours"], found["extra_points"]) == (0, 0)  # the point is off the mesh
         found = verify(r, Cut(surface, r.frame.origin - 1e-6 * direction, direction), np.empty((0, 3)))
         assert found["overlap"] == pytest.approx(0.5, abs=0.03)
         assert found["extra_contours"] == 9
