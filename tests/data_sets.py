@@ -44,7 +44,7 @@ def _write_grid(path, points, i, j, n, rings):
 
 
 def blocks_of(folder, parts="touches"):
-    """The files of touches, or surfaces, by name."""
+    """The files of touches, or of surfaces, sorted by name."""
     return sorted((Path(folder) / parts).glob("[!.]*.parquet"))
 
 

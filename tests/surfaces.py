@@ -96,7 +96,7 @@ def plane():
 
 
 def ellipsoid(a, b, c, u=0.0, v=0.0):
-    """It has semi-axes a, b, c and is touched at longitude u, latitude v; K and H are the textbook's."""
+    """An ellipsoid of semi-axes a, b, c, touched at longitude u, latitude v; K and H are the textbook's."""
     axes2 = np.array([a, b, c]) ** 2
     p = np.array([a * np.cos(u) * np.cos(v), b * np.sin(u) * np.cos(v), c * np.sin(v)])
     s = np.sum((p / axes2) ** 2)
@@ -127,7 +127,7 @@ def cylinder(r):
 
 
 def torus(big, small, angle, outside=1.0):
-    """It is around z, touched at `angle` of the tube, pi being inside. With outside=-1 its hole is solid."""
+    """A torus around z, touched at `angle` of its tube, inside at pi. With outside=-1 its hole is solid."""
     rho = big + small * np.cos(angle)
     kappas = sorted([-outside / small, -outside * np.cos(angle) / rho])
 
@@ -145,7 +145,7 @@ def torus(big, small, angle, outside=1.0):
 
 
 def bottle_neck():
-    """The paper's, with -0.0423 around the neck and 0.0172 along it: the skin of a torus's hole."""
+    """The paper's neck, with kappa -0.0423 around it and 0.0172 along it: the skin of a torus's hole."""
     small = 1.0 / 0.0172
     return torus(small + 1.0 / 0.0423, small, np.pi, outside=-1.0)
 

@@ -55,7 +55,7 @@ def write(path, numbered):
 
 
 def suzanne(bpy):
-    """Makes a scene with her, active, and a copy named Scan; returns the cursor's place on her forehead."""
+    """Makes a scene with Suzanne, active, and a copy named Scan; returns a place on her forehead."""
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.mesh.primitive_monkey_add(size=2.0)
     obj, place = bpy.context.object, (0.32, -0.19, 0.84)

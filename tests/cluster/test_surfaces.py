@@ -23,7 +23,7 @@ AROUND = 1.0  # the radius of the torus; that of its tube is 0.4
 
 
 def whole(folder, *words):
-    """Runs `whole` on the folder "objects" in this one and writes into "set" beside it."""
+    """Runs `whole` on the objects in folder / "objects" and writes into folder / "set"."""
     from cluster.command_line import main
 
     return main(["whole", str(folder / "objects"), *WORDS, "--output", str(folder / "set"), *words])

@@ -51,7 +51,7 @@ def open_tab():
 
 
 def until(reached, seconds=40):
-    """Waits until `reached`, as a window without a graphics card may take its time."""
+    """Waits until `reached()` is true, as a window without a graphics card may take its time."""
     for _ in range(10 * seconds):
         yield 0.1
         if reached():
@@ -203,7 +203,7 @@ SAID = {
 
 
 def disturbed(what, start, is_clean, made, **inputs):
-    """Checks that what a user may do to a target ends touching it all over, of which nothing is left.
+    """Checks that anything a user may do to a target stops the touches all over it, and leaves nothing.
 
     start, is_clean, made : start it with inputs; tell whether it is over without a trace, and what it made
     """

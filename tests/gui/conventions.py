@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: what users expect of any extension.
 
-Search, menus, Adjust Last Operation, presets, grayed-out buttons, the tab, and large letters; every step
-asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
+It checks search, menus, Adjust Last Operation, presets, grayed-out buttons, the tab and large letters. Every
+step asserts on Blender's data and leaves a picture, to be looked at, beside the scene.
 """
 
 import math

@@ -43,7 +43,7 @@ def counts():
 
 
 def cycle(number, before):
-    """One touch, by operator or by probe, taken back, brought again and taken back."""
+    """Makes one touch, by operator or by probe, takes it back, brings it again and takes it back."""
     with in_view():
         place = bpy.context.scene.cursor.location
         if number % 2:
@@ -115,7 +115,7 @@ def own():
 
 
 def enabling():
-    """The first round is as the last, and while disabled the extension is registered nowhere."""
+    """The last round is like the first, and while disabled the extension is registered nowhere."""
     bpy.ops.tactile.pick("EXEC_DEFAULT", True, target="Suzanne", new=True)  # its timer may be waiting
     seen = []
     for _ in range(TIMES):

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: a probe and its patch as Blender's objects.
 
-What undo, playback, moving, deleting and clicking do to them, with a picture after each. TACTILE_SCAN is a
-mesh file to do it to in place of Suzanne, or "million", for a sheet of so many faces.
+It checks what undo, playback, moving, deleting and clicking do to them, with a picture after each.
+TACTILE_SCAN names a mesh file to use in place of Suzanne, or is "million", for a sheet of so many faces.
 """
 
 import math

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in a window of Blender on the scene of make_scene.py: the pictures of docs/viewport.md, taken anew.
 
-They are beside the scene: pick.jpg, probe.jpg and deviation.jpg. verify.py and stability.py
-take verify.jpg and stability.jpg.
+They are beside the scene: pick.jpg, probe.jpg and deviation.jpg. verify.py and stability.py take
+verify.jpg and stability.jpg.
 """
 
 import math

@@ -2,11 +2,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
 
-# run.sh ZIP [CHECK]: checks what only a real Blender can show, with the zip without wheels installed in it: the
-# command line, the example script, the menu entry, probes, verification, whole objects and stability maps by
-# mouse and keyboard in a window, what hundreds of touches leave behind, and installing from a repository.
-# The pictures in build/gui are to be looked at. CHECK runs only the steps with this in their name, such as
-# "random steps". TACTILE_OUT names another folder than build/gui, so that two runs can go on at once.
+# run.sh ZIP [CHECK]: checks what only a real Blender can show, with the zip without wheels installed in it:
+# the command line, the example script, the menu entry, probes, verification, whole objects and stability
+# maps by mouse and keyboard in a window, what hundreds of touches leave behind, and installing from a
+# repository. The pictures in build/gui are to be looked at. CHECK runs only the steps with this in their
+# name, such as "random steps". TACTILE_OUT names another folder than build/gui, so that two runs can go on
+# at once.
 set -euo pipefail
 [ $# = 1 ] || [ $# = 2 ] || { echo "usage: run.sh ZIP [CHECK]" >&2; exit 2; }
 only=${2:-}

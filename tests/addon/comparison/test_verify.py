@@ -200,7 +200,7 @@ def test_a_mesh_that_contradicts_the_patch_is_a_doubt_with_a_warning(empty, patc
     at = positions(ball.data)
     away = np.linalg.norm(at - np.array(patch["tactile"]["frame"]["origin"]), axis=1)
     at *= 1.0 + 0.05 * np.clip(1.0 - away / 0.5, 0.0, 1.0)[:, None]
-    ball.data.vertices.foreach_set("co", at.ravel())  # by the attribute, Blender would keep its old tree
+    ball.data.vertices.foreach_set("co", at.ravel())  # setting the attribute keeps Blender's old tree
     ball.data.update()
     found = verified(empty, patch)
     assert patch["tactile"]["status"] == "uncertain"
@@ -390,7 +390,7 @@ def test_what_changes_while_it_is_compared_ends_it_with_a_sentence(empty, patch,
 
 
 def test_in_steps_it_finds_what_it_finds_at_once(empty, patch, extension):
-    """It does so even where Blender evaluates the mesh again between two steps."""
+    """The result is the same even where Blender evaluates the mesh again between two steps."""
     operator = extension.tactile_addon.comparison.verify_operator
     ball, wanted, done = empty.data.objects["Sphere"], verified(empty, patch), []
     deviation = values(patch.data, "deviation")

@@ -232,7 +232,7 @@ def test_what_was_exported_and_is_read_gives_the_same_patch(
 
 
 def test_comments_that_are_not_ours_say_nothing(contact_file, tmp_path):
-    """They are comments of other programs, of version 1, and below the header."""
+    """The comments are those of other programs, of version 1, and below the header."""
     told = "# point 1 2 3\n# noise 5\n"
     titles = "# made by a robot\n", "# Tactile Patch contacts, version 1, lengths in no unit\n", ""
     for text in (titles[0] + told + PLAIN, titles[1] + PLAIN, titles[2] + told + PLAIN, PLAIN + told):

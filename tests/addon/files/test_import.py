@@ -187,7 +187,7 @@ def test_contacts_in_any_order_are_drawn_along_their_curve(empty, measured):
 
 
 def test_what_a_file_says_of_its_patch_counts_unless_something_else_is_given(empty, measured, tmp_path):
-    """The file names the side that the bulge speaks against, and a point beside where the curves meet."""
+    """The file names the side opposite to the bulge, and a point beside where the curves meet."""
     path = Path(measured(normals=False))
     point, down = SURFACE.point + 0.01 * SURFACE.normal, -SURFACE.normal
     told = "".join(

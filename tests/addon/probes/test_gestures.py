@@ -99,7 +99,7 @@ def test_at_the_end_of_a_gesture_the_patch_is_that_of_a_fresh_touch(empty, ridge
 
 
 def test_a_number_of_an_array_that_is_set_is_answered_once(empty, ridge, gesture, extension, monkeypatch):
-    """Blender tells of it twice; a setting that is as it was is answered where something has happened."""
+    """Blender calls back twice for it. A value set again is answered if something else has changed."""
     handlers, looked = extension.tactile_addon.probes.change_handlers, []
     inner = handlers._look_at
     monkeypatch.setattr(handlers, "_look_at", lambda *given: looked.append(1) or inner(*given))

@@ -64,7 +64,7 @@ def state(patch):
 
 
 def test_a_target_that_is_no_mesh_and_a_scale_that_is_none_are_messages(empty, ball, capfd):
-    """Only the panel keeps a script from setting them."""
+    """A script can set a target that the panel does not offer."""
     probe, patch = pick(empty)
     settings = probe.tactile_probe
     for change, back, message in (
@@ -848,14 +848,14 @@ def test_the_nearest_point_of_a_stretched_object_is_nearest_in_the_world(empty, 
         point, _, distance = surface.project(list(location))
         nearest = tree.find_nearest(location)[3]
         excess.append(distance / nearest - 1.0)
-        assert distance < 1.1 * nearest + 1e-3 * surface.size  # nearer than that is on the surface
+        assert distance < 1.1 * nearest + 1e-3 * surface.size  # smaller distances are not refined
         assert distance == pytest.approx((location - Vector(point)).length, rel=1e-4, abs=1e-6)
     assert np.quantile(excess, 0.95) < 0.01
 
 
 @pytest.fixture
 def counted(extension, monkeypatch):
-    """Counts calls of a function of one of the modules, by its name."""
+    """A function that counts the calls of a function of one of the modules, by its name."""
     calls = {}
 
     def count(module, name):
@@ -897,7 +897,7 @@ def test_what_no_probe_depends_on_costs_none_of_them_anything(empty, ball, count
         counted("probes.touch_again", "_made"),
         counted("probes.change_handlers", "may_be_outdated"),
     )
-    empty.ops.object.empty_add()  # an object more: it is looked at whether all targets are still there
+    empty.ops.object.empty_add()  # with an object more, the handler checks that all targets are there
     assert (calls["is_outdated"], calls["update"]) == (0, 0)
     calls["may_be_outdated"] = looked["_made"] = 0
     other = empty.context.object

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A patch is seen in colors without a button: its viewports, the range of colors, its rim, maps below."""
+"""A patch shows its colors without a button: viewports, the range of colors, its rim, maps below it."""
 
 import math
 

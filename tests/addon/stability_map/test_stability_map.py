@@ -202,7 +202,7 @@ def test_a_bump_between_the_curves_shows_as_error(empty):
 
 
 def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
-    ball.data.attributes.new("error", "BOOLEAN", "FACE")  # the name is taken, and by another type
+    ball.data.attributes.new("error", "BOOLEAN", "FACE")  # the name is taken by another type
     ball.data.materials.append(empty.data.materials.new("Own"))
     before = (ball.data.attributes.keys(), ball.data.materials.keys(), positions(ball.data).tolist())
     faces = [tuple(face.vertices) for face in ball.data.polygons]
@@ -220,7 +220,7 @@ def test_the_copy_has_its_attributes_and_the_target_is_untouched(empty, ball):
     assert np.array(painted.matrix_world) == pytest.approx(np.array(ball.matrix_world), abs=1e-5)
     assert empty.context.view_layer.objects.active == painted
     mesh = painted.data
-    assert len(mesh.polygons) == 4 * len(ball.data.polygons) - 128 * 2  # of a quad four, of a triangle three
+    assert len(mesh.polygons) == 4 * len(ball.data.polygons) - 128 * 2  # quads make four, triangles three
     for name in QUANTITIES:
         assert mesh.attributes[name].data_type == "FLOAT"
         assert np.isfinite(values(mesh, name)).all()

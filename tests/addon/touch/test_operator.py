@@ -219,7 +219,7 @@ def test_without_a_location_the_cursor_is_projected(empty, ball):
 
 def test_extent_and_step_suit_the_object_where_they_are_not_given(empty, ball):
     _, report = reconstruct(empty, location=TOP)
-    assert 1.0 <= report["extent"] <= 2.0  # of a ball of radius 2 as much as a finger can see from the top
+    assert 1.0 <= report["extent"] <= 2.0  # half of the size of the ball at most
     # Contacts are some of those that were felt, so they may be somewhat nearer to each other.
     assert report["extent"] / 16.0 < report["step"] < 1.001 * report["extent"] / 12.0
     assert report["vertex_distance_max"] < 0.02 * report["radius"]
@@ -525,7 +525,7 @@ def test_with_nothing_active_the_operator_asks_for_a_mesh(empty):
 
 
 def test_all_curves_ending_at_once_leave_nothing(empty):
-    """The tip of a needle: no curve gets anywhere."""
+    """At the tip of a needle no curve gets anywhere."""
     empty.ops.mesh.primitive_cone_add(radius1=0.2, depth=4.0)
     before = datablocks(empty)
     with pytest.raises(
@@ -536,7 +536,7 @@ def test_all_curves_ending_at_once_leave_nothing(empty):
 
 
 def test_a_plane_that_misses(empty):
-    """A thin strip: the curves across it end at its border at once."""
+    """Curves across a thin strip end at its border at once."""
     empty.ops.mesh.primitive_plane_add(size=2.0)
     empty.context.object.scale.y = 0.01
     with pytest.raises(RuntimeError, match="no contact"):

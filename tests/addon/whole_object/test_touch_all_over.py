@@ -131,7 +131,7 @@ def test_a_scaled_object_is_touched_as_it_is(empty, ball, scale):
 
 
 def test_another_process_touches_the_same(files):
-    """It does to the last bit, in any order of sets. The ball is a file, as the faces of new spheres vary."""
+    """All bits are the same, in any order of sets. The ball is a file, as the faces of new spheres vary."""
     code = (
         "import sys, bpy, addon_utils; addon_utils.enable('bl_ext.user_default.tactile_patch');"
         "from bl_ext.user_default.tactile_patch.tactile_addon import command_line;"

@@ -308,7 +308,7 @@ def test_edges_in_steps_are_the_edges(ring):
 
 @pytest.mark.parametrize("answer", [None, False])
 def test_false_while_patches_are_joined_ends_the_touching(answer, monkeypatch):
-    """Otherwise patches less certain than the tolerance are touched again: here always the first three."""
+    """Any other answer has patches in doubt touched again, which are the first three here."""
     monkeypatch.setattr(Charts, "less_certain_than", lambda charts, tolerance: [0, 1, 2])
     solid, joins = solids.ball(), False
     steps = core.touch_all_over(solid, solid.start, solid.outward, tolerance=8e-3, noise=8e-3, rng=0)

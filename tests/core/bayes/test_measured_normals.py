@@ -179,7 +179,7 @@ def test_slopes_are_the_derivatives_of_the_heights():
 
 
 def test_without_slopes_both_likelihoods_are_one():
-    """They agree except for the weak prior of the free terms."""
+    """The likelihoods agree except for the weak prior of the free terms."""
     rng = np.random.default_rng(4)
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
     weights, nothing = np.ones((1, 60)), np.zeros((1, 27))

@@ -213,7 +213,7 @@ def test_thousands_of_contacts_suggest_a_plane():
     s = surfaces.pear()
     contours = track(s, s.point, s.normal, THREE, extent=12, step=0.02)
     r = reconstruct(s.point, contours, outward=s.normal)
-    assert 200 < len(r.contacts) <= 300  # means of 3600
+    assert 200 < len(r.contacts) <= 300  # they are means of 3600 contacts
     assert 0.0 < suggest_plane(r)[1] < r.mean_height_std
 
 
@@ -440,7 +440,7 @@ def test_the_suggested_plane_is_measured_as_the_contours_were_tracked():
 
 @pytest.mark.parametrize("step", [1.0, 4.0, 0.25])
 def test_what_is_expected_of_a_plane_is_the_posterior_with_its_contacts_added(step):
-    """It has as many contacts as each curve; in place of more than 24, it has 24 means with less noise."""
+    """The plane has as many contacts as each curve, or in place of more than 24, 24 means with less noise."""
     s = surfaces.torus(40, 20, 0.6)
     r = s.fit(s.track(THREE, step=step, noise=0.05, rng=1))
     plane, expected = suggest_plane(r)

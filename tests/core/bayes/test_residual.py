@@ -173,7 +173,7 @@ def test_grid_points_that_are_not_tried_would_change_nothing(monkeypatch):
 
 
 def test_the_point_is_a_contact_like_the_others():
-    """On a rough surface, as at a vertex of a mesh, it may be off the surface around it like any contact."""
+    """On a rough surface, as at a vertex of a mesh, the point may be off what is around it as they are."""
     _, r = touched()
     noise = r.radius * r.residual.noise
     assert abs(r.height(0.0, 0.0)) < 3.0 * noise
@@ -349,7 +349,7 @@ def test_the_derivatives_of_a_surface_with_a_residual_are_those_of_its_height_in
 
 
 def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
-    """They agree up to the constant of 2 pi, with a residual of any size and without one."""
+    """The likelihoods agree up to the constant of 2 pi, with a residual of any size and without one."""
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     basis, heights = monomials(*flat.T, TERMS), rough(3)(flat)
     noises = np.array([1e-3, 2e-3, 4e-3])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contours of very many contacts, with noise in all directions: fits are no worse than of few."""
+"""Contours of very many contacts, with noise in all directions: fits are no worse than with few contacts."""
 
 from functools import cache
 

@@ -20,7 +20,7 @@ UP = (0.0, 0.0, 1.0)
 
 
 class Sector:
-    """A plane without what is between two radii and two azimuths, crossed by no curve; a floor or none."""
+    """A plane that lacks a sector between two radii, which no curve crosses; there may be a floor instead."""
 
     def __init__(self, floor, nearest=3.0, farthest=math.inf, azimuths=(15.0, 45.0)):
         self.floor, self.radii, self.azimuths = floor, (nearest, farthest), np.radians(azimuths)
@@ -48,7 +48,7 @@ def explore(surface, point=(0.0, 0.0, 0.0), outward=UP, **more):
 
 
 def mean_error(surface, r):
-    """The mean |dz| over the domain, against the plane and, where that lacks, against the floor."""
+    """The mean |dz| over the domain, against the plane and, where it is missing, against the floor."""
     points, weights = r.domain.nodes
     x, y, z = r.frame.to_world(np.column_stack([points, r.height(*points.T)])).T
     return weights @ np.abs(z - np.where(surface.lacks(x, y), surface.floor, 0.0))

@@ -74,7 +74,7 @@ def test_8_is_the_integral_of_the_absolute_gaussian_curvature(data_and_domain):
 
 
 def test_total_curvature_of_a_cap_is_the_area_of_its_normals():
-    """It is 2 pi (1 - cos b) if the rim leans by b, where sin b = L / r. Six curves see all of the cap."""
+    """The total is 2 pi (1 - cos b) for a rim that leans by b, sin b = L / r. Six curves see all of it."""
     ball = surfaces.sphere(25)
     planes = surfaces.planes(np.arange(0, 180, 30))
     r = ball.fit(ball.track(planes), method="least-squares")
@@ -110,7 +110,7 @@ def test_least_squares_finds_the_coefficients_that_made_the_data():
 @pytest.mark.parametrize("name", ["saddle", "quartic", "bottle neck"])
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_both_solvers_reach_the_same_surface(name, noise):
-    """They do where (9) has one minimum. On convex surfaces it has several."""
+    """These surfaces have one minimum of (9). Convex ones have several."""
     surface = PAPER_SIZE[name]
     contours = surface.track(surfaces.UPRIGHT, noise=noise, rng=0)
     fast, descent = (surface.fit(contours, method="tagc", solver=s) for s in ("fast", "descent"))
@@ -178,7 +178,7 @@ def test_on_a_cylinder_the_descent_crawls_and_a_step_cap_is_said(monkeypatch):
 
 
 def test_the_start_keeps_to_lines_between_neighboring_half_curves():
-    """It is exact for straight half curves in one plane, as the lines between them lie in that plane."""
+    """The start is exact for straight half curves in one plane, in which the lines between them lie too."""
     angles = np.radians([0, 60, 120, 180, 240, 300])
     half_curves = [np.outer(np.arange(1, 8) / 7, [np.cos(a), np.sin(a), 0.0]) for a in angles]
     start = least_squares.tagc_start(least_squares.problem(0.0, 0.0, 4, np.vstack(half_curves)), half_curves)
@@ -186,7 +186,7 @@ def test_the_start_keeps_to_lines_between_neighboring_half_curves():
 
 
 def test_the_start_of_the_descent_joins_neighboring_half_curves_at_their_quarters():
-    """It joins them contact by contact, as far as the shorter one goes, and the last one with the first."""
+    """The start joins them contact by contact as far as the shorter one goes, and the last with the first."""
     rng = np.random.default_rng(6)
     angles, counts = np.radians([0, 60, 120, 180, 240, 300]), (7, 5, 7, 6, 7, 7)
     halves = [
@@ -206,8 +206,8 @@ def test_the_start_of_the_descent_joins_neighboring_half_curves_at_their_quarter
 def test_figure_3_and_4_of_the_paper():
     """The bottle neck: 57 points with the reference point thrice among them, 0.05 mm noise, nine more curves.
 
-    The paper finds: unconstrained 0.0461 mm on the data and 13.0041 mm off it, TAGC 0.0514 and 0.0859 mm;
-    total absolute curvature 16.6 against 0.033.
+    In the paper the unconstrained fit is off by 0.0461 mm on the data and 13.0041 mm off it, TAGC by 0.0514
+    and 0.0859 mm; their total absolute curvatures are 16.6 and 0.033.
     """
     neck = surfaces.bottle_neck()
     touch = {"extent": 11.7, "step": 1.3}
@@ -243,7 +243,7 @@ def test_figure_3_and_4_of_the_paper():
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_the_descent_comes_down_a_bowl_of_any_size(scale):
-    """Its first step has the length 1, which is too far here."""
+    """The first step of the descent has the length 1, which is too far here."""
 
     class Bowl:
         def fields(self, a):

@@ -102,7 +102,7 @@ def test_results_are_compared_and_hashed_by_identity():
 
 @pytest.mark.parametrize("k", [-0.5, 1.5])
 def test_the_total_curvature_of_a_steep_bowl_is_what_its_normals_cover(k):
-    """By Gauss and Bonnet it is 2 pi (1 - 1 / sqrt(1 + k^2)) up to radius 1, where the slope is k."""
+    """By Gauss and Bonnet the total is 2 pi (1 - 1 / sqrt(1 + k^2)) up to radius 1, where the slope is k."""
     ends = [(np.cos(a), np.sin(a)) for a in np.radians(np.arange(0, 360, 30))]
     bowl, disk = MongePatch(k, k, np.empty(0)), closed_spline_domain(ends, 1.0)
     wanted = 2.0 * np.pi * (1.0 - 1.0 / np.sqrt(1.0 + k**2))

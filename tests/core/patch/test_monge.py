@@ -112,7 +112,7 @@ def test_closest_points_beat_every_point_of_a_fine_net():
 
 
 def test_distances_to_a_cylinder_are_known():
-    """They are 0 on the patch and the height above its straight line; no points have no distances."""
+    """Distances are 0 on the patch and the height above its straight line; no points have no distances."""
     patch = MongePatch(-0.05, 0.0, np.empty(0))
     assert distances(patch, np.column_stack([X, Y, patch.height(X, Y)])) == pytest.approx(0.0, abs=1e-15)
     assert distances(patch, [[0.0, 3.0, 2.0]]) == pytest.approx([2.0])

@@ -42,7 +42,7 @@ def beyond(r, count=10_000):
 @pytest.mark.parametrize("distance", [0.003, 0.03, 0.2, 0.5, 0.8])
 @pytest.mark.parametrize("count", [3, 4, 6])
 def test_near_an_edge_no_patch_reaches_beyond_it(flank, distance, count):
-    """Also where the point is less than a step from it, so that some half curves have no contact at all."""
+    """None does even where the point is less than a step from it and some half curves have no contact."""
     rng, point = np.random.default_rng(count), (1.0 - distance, 0.3, 0.0)
     for turn in rng.uniform(0.0, np.pi, 5):
         planes = [core.SamplingPlane(turn + np.pi * i / count) for i in range(count)]
@@ -70,7 +70,7 @@ def test_strokes_beyond_an_edge_are_none_of_the_patch():
 
 @pytest.mark.parametrize("surface", [surfaces.sphere(25), surfaces.torus(40, 20, 0.6)], ids=["ball", "torus"])
 def test_a_surface_that_goes_on_has_no_brinks(surface):
-    """Long curves end where it turns away, which is no brink."""
+    """Long curves end where the surface turns away, which is no brink."""
     for extent in (8.0, 60.0):
         r = surface.fit(surface.track(surfaces.TILTED, extent=extent))
         assert r.domain.brinks is None

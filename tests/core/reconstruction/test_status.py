@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A patch that is in doubt says so, why, and what to do; one of which all is well does not."""
+"""A patch in doubt says so, why, and what to do; a patch without doubt does not."""
 
 from dataclasses import replace
 
@@ -154,7 +154,7 @@ def test_the_angle_told_is_a_quantile_of_the_posterior(surface, degrees):
 
 
 def cut_short(contours, point):
-    """These contours, but the first reaches only a fifth of the extent."""
+    """The contours, of which the first now reaches only a fifth of the extent."""
     near = np.linalg.norm(contours[0].points - point, axis=1) < 0.2 * EXTENT + 0.1
     return [Contour(contours[0].points[near], noise=contours[0].noise), *contours[1:]]
 
@@ -255,7 +255,7 @@ def test_a_curve_may_miss_the_point_by_half_a_percent_of_the_radius_or_five_devi
     misses = np.zeros((3, 2))
     misses[2] = share * r.radius, std * r.radius
     assert (with_misses(r, misses).status == "uncertain") == doubt
-    # The deviation of a miss is at least a third of a contact's noise.
+    # The deviation of a miss is at least 0.3 of a contact's noise.
     far = [[0.01 * r.radius, 0.0]] * 3
     assert with_misses(r, far, noise=0.01).status == "ok"
     assert with_misses(r, far, noise=0.006).status == "uncertain"

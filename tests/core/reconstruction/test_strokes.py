@@ -425,7 +425,7 @@ def test_on_a_plane_d1_points_to_the_farthest_contact():
 
 
 def test_means_of_contacts_on_two_lines_stay_on_the_plane():
-    """They leave most terms of a quartic open, which must not carry the means between them away."""
+    """Two lines leave most terms of a quartic open, which must not carry the means between them away."""
     rng, x = np.random.default_rng(3), np.linspace(-0.6, 0.6, 450)
     lines = [np.column_stack([x, sign * x + rng.normal(0.0, 1e-6, 450), 0.0 * x]) for sign in (1.0, -1.0)]
     contacts = np.vstack(lines)

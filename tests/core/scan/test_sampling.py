@@ -11,7 +11,7 @@ from core.scan import sampling
 
 @pytest.mark.parametrize("spacing", [0.1, 0.2, 0.4])
 def test_the_count_of_spaced_points_is_known_before_they_are_chosen(spacing):
-    """Points all over the unit sphere; this is nearly flat over a disk as wide as the spacing."""
+    """The points are all over the unit sphere, which is nearly flat over a disk as wide as the spacing."""
     rng = np.random.default_rng(0)
     points = rng.normal(size=(60_000, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
