@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Speed and accuracy are claims: each comes from `python -m benchmarks.NAME`, at the root of a checkout.
+"""Commands that measure what the documentation claims: `python -m benchmarks.NAME`, in a checkout's root.
 
-All run on one thread.
+Each process computes on one thread, except those of benchmarks.threads.
 """
 
 import os
@@ -12,7 +12,7 @@ from pathlib import Path
 from time import perf_counter
 
 for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
-    os.environ[f"{library}_NUM_THREADS"] = "1"  # read once, when numpy is imported
+    os.environ[f"{library}_NUM_THREADS"] = "1"  # numpy reads this once, on import.
 
 ROOT = Path(__file__).resolve().parents[1]
 SCANS_FOLDER = ROOT.parent / "shared" / "data" / "meshes"
@@ -29,14 +29,14 @@ def machine(*packages):
 
 
 def timed(run, *args, **kwargs):
-    """Seconds that a call takes, and what it returns."""
+    """(seconds that a call takes, what it returns)."""
     start = perf_counter()
     value = run(*args, **kwargs)
     return perf_counter() - start, value
 
 
 def table(head, rows, left=1):
-    """Prints Markdown; so many columns are aligned to the left."""
+    """Prints a Markdown table; its first `left` columns are aligned to the left, the others to the right."""
     print("|", " | ".join(head), "|")
     print("|" + "---|" * left + "--:|" * (len(head) - left))
     for row in rows:

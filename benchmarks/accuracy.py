@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How near the fits come to surfaces known exactly, beside what people would use instead.
 
-`python -m benchmarks.accuracy`, from the root of a checkout; scikit-learn for the Gaussian process, which
-is left out where it is missing. Prints Markdown tables:
+`python -m benchmarks.accuracy`, from the root of a checkout. The Gaussian process needs scikit-learn, and is
+left out where that is missing. The command prints Markdown tables for
 
 (a) eleven exact surfaces of the paper's size, three plane sets, three noise levels, 75 contacts;
 (b) random smooth closed shapes, a third of them touched at a hyperbolic point, six plane sets.
 
-The constants of the default's prior, as the settings of the peers, were chosen on (a); (b) is independent of
-that choice. `--choose` prints what the peers' settings were chosen by.
+The constants of the prior of "bayes" and the settings of the peers were chosen on (a); (b) is independent of
+that choice. `--choose` prints the errors by which the peers' settings were chosen.
 
-The error is the mean |dz| over some 300 points of the true surface above the domain, each method in the
-frame it found itself (the peers in the paper's). Lengths are in mm, errors in micrometers.
+The error is the mean |dz| over some 300 points of the true surface above the domain. Each method is judged in
+the frame that it found itself, the peers in the paper's. Lengths are in mm, errors in micrometers.
 """
 
 import argparse
@@ -34,8 +34,8 @@ from tests import surfaces
 from . import machine, table
 from .peers import Fit, gaussian_process, jet, quadric_process, radial_basis
 
-# Surfaces and extents of their half curves. The sizes are such that the peers' errors come out like those
-# measured on other surfaces when this fit was planned, so that these are as hard.
+# Each surface with the extent of its half curves. The sizes make the peers' errors like those that were
+# measured on other surfaces when this fit was planned, so these surfaces are as hard as those.
 SURFACES = {
     "ellipsoid": (surfaces.ellipsoid(35, 32, 19, 0.4, 0.5), 13),
     "torus outer": (surfaces.torus(30, 22, 0.8), 13),
@@ -65,9 +65,9 @@ PLANES = {  # Azimuths and tilts in degrees.
     "0/20/40": ((0, 20, 40), (0, 0, 0)),
 }
 EXACT_PLANES = tuple(PLANES)[:3]
-TURN = 23.0  # Azimuth 0 is so many degrees off d1, so that a set of planes favors no direction.
+TURN = 23.0  # The angle in degrees between azimuth 0 and d1, so that a set of planes favors no direction.
 SHAPE_NOISE = 0.05
-STEPS = 12  # A half curve has so many, so three curves have 75 contacts.
+STEPS = 12  # The number of steps of a half curve. Three curves then have 75 contacts.
 HOLD_OUT = 300
 RUNS = 20
 
@@ -92,7 +92,7 @@ def exact_case(name, planes, noise, seed):
 
 
 def _touched(surface, planes, noise, seed, extent, turn):
-    """The case; None where a curve ends early or the surface is no graph over the domain."""
+    """The Case, or None where a curve ends early or the surface is no graph over the domain."""
     axes, kappas = darboux(surface)
     azimuths, tilts = (np.radians(angles) for angles in PLANES[planes])
     sampling = [SamplingPlane(a + np.radians(turn), t) for a, t in zip(azimuths, tilts, strict=True)]
@@ -108,13 +108,13 @@ def _touched(surface, planes, noise, seed, extent, turn):
 
 
 def domain_of(contours, point, axes, extent):
-    """What the contours' ends bound, in this frame."""
+    """The domain that the ends of the contours bound, in the frame `axes`."""
     ends = np.vstack([contour.points[[0, -1]] for contour in contours]) - point
     return closed_spline_domain((ends @ axes)[:, :2], extent)
 
 
 def darboux(surface):
-    """The true frame and curvatures, from central differences of the normal."""
+    """The true Darboux frame (3, 3) and (k1, k2) at the point, from central differences of the normal."""
     n, h = surface.normal, 1e-4
     e1 = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     e1 /= np.linalg.norm(e1)
@@ -132,9 +132,9 @@ def darboux(surface):
 
 
 def above(surface, axes, kappas, points):
-    """The surface above tangent plane points (m, 2), relative to the reference point, (m, 3).
+    """The surface above points (m, 2) of the tangent plane: points (m, 3), relative to the reference point.
 
-    Newton's method finds it from the quadric; NaN where that finds no way.
+    Newton's method finds them from the quadric; they are NaN where it does not converge.
     """
     n, h = axes[:, 2], 1e-5
     z = (points**2 @ kappas) / 2.0
@@ -155,10 +155,11 @@ def above(surface, axes, kappas, points):
 
 
 def random_cases(seed):
-    """A random shape touched at a random point, with each plane set; hyperbolic for every third seed.
+    """{plane set: Case} of a random shape touched at a random point.
 
-    The shape is a level set of |p|^2 / R^2 - 1 and forty waves no shorter than 2 pi R / 2.7, R from 25
-    to 35 mm, the radii of curvature at the point from 15 mm up, as on the exact surfaces.
+    For every third seed the point is hyperbolic. The shape is a level set of the sum of |p|^2 / R^2 - 1 and
+    forty waves no shorter than 2 pi R / 2.7, with R from 25 to 35 mm. The radii of curvature at the point are
+    15 mm or more, as on the exact surfaces.
     """
     rng = np.random.default_rng(seed)
     while True:
@@ -178,7 +179,7 @@ def random_cases(seed):
 
 
 def _random_shape(rng, waves=40):
-    """A closed level set, touched in a random direction; None where there is nothing to touch."""
+    """A closed level set with a point in a random direction, or None if no ray hits its outside there."""
     radius = rng.uniform(25.0, 35.0)
     vectors = rng.normal(size=(waves, 3))
     vectors *= (rng.uniform(0.5, 2.7, waves) / np.linalg.norm(vectors, axis=1))[:, None]
@@ -210,7 +211,7 @@ def ours(case, **options):
     return Fit(r.frame.axes, r.height, (r.patch.k1, r.patch.k2), r.height_std)
 
 
-# These are the best, on average, of those that `--choose` tries.
+# These settings are the best, on average, of those that `--choose` tries.
 SPLINES = {
     "RBF thin plate": {"kernel": "thin_plate_spline", "degree": 2, "smoothing": 0.1},
     "RBF cubic": {"kernel": "cubic", "degree": 2, "smoothing": 0.03},
@@ -253,7 +254,7 @@ def cramer_rao(case):
 
 
 def noise_limit(case, surface):
-    """The mean |dz| (um) of five terms fitted to the noise alone, as if all higher terms were known."""
+    """The mean |dz| (um) of a quadric with five terms fitted to the noise, with all higher terms known."""
     contacts = np.vstack([c.points for c in case.contours]) - case.point
     x, y, z = (contacts @ case.axes).T
     there = above(surface, case.axes, case.kappas, np.column_stack([x, y]))
@@ -267,9 +268,9 @@ def noise_limit(case, surface):
 
 
 class Score(NamedTuple):
-    error: float  # The mean of |dz| in um.
-    kappa: float  # The larger error of the two curvatures in 1e-3 / mm.
-    normal: float  # degrees
+    error: float  # The mean |dz| in um.
+    kappa: float  # The larger of the errors of the two principal curvatures, in 1e-3 / mm.
+    normal: float  # The angle between the normal found and the true one, in degrees.
     covered: float  # The share of the hold-out within the 90 % interval.
     width: float  # The mean height_std over the mean |dz|.
 
@@ -300,7 +301,10 @@ def random_scores(seed):
 
 
 def milliseconds():
-    """Medians of fit, and of fit and hold-out, for each method: in turns, surface by surface, at 0.02 mm."""
+    """{method: (ms of a fit, ms of a fit and the heights of the hold-out)}: medians over all surfaces.
+
+    The noise is 0.02 mm. The methods take turns on each surface.
+    """
     fits, both = ({name: [] for name in METHODS} for _ in range(2))
     for surface in SURFACES:
         case = exact_case(surface, EXACT_PLANES[0], 0.02, 0)
@@ -347,16 +351,16 @@ def error_table(scores, times):
             *(f"{t:.2f}" for t in times[method]),
         ]
 
-    print("(a) Exact surfaces: mean |dz| in um, medians over surfaces of the mean over seeds, for noise of")
-    print("0, 0.02 and 0.1 mm. `mean`: of all, each plane set and noise counting alike. `worst`: the worst")
-    print("case less 2 um, as a multiple of the quadric alone there.\n")
+    print("(a) Exact surfaces: the mean |dz| in um, averaged over seeds, as medians over the surfaces, for")
+    print("noise of 0, 0.02 and 0.1 mm. `mean` is over all surfaces, plane sets and noises alike. `worst` is")
+    print("the error less 2 um over that of the quadric alone, in the worst case.\n")
     head = ["method", *(f"{p}, {n:g}" for p, n in CELLS), "mean", "worst", "fit, ms", "and hold-out"]
     limit = [f"{median_of(scores, lambda s: s['limit'], *cell):.0f}" for cell in CELLS]
     table(head, [*(row(m) for m in METHODS), ["five terms through the noise alone", *limit, "", "", "", ""]])
 
 
 def frame_table(scores):
-    print("Curvatures and normal: medians of the larger kappa error in 1e-3 / mm, and of degrees.\n")
+    print("Medians of the larger kappa error in 1e-3 / mm, and of the error of the normal in degrees.\n")
     plane = EXACT_PLANES[0]
     head = ["method, 0/60/120", *(f"kappa, {n:g}" for n in NOISES), *(f"normal, {n:g}" for n in NOISES)]
     names = {BAYES: BAYES, QUADRIC: "the paper's frame (all its fits)"} | {
@@ -397,8 +401,8 @@ def choice_scores(key):
 
 
 def choice_table(scores):
-    """What the peers' settings were chosen by."""
-    print("Peers by their settings, as in (a); smoothing is scipy's, in unit radius.\n")
+    """Prints the errors by which the peers' settings were chosen."""
+    print("The errors of the peers by their settings, as in (a); smoothing is scipy's, in unit radius.\n")
     rows = []
     for method in CHOICES:
         cells = [[s[method].error for k, s in scores.items() if k[1:3] == cell] for cell in CELLS]
@@ -408,8 +412,8 @@ def choice_table(scores):
 
 
 def interval_table(scores):
-    print("90 % intervals of the default's height_std: share of the hold-out within, and median of mean")
-    print("height_std over mean |dz|.\n")
+    print(f"The share of the hold-out within the 90 % intervals of height_std ({BAYES}), and the median of")
+    print("the mean height_std over the mean |dz|.\n")
     rows = []
     for cell in CELLS:
         of = [s[BAYES] for k, s in scores.items() if k[1:3] == cell]
@@ -418,9 +422,9 @@ def interval_table(scores):
 
 
 def surface_table(scores):
-    """Where each method fails: medians are silent about it."""
-    print("Errors by surface in um, the median over seeds: planes 0/60/120 with 0.02 mm of noise, and the")
-    print("tilted ones with none.\n")
+    """Prints where each method fails, which medians over the surfaces do not show."""
+    print("Errors by surface in um, medians over seeds: with planes 0/60/120 and 0.02 mm of noise, and with")
+    print("tilted planes and no noise.\n")
     methods = [m for m in (BAYES, PROCESS, CUBIC, TAGC, QUADRIC) if m in METHODS]
     cells = ((EXACT_PLANES[0], 0.02), (EXACT_PLANES[2], 0.0))
     rows = []
@@ -435,7 +439,7 @@ def _interval(scores):
 
 
 def random_table(scores):
-    print(f"(b) {len(scores)} random shapes, noise {SHAPE_NOISE:g} mm: |dz| in um.\n")
+    print(f"(b) {len(scores)} random shapes with {SHAPE_NOISE:g} mm of noise: the mean |dz| in um.\n")
     rows = []
     for planes in (*PLANES, "all"):
         of = {m: [s[p][m] for s in scores for p in PLANES if planes in (p, "all")] for m in SHAPE_METHODS}
@@ -471,8 +475,8 @@ def random_table(scores):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10, help="of the noise on exact surfaces (%(default)s)")
-    parser.add_argument("--shapes", type=int, default=300, help="random ones (%(default)s)")
-    parser.add_argument("--choose", action="store_true", help="the peers by their settings, and nothing else")
+    parser.add_argument("--shapes", type=int, default=300, help="number of random shapes (%(default)s)")
+    parser.add_argument("--choose", action="store_true", help="print only the peers by their settings")
     options = parser.parse_args()
     keys = [
         (name, planes, noise, seed)

@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How few contacts, and how few sampling planes, are enough: the error against the amount of data.
 
-`python -m benchmarks.amount [--quick]`, from the root of a checkout. Prints Markdown tables of the errors,
-and for each noise how many contacts make a patch as good as the most do, and how many core.explore takes by
-itself; draws build/charts/amount.png.
+`python -m benchmarks.amount [--quick]`, from the root of a checkout. It prints Markdown tables of the errors.
+For each noise it prints from how many contacts on the error is at most 1.25 times that with the most, and how
+many contacts core.explore takes by itself. It draws build/charts/amount.png.
 
 The surfaces are those of benchmarks.accuracy and random shapes like its own. Each plane is tracked with
-contacts close together, of which evenly spread ones are taken: noise and extent stay as they are. Where
-core.explore chooses, it touches anew. The error is the mean |dz| over a hold-out, the same for all rows of
-a surface: some 300 points above the domain of the curves in three planes. Lengths are in mm, errors in
-micrometers.
+contacts close together, and evenly spread ones are taken from these, so that noise and extent stay the same.
+Where core.explore chooses, it touches anew. The error is the mean |dz| over a hold-out, which is the same for
+all rows of a surface: some 300 points above the domain of the curves in three planes. Lengths are in mm,
+errors in micrometers.
 """
 
 import argparse
@@ -31,11 +31,11 @@ from core.patch.monge import exponents, monomials
 from . import accuracy, plot
 from .plot import plt
 
-FINE = 96  # Half curves are tracked with so many steps,
-STEPS = (2, 3, 4, 6, 8, 12, 16, 24, 32)  # of which so many are taken: 12 to 192 contacts in three planes.
+FINE = 96  # The number of steps with which half curves are tracked.
+STEPS = (2, 3, 4, 6, 8, 12, 16, 24, 32)  # The numbers that are taken: 12 to 192 contacts in three planes.
 PLANES = (3, 4, 5, 6)
-TOTAL, EACH = 72, 24  # Contacts of all curves, or of each, by the number of planes.
-ENOUGH = 1.25
+TOTAL, EACH = 72, 24  # Contacts of all curves together, and of each curve, where the number of planes varies.
+ENOUGH = 1.25  # Contacts are enough if the error is at most this multiple of that with the most contacts.
 BAYES, TAGC, BOUND = "Bayes, degree 4", "TAGC", "Cramér-Rao bound, degree 4"
 CHOSEN = "as many as core.explore takes"
 METHODS = {BAYES: accuracy.ours, TAGC: partial(accuracy.ours, method="tagc")}
@@ -44,22 +44,22 @@ LOOKS = {  # By noise: color, mark, and the label's place at the line's end.
     0.02: (plot.GREEN, "s", "bottom"),
     0.1: (plot.VERMILION, "^", "center"),
 }
-TAGC_NOISE = 0.02  # The chart has only this noise for it, the table all.
+TAGC_NOISE = 0.02  # The chart shows TAGC for this noise only, the table for all.
 BEST = {degree: f"best polynomial of degree {degree}" for degree in (4, 6)}
 CAPTION = (
-    "Marks: the default fit, medians and quartiles over {} exact surfaces and {} random shapes, radii of "
-    "curvature from 15 mm, extents of 10 to 15 mm; seeds of noise: {}. Contacts are spread evenly, whatever "
-    "their number over the same extent, and counted without the reference point; planes are at equal turns. "
+    "Marks: bayes of degree 4, medians and quartiles over {} exact surfaces and {} random shapes, radii of "
+    "curvature from 15 mm, extents of 10 to 15 mm; seeds of noise: {}. Contacts are spread evenly over the "
+    "same extent, whatever their number, and counted without the reference point; planes are at equal turns. "
     "Hold-out: some 300 points above the domain of the curves in three planes, the same whatever was "
     "touched. Limits: the polynomial nearest to the hold-out itself, and the Cramér-Rao bound of unbiased "
     "fits of the visible terms to degree 4 ({} contacts on the right), below which a prior may go. Without "
     "noise the error stays at what three planes cannot show; a fourth shows most of that. TAGC takes its "
-    "curvatures from the ten contacts nearest to the point, which span less the more there are."
+    "curvatures from the ten contacts of each curve nearest to the point, which span less the more there are."
 )
 
 
 class Touch(NamedTuple):
-    """How much was touched: planes, and contacts on each half curve."""
+    """How much was touched: the number of planes, and of contacts on each half curve."""
 
     planes: int
     steps: int
@@ -92,19 +92,19 @@ class Place(NamedTuple):
         return touch(self.surface, self.point, self.axes[:, 2], sampling, **more)
 
     def tracked(self, planes, noise, seed):
-        """Contours, fine."""
+        """Contours with FINE steps to a half curve."""
         return self.touched(track, planes, noise, seed, step=self.extent / FINE)
 
 
 class Remembering:
-    """A surface that answers a ray once: from touch to touch only the noise differs."""
+    """A surface that remembers the hit of each ray, because touches differ only in their noise."""
 
     def __init__(self, surface):
         self.ray_cast = cache(surface.ray_cast)
 
 
 def find(key):
-    """The place and its hold-out, by an exact surface's name or the seed of a random shape."""
+    """The Place of an exact surface's name or of the seed of a random shape, and its hold-out (m, 3)."""
     if key in accuracy.SURFACES:
         return _at(*accuracy.SURFACES[key])
     rng = np.random.default_rng(key)
@@ -119,7 +119,7 @@ def find(key):
 
 
 def _at(surface, extent):
-    """None where a curve ends early or the surface is no graph over the domain."""
+    """The Place and its hold-out (m, 3), or None where a curve ends early."""
     place = Place(Remembering(surface), surface.point, extent, *accuracy.darboux(surface))
     contours = {m: place.tracked(m, 0.0, 0) for m in PLANES}
     if any(c.stops != ("extent", "extent") for m in PLANES for c in contours[m]):
@@ -147,9 +147,9 @@ def cases(place, hold_out, noise, seed):
 
 
 def errors(key, seeds):
-    """((noise, touch, method or limit), the error in um) for all touches of a surface.
+    """[((noise, touch, name of a method or limit), error in um)] for all touches of a surface.
 
-    Where core.explore chooses, contacts and the error.
+    For CHOSEN, where core.explore chooses, there is (number of contacts, error in um) instead of the error.
     """
     place, hold_out = find(key)
     over = hold_out @ place.axes
@@ -169,7 +169,7 @@ def errors(key, seeds):
 
 
 def best_polynomial(over, degree):
-    """The least mean |dz| (um) of a polynomial through the reference point: a linear program."""
+    """The least mean |dz| (um) of any polynomial through the reference point, by linear programming."""
     from scipy.optimize import linprog
 
     radius = np.abs(over).max()
@@ -185,7 +185,7 @@ def best_polynomial(over, degree):
 
 
 def cramer_rao(case):
-    """The mean |dz| (um) of an unbiased estimate of the terms to degree 4, of those that are visible."""
+    """The mean |dz| (um) of an unbiased estimate of those terms to degree 4 that the contacts show."""
     contacts = np.vstack([c.points for c in case.contours]) - case.point
     contacts = contacts[np.linalg.norm(contacts, axis=1) > 0.0] @ case.axes
     over, radius, terms = case.hold_out @ case.axes, np.abs(contacts).max(), exponents(1, 4)
@@ -196,7 +196,7 @@ def cramer_rao(case):
 
 
 def chosen(found, noise):
-    """How many contacts were taken by choice, and the error with them: medians."""
+    """Medians of the number of contacts that core.explore takes, and of the error with them."""
     return np.median(found[noise, None, CHOSEN], axis=0)
 
 
@@ -205,7 +205,7 @@ def medians(found, touches, noise, name, quantile=0.5):
 
 
 def print_tables(found):
-    """Medians by noise and method, and how many contacts are enough."""
+    """Prints medians by noise and method, and how many contacts are enough."""
 
     def rows(touches, *between):
         for name in (*METHODS, BOUND):
@@ -213,10 +213,10 @@ def print_tables(found):
                 cells = (f"{error:.1f}" for error in medians(found, touches, noise, name))
                 yield [name, f"{noise:g}", *between, *cells]
 
-    print("Mean |dz| in um, medians over surfaces and seeds. Three planes, by the number of contacts:\n")
+    print("Mean |dz| in um, medians over surfaces and seeds, in three planes by the number of contacts:\n")
     contacts = [touch.contacts for touch in BY_CONTACTS]
     accuracy.table(["method", "noise, mm", *map(str, contacts)], rows(BY_CONTACTS))
-    print("By the number of planes:\n")
+    print("The same by the number of planes:\n")
     sets = {f"{TOTAL} in all": SAME_TOTAL, f"{EACH} a curve": SAME_EACH}
     head = ["method", "noise, mm", "contacts", *(f"{planes} planes" for planes in PLANES)]
     accuracy.table(head, [row for name, touches in sets.items() for row in rows(touches, name)])
@@ -224,15 +224,15 @@ def print_tables(found):
         error = np.array(medians(found, BY_CONTACTS, noise, BAYES))
         enough = contacts[np.flatnonzero(error > ENOUGH * error[-1]).max(initial=-1) + 1]
         print(
-            f"Noise {noise:g} mm: from {enough} contacts on, the error of {BAYES} is within {ENOUGH:g} "
-            f"of that with {contacts[-1]}. "
-            "core.explore takes {:.0f}, with which it is {:.1f} um.".format(*chosen(found, noise))
+            f"Noise {noise:g} mm: from {enough} contacts on, the error of {BAYES} is at most {ENOUGH:g} "
+            f"times that with {contacts[-1]}. "
+            "core.explore takes {:.0f} contacts, with which it is {:.1f} um.".format(*chosen(found, noise))
         )
     print(*(f"The {name} is {np.median(found[None, None, name]):.2g} um off." for name in BEST.values()))
 
 
 def draw_lines(axes, found, touches, at):
-    """Medians and quartiles for each noise, TAGC's medians, and the limits."""
+    """Draws medians and quartiles for each noise, TAGC's medians, and the limits."""
     for noise, (color, mark, _) in LOOKS.items():
         axes.plot(at, medians(found, touches, noise, BAYES), color=color, marker=mark, markersize=5)
         quartiles = (medians(found, touches, noise, BAYES, q) for q in (0.25, 0.75))
@@ -268,7 +268,7 @@ def draw(found):
 
 
 def label(left, right, found):
-    """Names at the lines' ends, and what the line styles mean."""
+    """Writes names at the lines' ends, and what the line styles mean."""
     last = BY_CONTACTS[-1:]
     at = 1.07 * last[0].contacts
     for noise, (color, _, align) in LOOKS.items():

@@ -3,16 +3,21 @@
 """Whole objects: how far the surface of all touches is off, after how many touches and seconds, beside peers.
 
 `python -m benchmarks.atlas [--only NAME] [--finest T] [--coarsest T] [--peers NAME]`, from the root of a
-checkout; bpy to read the scans and cast rays, pymeshlab for three of the peers. Sizes are 1, contacts have a
-noise of .0005.
-Prints Markdown tables: (a) five tolerances: touches, contacts, CPU seconds, distances of points of the
-object from the mesh, what share of these the field's 90 % interval holds, the angle of normals across edges,
-that at points around which the object turns by less than 20 degrees, with their share, by how much the joined
-surface and the object turn from .001 on one side of these points to .001 on the other, the share of points
-where K is alike within 90 %, and what the mesh is; (b) peers on the contacts of tolerance .001, each at the
-best of its settings, with the same normals; and where normals are off by ten degrees; (c) as many touches at
-random places and at evenly spaced ones, in one batch, with the seconds of touching alone. Draws
-build/charts/atlas.png. `--memory` touches the lemon 1000 times and prints how much memory that took at most.
+checkout. It needs bpy to read the scans and to cast rays, and pymeshlab for three of the peers. Each object
+has the size 1, and contacts have a noise of .0005. The command draws build/charts/atlas.png and prints
+Markdown tables:
+
+(a) each object at five tolerances: the numbers of touches and contacts, and CPU seconds; the distances of
+    points of the object from the mesh, and the share of these points that the field's 90 % interval holds;
+    along the edges of the graph the angle between the normals of the two patches, also at those points
+    alone around which the object turns by less than 20 degrees, with their share; by how much the joined
+    surface and the object turn from .001 on one side of an edge to .001 on the other; the share of points
+    where K is alike within 90 %; and the topology of the mesh;
+(b) peers on the contacts of tolerance .001 with the same normals, each at the best of its settings, and the
+    atlas and Poisson where normals are off by ten degrees;
+(c) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of touching.
+
+`--memory` touches the lemon up to 1000 times and prints how much memory that took at most.
 """
 
 import argparse
@@ -35,16 +40,16 @@ from .real import Scan
 SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
 NOISE, COMPARED, POINTS, MOST = 0.0005, 0.001, 2500, 1500
-EDGE = 0.01
+EDGE = 0.01  # The length of an edge of the mesh.
 FINE = 0.0002  # With this tolerance and noise 1000 touches are not enough.
-BLURRED = np.radians(10.0)  # The deviation of blurred normals.
-CREASE = 20.0  # Where the object turns by more degrees within a mesh's edge, there is a crease.
-BESIDE = 0.001  # Normals are asked so far from an edge of two patches, on both sides.
-AROUND = 8  # So many places on a ring of that radius are asked.
+BLURRED = np.radians(10.0)  # The root mean square angle by which blurred normals are off.
+CREASE = 20.0  # There is a crease where the object turns by more degrees within EDGE.
+BESIDE = 0.001  # The distance from the edge of two patches at which normals are compared, on both sides.
+AROUND = 8  # The number of places on a ring of radius EDGE where normals are compared.
 
 
 class Scanned:
-    """A scan, and points all over it, by area."""
+    """A scan, and random points all over it, by area."""
 
     def __init__(self, name):
         self.scan = Scan(next(SCANS_FOLDER.glob(f"{name}*")))
@@ -60,7 +65,7 @@ class Scanned:
 
 
 def turns(points, normals):
-    """By how many degrees an object turns at most within EDGE around points (n, 3), by its normals."""
+    """By how many degrees (n,) an object's normals turn at most within EDGE around points (n, 3)."""
     at = normals(points)
     e1 = np.cross(at, np.eye(3)[np.abs(at).argmin(axis=1)])
     e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
@@ -72,7 +77,7 @@ def turns(points, normals):
 
 
 def turns_across(points, ways, normals):
-    """By how many degrees normals turn from BESIDE on one side of points (n, 3) to the other, along ways."""
+    """By how many degrees normals turn from one side of points (n, 3) to the other, along ways (n, 3)."""
     cosines = np.einsum("ni,ni->n", *(normals(points + side * BESIDE * ways) for side in (-1.0, 1.0)))
     return np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
@@ -94,12 +99,12 @@ class Exact:
         self.random = np.array([(p, self.solid.normal(*p)) for p in points[: POINTS // 2]])
 
     def normals(self, points):
-        """As of a Scanned."""
+        """Normals at points (n, 3) of the object."""
         return np.array([self.solid.normal(*p) for p in points])
 
 
 class Blurred:
-    """An object whose normals are felt badly."""
+    """An object whose rays return normals that are off by BLURRED."""
 
     def __init__(self, thing):
         self.thing, self.rng = thing, np.random.default_rng(0)
@@ -120,7 +125,7 @@ class Blurred:
 
 
 def off_mesh(vertices, triangles, points):
-    """Distances of points from a mesh, in permille of the size."""
+    """Distances (n,) of points (n, 3) from a mesh, in permille of the size."""
     import bpy  # noqa: F401  # It brings mathutils.
     from mathutils.bvhtree import BVHTree
 
@@ -134,7 +139,7 @@ def three(off):
 
 
 def explored(thing, tolerance):
-    """The atlas, the explorations, and CPU seconds of touching with joining, and of meshing; and the mesh."""
+    """(atlas, explorations, CPU seconds of touching and joining, CPU seconds of meshing, mesh)."""
     start, found = process_time(), []
     steps = core.touch_all_over(
         thing, thing.start, thing.outward, tolerance=tolerance, noise=NOISE, most=MOST, rng=0
@@ -150,9 +155,12 @@ def explored(thing, tolerance):
 
 
 def agreeing(thing, atlas):
-    """The mean angle of normals across edges in degrees, that off creases of the object, the share of points
-    that are off them; by how many degrees the joined surface and the object turn across edges; and the share
-    of points where K is alike within 90 %."""
+    """How well neighboring patches agree along the edges of the graph, in five numbers.
+
+    They are the mean angle of normals across edges in degrees; the same off the creases of the object; the
+    share of points off creases; by how many degrees the joined surface and the object turn across edges, a
+    pair; and the share of points where K is alike within 90 %.
+    """
     points = np.vstack([edge.curve for edge in atlas.edges])
     angles = np.degrees(np.concatenate([edge.angle for edge in atlas.edges]))
     alike = []
@@ -173,7 +181,7 @@ def agreeing(thing, atlas):
 
 
 def row(thing, tolerance):
-    """A line of the first table, and what it is made of."""
+    """A row of the first table, the numbers of it that are drawn, and the explorations behind it."""
     atlas, found, touching, meshing, mesh = explored(thing, tolerance)
     distance, std = atlas.distance(thing.points)
     felt = np.isfinite(std)
@@ -223,7 +231,10 @@ def _matrices(meshes):
 
 
 def implicit_basis(points, normals, at, smoothing, offset=0.01):
-    """|f| at points, of cubics through contacts (0) and points off them along their normals (+-offset)."""
+    """1000 |f| at places `at` (n, 3), where thin plate splines f take the values of an implicit function.
+
+    These are 0 at contacts, and +-offset at points that far from them along their normals.
+    """
     from scipy.interpolate import RBFInterpolator
 
     where = np.vstack([points, points + offset * normals, points - offset * normals])
@@ -232,7 +243,7 @@ def implicit_basis(points, normals, at, smoothing, offset=0.01):
 
 
 def implicit_process(points, normals, at, length, offset=0.01, most=700):
-    """|f| at points, of a process with a Matern covariance, on so many of the contacts."""
+    """The same, where f is a process with a Matérn covariance of order 3/2, on `most` of the contacts."""
     some = np.linspace(0, len(points) - 1, min(most, len(points))).astype(int)
     points, normals = points[some], normals[some]
     where = np.vstack([points, points + offset * normals, points - offset * normals])
@@ -248,7 +259,7 @@ def implicit_process(points, normals, at, length, offset=0.01, most=700):
 
 
 def peers(thing, found, some=""):
-    """Lines of the second table, of peers with that in their names."""
+    """Rows of the second table, of the peers with `some` in their names."""
     points = np.vstack([c.points for e in found for c in e.contours])
     normals = np.vstack([c.normals for e in found for c in e.contours])
     points, first = np.unique(points, axis=0, return_index=True)
@@ -285,7 +296,7 @@ def peers(thing, found, some=""):
 
 
 def spread(points, count):
-    """Indices of so many of points, each the farthest from those before."""
+    """Indices of `count` of the points, each the farthest from those before it."""
     found, nearest = [0], np.linalg.norm(points - points[0], axis=1)
     while len(found) < count:
         found.append(int(np.argmax(nearest)))
@@ -294,7 +305,7 @@ def spread(points, count):
 
 
 def elsewhere(thing, which, where, tolerance):
-    """A line of the third table: touches at other places."""
+    """A row of the third table: touches at the random places with indices `which`; `where` names them."""
     points, outward = thing.random[which, 0], thing.random[which, 1]
     wanted = {"farthest": 0.3, "largest_std": 1.5 * tolerance, "noise": NOISE, "rng": 0}
     start = process_time()
@@ -311,7 +322,10 @@ def elsewhere(thing, which, where, tolerance):
 
 
 def compared(thing, found, cells, tolerance, some):
-    """Lines of the second table and of the third; with some peers only, those of the object as it is."""
+    """Rows of the second and of the third table.
+
+    If `some` names peers, there are only their rows, and only with the normals of the object as it is.
+    """
     others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]]
     others += peers(thing, found, some)
     if some:
@@ -332,7 +346,7 @@ def compared(thing, found, cells, tolerance, some):
 
 
 def print_memory():
-    """How much more than before 1000 touches of the lemon took at most."""
+    """Prints the peak of memory during up to 1000 touches of the lemon, less that before them."""
     import resource
 
     with blender.quiet():
@@ -347,7 +361,7 @@ def print_memory():
 
 
 def draw(numbers):
-    """Mean distance against touches and against CPU seconds."""
+    """Draws the mean distance against touches and against CPU seconds."""
     import matplotlib
 
     matplotlib.use("agg")
@@ -375,11 +389,11 @@ def draw(numbers):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", default="", help="objects with this in their names")
+    parser.add_argument("--only", default="", help="only objects with this in their names")
     parser.add_argument("--finest", type=float, default=min(TOLERANCES), help="tolerance (%(default)s)")
     parser.add_argument("--coarsest", type=float, default=max(TOLERANCES), help="tolerance (%(default)s)")
-    parser.add_argument("--peers", default="", help="those with that in their names, and no other places")
-    parser.add_argument("--memory", action="store_true", help="of 1000 touches, and no more")
+    parser.add_argument("--peers", default="", help="only peers with this in their names, and not (c)")
+    parser.add_argument("--memory", action="store_true", help="print only the memory that 1000 touches take")
     options = parser.parse_args()
     if options.memory:
         print_memory()
@@ -406,7 +420,7 @@ def main():
     if random:
         table(["object", "places", "touches", "% covered", "mean / median / 95 %", "s touch"], random, left=2)
     draw(numbers)
-    print(f"Lengths in permille of the size; CPU seconds, {machine('bpy', 'numpy', 'scipy')}.")
+    print(f"Lengths are in permille of the size, times in CPU seconds; {machine('bpy', 'numpy', 'scipy')}.")
 
 
 if __name__ == "__main__":

@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Speed against accuracy: each fit of this project, and what else one could take, on the same contacts.
 
-`python -m benchmarks.chart [--quick]`, from the root of a checkout; a peer whose package is missing is left
-out with a word. Writes to build/charts
+`python -m benchmarks.chart [--quick]`, from the root of a checkout. A peer whose package is missing is left
+out with a message. The command writes to build/charts
 
 speed_accuracy.png, .csv        from contacts to the heights of the hold-out: milliseconds and micrometers
 speed_accuracy_frame.png, .csv  normal and principal curvatures at the point: milliseconds, degrees and 1/mm
 
-for the exact surfaces, plane sets and noise levels of benchmarks.accuracy. The methods take turns, case by
-case, in one process on one thread.
+for the exact surfaces, plane sets and noise levels of benchmarks.accuracy (`--quick` takes one plane set and
+one seed). The methods take turns, case by case, in one process on one thread.
 """
 
 import argparse
@@ -30,21 +30,25 @@ from . import accuracy, machine, peers, plot
 from .amount import Remembering
 
 QUICK_PLANES = accuracy.EXACT_PLANES[:1]
-SEEDS = 4  # The full run has so many seeds of the noise.
-RINGS = 25  # Dense meshes have so many rings, which are 1951 vertices.
+SEEDS = 4  # The number of seeds of the noise in the full run.
+RINGS = 25  # The number of rings of a dense mesh, which has 1951 vertices.
 REPEATED = 0.02  # A method that takes fewer seconds is run three times more, for a median.
 LEAST_COVERED = 0.9  # A surface that covers less of the hold-out has failed.
-HOLLOW = "(hollow)"  # The label of what is out of competition.
+HOLLOW = "(hollow)"  # The label of methods that get more data than the others, so they do not compete.
 # Distributions whose names differ from their modules'.
 DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}
 KAPPA, NORMAL = "kappa 1/mm", "normal degrees"
 TIME_LIMITS = (0.3, 300.0)  # The limits of the axes.
-OFF_SCALE = 400.0  # Above so many um there are only names and values.
+OFF_SCALE = 400.0  # Errors above so many um are not to scale: a band at the top has their values.
 HEIGHT_LIMITS, KAPPA_LIMITS, NORMAL_LIMITS = (2.5, 1500.0), (5e-6, 0.3), (4e-4, 30.0)
 
 
 class Method(NamedTuple):
-    """A fit: from a case to a peers.Fit; in the frame's chart, to the normal and both kappas."""
+    """A method in a chart.
+
+    `run` maps a case of benchmarks.accuracy to a peers.Fit, or in the chart of frames a Touch to the normal
+    and both kappas.
+    """
 
     label: str
     family: str
@@ -52,7 +56,7 @@ class Method(NamedTuple):
     says: str  # What the label stands for.
     needs: tuple = ()
     planes: int = 3
-    touches: bool = False  # Whether it touches by itself instead of taking the contacts.
+    touches: bool = False  # Whether it touches by itself, so that `run` is not used.
 
 
 OURS, PAPER, INTERPOLATION = "bayes: this project's default", "the paper's fits", "interpolation"
@@ -93,7 +97,7 @@ METHODS = [
     *(_bayes(f"d{d}", "degree", degree=d) for d in (2, 3, 4, 6)),
     _bayes("auto", "degree by evidence", degree="auto"),
     *(_bayes(f"{m} planes", f"degree 4, from more contacts {HOLLOW}", planes=m, degree=4) for m in (4, 5)),
-    Method("auto touch", OURS, None, f"extent and step too, with the tracking {HOLLOW}", touches=True),
+    Method("auto touch", OURS, None, f"own extent and step, tracking included {HOLLOW}", touches=True),
     *_powers("TAGC", "tagc", (1e2, 1e3, 1e4), "total |K|, weight; by Newton"),
     *_powers("desc.", "tagc", (1e2, 1e3, 1e4), "the same by steepest descent", solver="descent"),
     *_powers("QV", "quadratic-variation", (1e3, 1e5), "quadratic variation, weight"),
@@ -147,21 +151,21 @@ FRAME_METHODS = [
 
 
 class Touch(NamedTuple):
-    """A case, the contours of more planes through its point, and the true surface around as a mesh."""
+    """A case, contours in more planes through its point, and the surface around it as a mesh with noise."""
 
     case: accuracy.Case
     contours: dict  # The contours by the number of planes.
     vertices: np.ndarray  # The point comes first.
     triangles: np.ndarray
     extent: float  # The length of the half curves.
-    explored: object  # What core.explore finds there within this extent.
+    explored: object  # A function: calls core.explore there, with this extent as the farthest.
 
 
 class Result(NamedTuple):
     label: str
     noise: float
     ms: float
-    errors: tuple  # These are nan where it has failed.
+    errors: tuple  # They are NaN where the method has failed.
 
 
 # Measurement -----------------------------------------------------------------------------------------
@@ -169,7 +173,7 @@ class Result(NamedTuple):
 
 def touch_of(name, planes, noise, seed):
     surface, extent = accuracy.SURFACES[name]
-    remembering = Remembering(surface)  # Rays in Python are slow and not part of the time.
+    remembering = Remembering(surface)  # The time excludes rays, because they are slow in Python.
     number = 1000 * seed + list(accuracy.SURFACES).index(name)
     case = accuracy.exact_case(name, planes, noise, number)
     contours = {3: case.contours}
@@ -191,7 +195,7 @@ def touch_of(name, planes, noise, seed):
 
 
 def in_rings(domain):
-    """Points (1 + 3 RINGS (RINGS + 1), 2) and triangles (6 RINGS^2, 3) over a domain, near to equilateral.
+    """Points (1 + 3 RINGS (RINGS + 1), 2) and nearly equilateral triangles (6 RINGS^2, 3) over a domain.
 
     Ring k has 6k points in equal turns.
     """
@@ -210,7 +214,10 @@ def in_rings(domain):
 
 
 def fit_result(method, touch):
-    """Seconds, and the mean |dz| (um) over the covered part of the hold-out, which must be most of it."""
+    """Seconds, and (the mean |dz| in um,) over the part of the hold-out that the fit covers.
+
+    The error is NaN where that part is less than LEAST_COVERED.
+    """
     case = touch.case._replace(contours=touch.contours[method.planes])
 
     def touched():
@@ -223,14 +230,14 @@ def fit_result(method, touch):
         return fit.height(x, y) - z
 
     if method.touches:
-        touched()  # This remembers the rays.
+        touched()  # The surface now remembers the rays.
     seconds, miss = typical(heights)
     covered = np.isfinite(miss)
     return seconds, (1e3 * np.abs(miss[covered]).mean() if covered.mean() >= LEAST_COVERED else np.nan,)
 
 
 def frame_result(method, touch):
-    """Seconds, the larger error of the kappas (1/mm), the normal's (degrees)."""
+    """Seconds, and (the larger error of the kappas in 1/mm, the error of the normal in degrees)."""
     seconds, (normal, kappas) = typical(lambda: method.run(touch))
     axis = touch.case.axes[:, 2]
     angle = np.arctan2(np.linalg.norm(np.cross(normal, axis)), normal @ axis)
@@ -238,7 +245,10 @@ def frame_result(method, touch):
 
 
 def typical(run):
-    """Seconds of processor time, the median of three more runs where it is quick, and what it returned."""
+    """Seconds of processor time of a call, and what it returned.
+
+    The time of a quick call is the median of three more calls.
+    """
 
     def timed():
         start = process_time()
@@ -256,7 +266,7 @@ def measure(methods, result, errors, touch):
     for method in methods:
         try:
             seconds, found = result(method, touch)
-        except Exception as problem:  # Peers raise anything if they find nothing.
+        except Exception as problem:  # Peers raise exceptions of all kinds if they find nothing.
             print(f"{method.label}: {problem}", file=sys.stderr)
             seconds, found = np.nan, (np.nan,) * errors
         yield Result(method.label, touch.case.noise, 1e3 * seconds, found)
@@ -271,7 +281,10 @@ def available(methods):
 
 
 def rows_of(methods, results, measures):
-    """The table: a row for each method and noise, medians and quartiles of the cases that did not fail."""
+    """Head and rows of the table, a row for each method and noise.
+
+    Medians and quartiles are over the cases in which the method did not fail.
+    """
     head = ["method", "family", "meaning", "noise mm", "planes", "cases", "failed share"]
     head += [f"{measure} {part}" for measure in ("ms", *measures) for part in ("q1", "median", "q3")]
     rows = []
@@ -311,7 +324,7 @@ def marks_of(table, noise, measure):
 
 
 def panel(axes, marks, noise, limits, off_scale=np.inf):
-    """Marks with their quartiles and labels; those off the scale are in a band at the top, with values."""
+    """Draws marks with quartiles and labels; those off the scale are in a band at the top, with values."""
     axes.set(xscale="log", yscale="log", xlim=TIME_LIMITS, ylim=limits)
     axes.set_title(f"noise {noise:g} mm" if noise else "no noise")
     for ticks in (axes.xaxis, axes.yaxis):
@@ -336,7 +349,10 @@ def panel(axes, marks, noise, limits, off_scale=np.inf):
 
 
 def pareto(axes, marks):
-    """Steps along the methods, of the same data and on the scale, that none beats in both time and error."""
+    """Draws steps along the methods that no other beats in both time and error.
+
+    Methods with more data and those off the scale do not count.
+    """
     best, front = np.inf, []
     for mark in sorted((m for m in marks if not m.more and m.y[1] <= OFF_SCALE), key=lambda m: m.x[1]):
         if mark.y[1] < best:
@@ -347,7 +363,7 @@ def pareto(axes, marks):
 
 
 def key(axes, methods, columns=False):
-    """What the labels stand for, family by family: below each other, or in columns."""
+    """Writes what the labels stand for, family by family: below each other, or in columns."""
     axes.axis("off")
     families = [(family, list(of)) for family, of in groupby(methods, key=lambda method: method.family)]
     lines = []
@@ -367,7 +383,7 @@ def key(axes, methods, columns=False):
 
 
 def _listed(labels):
-    """TAGC 1e2, 1e3: what all begin with is said once."""
+    """Labels in one string, as in "TAGC 1e2, 1e3": the word that all begin with is written once."""
     first = labels[0].split()[0] + " "
     return ", ".join([labels[0], *(text.removeprefix(first) for text in labels[1:])])
 
@@ -388,7 +404,7 @@ def draw_heights(table, methods, caption):
 
 
 def draw_frame(table, methods, bounds, caption):
-    """bounds : of Cramér and Rao on the error of kappa, by noise"""
+    """bounds : {noise: the Cramér-Rao bound on the error of kappa, in 1/mm}"""
     figure = plot.plt.figure(figsize=(8.6, 7.4))
     edges = {"left": 0.08, "right": 0.99, "top": 0.9, "bottom": 0.02}
     grid = figure.add_gridspec(3, 3, height_ratios=(1, 1, 0.34), hspace=0.34, wspace=0.08, **edges)
@@ -423,13 +439,13 @@ def touches(quick):
 
 
 def measured(methods, frame_methods, quick):
-    """The results of both charts, and medians of the Cramér-Rao bound by noise."""
+    """The results for either chart, and {noise: the median of the Cramér-Rao bound in 1/mm}."""
     heights, frames, bounds = [], [], {noise: [] for noise in accuracy.NOISES}
-    with blender.quiet():  # One of MeshLab's filters prints.
+    with blender.quiet():  # One of MeshLab's filters prints to standard output.
         for i, touch in enumerate([touch_of("pear", QUICK_PLANES[0], 0.02, 0), *touches(quick)]):
             of_heights = list(measure(methods, fit_result, 1, touch))
             of_frames = list(measure(frame_methods, frame_result, 2, touch))
-            if i:  # The first one is for warming up.
+            if i:  # The first touch is for warming up.
                 heights += of_heights
                 frames += of_frames
                 bounds[touch.case.noise].append(accuracy.cramer_rao(touch.case))
@@ -442,16 +458,17 @@ def captions(methods, quick):
     sets, seeds = (1, 1) if quick else (len(accuracy.EXACT_PLANES), SEEDS)
     cases = (
         f"Medians and quartiles over {len(accuracy.SURFACES)} exact surfaces, patches of 24 to 30 mm, plane "
-        f"sets ({sets}) and seeds of the noise ({seeds}); all methods in turns, after a warm-up. "
+        f"sets ({sets}) and seeds of the noise ({seeds}); all methods take turns, after a warm-up. "
     )
     heights = (
-        f"Error: mean |dz| at some {accuracy.HOLD_OUT} points of the true surface. Time: the processor's, "
-        "from the contacts to the heights there, with the frame. Dashed: Pareto front, given three curves. "
+        f"Error: mean |dz| at some {accuracy.HOLD_OUT} points of the true surface. Time: processor time from "
+        "the contacts to the heights there, including the frame. Dashed: Pareto front, given three curves. "
         "Gray: off scale. "
     )
     frame = (
-        "Time: of meshes, for all vertices, and of pymeshlab for two calls, as it gives one kappa a call; "
-        "their normals are the vertex's. Cramér-Rao: of unbiased fits of degree 4 to the contacts. "
+        "Time: libigl and pymeshlab compute all vertices, trimesh one; pymeshlab is called twice, because it "
+        "gives one kappa a call. The normal of a mesh is that of its vertex. Cramér-Rao: the bound of "
+        "unbiased fits of degree 4 to the contacts. "
     )
     known = f"On {machine('numpy', 'scipy', *packages)}."
     return cases + heights + known, cases + frame + known

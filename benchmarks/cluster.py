@@ -5,12 +5,12 @@
 `python -m benchmarks.cluster [--quick]`, from the root of a checkout with cluster/requirements.txt installed.
 It prints Markdown tables:
 
-(a) touches a second by one worker and by two, beside plain loops over the same touches (plain_loop.py), one
-    and two side by side; in turns, medians. `processor` is the plain loops' processor time over that of all
-    the processes of the cluster: what else a machine does hardly changes it;
+(a) touches a second by one worker and by two, beside one and two plain loops over as many touches
+    (plain_loop.py); both take turns, and the table has medians. `processor` is the processor time of the
+    plain loops over that of all processes of the cluster, which other programs hardly change;
 (b) what a block costs beside its touches, on the worker and at the scheduler;
-(c) the memory of all processes while 1000 objects are touched, by processes that never give way to new ones;
-(d) on paper, from (a) and (b): the share of the workers' time that goes into touches.
+(c) the memory of all processes while 1000 objects are touched by processes that are never replaced;
+(d) the share of the workers' time that goes into touches, computed from (a) and (b).
 """
 
 import argparse
@@ -47,12 +47,12 @@ def options(touches, block, seed=0, **more):
 
 
 def family():
-    """This process and all below it that there are now."""
+    """This process and all its present descendants."""
     return [psutil.Process(), *psutil.Process().children(recursive=True)]
 
 
 def processor_time(processes):
-    """Seconds by process."""
+    """{process id: seconds of processor time}."""
     times = {}
     for process in processes:
         try:
@@ -64,7 +64,10 @@ def processor_time(processes):
 
 @contextmanager
 def clocked(spent):
-    """Adds seconds, and the processor time of all processes that are there before and after, to a list."""
+    """Appends (seconds, processor time of all processes of the family, that of this process) to a list.
+
+    Processes that end meanwhile do not count.
+    """
     before, start = processor_time(family()), perf_counter()
     yield
     seconds, after = perf_counter() - start, processor_time(family())
@@ -74,7 +77,7 @@ def clocked(spent):
 
 
 def made(engine, files, asked):
-    """(seconds, processor time, that of client and scheduler) of a data set that is made by warm workers."""
+    """Makes a data set with warm workers: (seconds, processor time, that of client and scheduler)."""
     spent = []
     with tempfile.TemporaryDirectory() as folder:
         run = Run(DataSet(Path(folder)), asked, [str(path) for path in files])
@@ -84,7 +87,7 @@ def made(engine, files, asked):
 
 
 def looped(files, asked, count):
-    """(seconds, processor time) of so many plain loops side by side, each over all of it."""
+    """(seconds, processor time) of `count` plain loops side by side, each over all files."""
     words = [[path.stem, str(path)] for path in files]
     command = [sys.executable, "-m", "benchmarks.plain_loop", json.dumps(words)]
     loops = [
@@ -104,7 +107,7 @@ def looped(files, asked, count):
 
 
 def rates(files, runs, touches):
-    """(a); seconds of processor time of a touch, by kind."""
+    """Prints (a); returns {kind: seconds of processor time of a touch}."""
     pairs = {(kind, workers): [] for kind in KINDS for workers in (1, 2)}
     for workers in (1, 2):
         with connected(None, workers, None) as client:
@@ -123,19 +126,22 @@ def rates(files, runs, touches):
         speeds = [total / median(pair[i][0] for pair in found) for i in (0, 1)]
         ratios = [median(plain[i] / cluster[i] for plain, cluster in found) for i in (0, 1)]
         rows.append([kind, f"{workers}", *(f"{v:.0f}" for v in speeds), *(f"{v:.2f}" for v in ratios)])
-    print(f"(a) {len(files)} scans, {touches} touches of each and worker, blocks of 500.\n")
+    print(f"(a) {len(files)} scans, {touches} touches of each scan by each worker, in blocks of 500.\n")
     table(["touches", "workers", "plain loops /s", "data set /s", "ratio", "processor"], rows, left=1)
     return seconds
 
 
 def _say(kind, workers, plain, cluster):
-    """What a pair of runs has taken, at once, for they take long."""
+    """Prints what a pair of runs has taken as soon as it ends, because all of them take long."""
     times = [f"{seconds:.1f} s, processor {work:.1f} s" for seconds, work, *_ in (plain, cluster)]
     print(f"{kind}, {workers}: plain loops {times[0]}; data set {times[1]}", file=sys.stderr, flush=True)
 
 
 def overhead(files, count):
-    """(b); seconds that a block of another object costs on its worker and at client and scheduler."""
+    """Prints (b); returns the seconds that a block costs on its worker, and at client and scheduler.
+
+    The former include opening another object for each block.
+    """
     fixed = KINDS["fixed"]
     with connected(None, 1, None) as client:
         engine = Engine(client, LIMIT)
@@ -145,10 +151,10 @@ def overhead(files, count):
     opening = looped(files, {"touches": 1, "block": 1, **fixed}, 1)[1] / len(files) - touches / count
     worker, center = (work - central - touches) / count, central / count
     idle = max(seconds - work, 0.0) / count
-    print(f"(b) A block beside its touches, out of {count} of one touch.\n")
+    print(f"(b) What a block costs beside its touches, from {count} blocks of one touch.\n")
     rows = [["worker, processor time", worker], ["opening another object, processor time", opening]]
     rows.append(["client and scheduler, processor time", center])
-    rows.append(["beyond the processor time of all, as where other programs have it", idle])
+    rows.append(["clock beyond all processor time, as where other programs run", idle])
     table(["", "ms"], [[name, f"{1e3 * value:.1f}"] for name, value in rows])
     return worker + opening, center
 
@@ -171,7 +177,7 @@ def write_ball(path, radii, rings=32):
 
 
 def memory(count):
-    """(c); megabytes that the processes grow by an object."""
+    """Prints (c), with the megabytes by which the processes grow for each object."""
     rng, seen = np.random.default_rng(0), []
     with tempfile.TemporaryDirectory() as folder, connected(None, 1, None) as client:
         client.run(_never_worn)
@@ -200,8 +206,8 @@ def _never_worn():
 
 
 def on_paper(seconds, worker, center):
-    """(d)."""
-    print("(d) Share of the workers' time that goes into touches, by workers and touches a block.\n")
+    """Prints (d), from the seconds that `rates` and `overhead` return."""
+    print("(d) The share of the workers' time that goes into touches, by workers and touches a block.\n")
     rows = []
     for kind, each in seconds.items():
         for count in WORKERS:
@@ -213,11 +219,11 @@ def on_paper(seconds, worker, center):
     table(["touches", "workers", *map(str, BLOCKS), "block for .9", "files/s then"], rows, left=1)
     for kind, each in seconds.items():
         most = (500 * each + worker) / center
-        print(f"Blocks of 500 {kind} touches: one scheduler keeps {most:.0f} workers busy.")
+        print(f"With blocks of 500 {kind} touches one scheduler keeps {most:.0f} workers busy.")
 
 
 def _share(each, worker, center, count, block):
-    """Share of the time that goes into touches; the scheduler hands out one block after the other."""
+    """The share of the time that goes into touches, if the scheduler hands out one block after the other."""
     return block * each / max(block * each + worker, count * center)
 
 

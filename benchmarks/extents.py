@@ -6,11 +6,11 @@
 extension. With --pictures it draws build/paper/extent.jpg instead.
 
 Scans, some of them ribbed or sharp-edged, and a ball are touched without noise at random points (seeded, by
-area), with the extent left to the touch and with fixed ones; the step is left to it always. The Markdown
-table has, of patches without a warning, medians: radius and summed area, and how far patch and mesh are
-apart along the normal, in the mean over the domain. `contradicted` are those in no doubt of their own whose
-vertices are off by more than they say: they carry a warning. `silent` are those without one and off by
-more than five times their own deviation.
+area). The touch chooses its extent, or a fixed one is given; it always chooses its step. The Markdown table
+has medians over the patches without a warning: the radius, the area, and the mean distance of patch and mesh
+along the normal over the domain; `all areas` is the sum of the areas. `contradicted` patches have no doubt of
+their own, but carry a warning because the mesh is off them by more than three times their deviation. `silent`
+patches have no warning and are off by more than five times their deviation.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from .paper_pictures import Stage, sheet
 from .refusals import SILENT
 from .scans import random_places, sampling_planes
 
-NECK = 0.19  # Above this height is the shoulder, neck and cap of the bottle.
+NECK = 0.19  # The bottle's shoulder, neck and cap are above this height.
 SCANS = {  # The file, and the least height of a point that is touched.
     "shell": ("shell_gastropod.stl", None),
     "bottle neck": ("bottle_bleach.ply", NECK),
@@ -35,13 +35,13 @@ SCANS = {  # The file, and the least height of a point that is touched.
     "pear": ("pear.ply", None),
     "ball": (None, None),
 }
-# The file, a point between ribs, between pockets or on a smooth side, and the share of the size that is seen.
+# The file, a point between ribs, between pockets or on a smooth side, and the share of the size in view.
 PICTURES = {
     "shell": ("shell_gastropod.stl", (-14.46461, -7.82709, 23.23658), 0.5),
     "CAD block": ("cad_block.stl", (-0.45, 0.3, 1.375), 0.7),
     "lemon": ("lemon.ply", (-0.03383, 0.02996, 0.03865), 1.0),
 }
-# Shares of the object's size.
+# Shares of the object's size; with 0 the touch chooses.
 EXTENTS = {"auto": 0.0, "1/16": 1.0 / 16.0, "1/8": 1.0 / 8.0, "1/4": 1.0 / 4.0}
 
 
@@ -62,13 +62,13 @@ def main():
     head = "object, extent|patches|refused|sure|contradicted|silent|radius|area|all areas|off|off / std|ms"
     table(head.split("|"), rows)
     print(
-        f"{options.touches} touches a row. Radius and `off` in thousandths of the object's size, areas in "
-        f"thousandths of its square; {machine('bpy', 'numpy', 'scipy')}."
+        f"{options.touches} touches a row. Radius and `off` are in thousandths of the object's size, areas "
+        f"in thousandths of its square; {machine('bpy', 'numpy', 'scipy')}."
     )
 
 
 def _rows(extension, name, count):
-    """A line of the table for each extent."""
+    """A row of the table for each extent."""
     import bpy
 
     file, least = SCANS[name]
@@ -87,7 +87,7 @@ def _rows(extension, name, count):
 
 
 def _touched(extension, obj, depsgraph, place, extent):
-    """The report of a touch and how far the patch is off the mesh; None where there is no patch."""
+    """(report of a touch, mean distance of patch and mesh or None), or None where there is no patch."""
     add_on, fit = extension.tactile_addon, {"seed": 0, "method": "bayes", "degree": "auto"}
     try:
         touched = add_on.touch.touch_object.touch(
@@ -118,7 +118,7 @@ def _cells(found, size, count):
 
 
 def _draw(extension):
-    """A sheet of patches on their objects."""
+    """Draws a sheet of patches on their objects."""
     import bpy
     from mathutils import Vector
 
@@ -132,7 +132,8 @@ def _draw(extension):
         up = Vector((0, 0, 1)) if abs(normal.z) < 0.8 else Vector((0, 1, 0))
         view = (normal + 0.35 * up + 0.3 * up.cross(normal)).normalized()
         width = share * max(obj.dimensions)
-        lines.delta_location = patch.matrix_world.to_3x3().inverted() @ (0.05 * width * view)  # off the patch
+        # The curves come nearer to the camera, so that the patch does not hide them.
+        lines.delta_location = patch.matrix_world.to_3x3().inverted() @ (0.05 * width * view)
         demo.look(bpy.context.scene, obj)
         Stage(extension, bpy.context.scene).photograph(name, patch.location, view, up, width, [patch])
     sheet("extent", [list(PICTURES)], list(PICTURES), [""], "")

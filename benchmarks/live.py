@@ -3,16 +3,16 @@
 """Where the time goes when a probe follows the mouse: one live update, on a small and on a large mesh.
 
 `python -m benchmarks.live ZIP [--base ROOT]`, from the root of a checkout; ZIP is the built extension. With
---base it prints instead how long a live update and the end of a gesture take beside those of that checkout,
-whose extension is built too: processor time, by turns (live_worker.py).
+--base it prints instead how much processor time a live update and the end of a gesture take beside those of
+that checkout, whose extension must be built too; the two take turns (live_worker.py).
 
-A wavy sheet is touched once, so that Blender's tree of its faces is there; then the first plane is
-turned by a degree again and again, as dragging its handle does. The Markdown table has medians in
-milliseconds on one thread, in one Blender without a window: `ray casts` are Blender's part of tracking,
-`fit` is the reconstruction with its report, `mesh write` rewrites patch and contours with normals and
-colors, `all` is the whole update with Blender's evaluation of what has changed, without the redraw.
-The last two columns are not live: building that tree, which happens once, and the end of a gesture, with the
-extent chosen and the distances to the mesh.
+A wavy sheet is touched once, so that Blender builds its tree of the faces. Then the first plane is turned by
+a degree again and again, as dragging its handle does. The Markdown table has medians in milliseconds on one
+thread, in one Blender without a window: `ray casts` are Blender's part of tracking, `fit` is the
+reconstruction with its report, `mesh write` rewrites patch and contours with normals and colors, and `all` is
+the whole update with Blender's evaluation of what has changed, without the redraw. The last two columns are
+not live: the first touch, which builds that tree, and the end of a gesture, which chooses the extent and
+measures the distances to the mesh.
 """
 
 import argparse
@@ -53,7 +53,7 @@ class Clock:
 
 
 def measure(bpy, update, clock, faces):
-    """A row of the table: medians in milliseconds by stage, and what is done once."""
+    """A row of the table in milliseconds: medians by stage, the first touch, and the end of a gesture."""
     obj = sheet(bpy, faces)
     start = perf_counter()
     bpy.ops.tactile.pick(target=obj.name, location=(0.2, 0.1, 0.05))
@@ -78,7 +78,7 @@ def measure(bpy, update, clock, faces):
 
 
 def compare(base):
-    """A Markdown table of medians here and in the checkout `base`."""
+    """Prints a Markdown table of medians here and in the checkout `base`."""
     with ExitStack() as stack:
         pair = [stack.enter_context(worker("live_worker.py", root)) for root in (ROOT, base)]
         rows = []

@@ -15,7 +15,7 @@ from time import process_time
 
 
 def sheet(bpy, faces):
-    """A wavy sheet of that many faces, the only object."""
+    """A wavy sheet of about that many faces, the only object of the scene."""
     import numpy as np
 
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -31,7 +31,7 @@ def sheet(bpy, faces):
 
 
 def as_in_a_window(addon):
-    """What is dear waits for the end of the gesture; returns what ends one."""
+    """Makes updates leave out what takes long, as in a drag; returns the function that ends the gesture."""
     rooms = hasattr(addon, "probes")
     update = addon.probes.touch_again.update if rooms else addon.probe.update
     handlers = addon.probes.change_handlers if rooms else addon.live

@@ -5,11 +5,12 @@
 `python -m benchmarks.mesh_size ZIP [--quick]`, from the root of a checkout; ZIP is the built extension.
 Prints Markdown tables, times in milliseconds, and draws build/charts/mesh_size.png.
 
-The mesh is the wavy sheet of benchmarks.live, a touch is three contours of 22 steps and the default fit.
-`Blender's ray casts` are the rays of tracking alone, cast once more; `ray casts of the surface` have the
-extension's part of them. `read mesh` is what each touch does before it tracks, `first touch` is all of a
-touch while Blender builds its tree of the faces. The peers cut the whole mesh by the same three planes,
-without a fit; what it takes to hand the mesh to them is apart. Without trimesh its columns are left out.
+The mesh is the wavy sheet of benchmarks.live, and a touch is three contours of 22 steps and the default fit.
+`Blender's ray casts` are the rays of tracking, cast once more without the extension; `ray casts of the
+surface` are the same rays by way of the extension. `read mesh` is what each touch does before it tracks, and
+`first touch` is a whole touch during which Blender builds its tree of the faces. The peers cut the whole mesh
+by three planes through the same point, without a fit; handing the mesh to them has columns of its own.
+Without trimesh its columns are left out.
 """
 
 import argparse
@@ -33,7 +34,7 @@ from .plot import plt
 # These are square numbers, because the sheet is square.
 FACES = (10_000, 40_000, 160_000, 490_000, 1_000_000, 4_000_000)
 QUICK_FACES = (10_000, 160_000, 1_000_000)
-LOCATION, EXTENT, STEPS = (0.2, 0.1, 0.05), 0.3, 11  # A half contour has so many steps.
+LOCATION, EXTENT, STEPS = (0.2, 0.1, 0.05), 0.3, 11  # STEPS counts those of a half curve.
 TOUCHES = 51
 FIT, TRACKING, CASTS, OURS = "tracking and fit", "tracking", "Blender's ray casts", "ray casts of the surface"
 READ, FIRST = "read mesh", "first touch"
@@ -53,8 +54,8 @@ COLUMNS = (FIT, TRACKING, OURS, CASTS, READ, FIRST, TO_BMESH, BISECT, TO_TRIMESH
 CAPTION = (
     "Solid: what each touch takes, three contours of 22 steps and the default fit, medians of {} azimuths; "
     "the ray casts are a part of tracking, cast once more on their own. Dotted: the first touch of a mesh, "
-    "when Blender builds its tree of the faces. Dashed: three sections of the whole mesh by the same planes, "
-    "without a fit and without handing the mesh over; {}."
+    "when Blender builds its tree of the faces. Dashed: three sections of the whole mesh through the same "
+    "point, without a fit and without handing the mesh over; {}."
 )
 
 
@@ -70,7 +71,7 @@ class Recorder:
 
 
 def touch(core, surface, point, normal, azimuth=0.0):
-    """Seconds of tracking three contours, and of that with the fit."""
+    """Seconds of tracking three contours, and of tracking with the fit."""
     planes = [core.SamplingPlane(azimuth + math.pi * i / 3) for i in range(3)]
     lengths = {"extent": EXTENT, "step": EXTENT / STEPS}
     tracking, contours = timed(core.track, surface, point, normal, planes, **lengths)
@@ -80,7 +81,7 @@ def touch(core, surface, point, normal, azimuth=0.0):
 
 
 def first_touch(extension, obj, depsgraph):
-    """The surface, and where and how it was touched."""
+    """Touches for the first time; returns the surface, the point (3,) and the normal (3,) there."""
     surface = extension.tactile_addon.touch.surface.MeshSurface(obj, depsgraph)
     point, normal, _ = surface.project(LOCATION)
     touch(extension.core, surface, point, normal)
@@ -94,7 +95,7 @@ def recorded(extension, surface, point, normal, azimuth):
 
 
 def touches(extension, obj, depsgraph, surface, point, normal):
-    """Medians in seconds by stage, all stages in turns, and of the number of rays."""
+    """({stage: median seconds}, the median number of rays); all stages take turns."""
     azimuths = [math.pi / 3 * i / TOUCHES for i in range(TOUCHES)]
     rays = [recorded(extension, surface, point, normal, azimuth) for azimuth in azimuths]
     bare = partial(obj.evaluated_get(depsgraph).ray_cast, depsgraph=depsgraph)
@@ -103,8 +104,8 @@ def touches(extension, obj, depsgraph, surface, point, normal):
         tracking, both = touch(extension.core, surface, point, normal, azimuth)
         runs[TRACKING].append(tracking)
         runs[FIT].append(both)
-        # These are rays at other azimuths, because where the first ones ran, the processor's cache is still
-        # warm.
+        # Rays at other azimuths are cast, because the faces that this touch has met are still in the
+        # processor's cache.
         runs[OURS].append(timed(cast_all, surface.ray_cast, rays[i - TOUCHES // 3])[0])
         runs[CASTS].append(timed(cast_bare, bare, rays[i - 2 * TOUCHES // 3])[0])
         if i % 10 == 0:
@@ -123,7 +124,7 @@ def cast_bare(cast, rays):
 
 
 def bisect(mesh, planes):
-    """Seconds to make a bmesh of the whole mesh, and to cut it by all planes."""
+    """{stage: seconds} to make a bmesh of the whole mesh, and to cut it by all planes."""
     import bmesh
 
     whole = bmesh.new()
@@ -138,7 +139,7 @@ def bisect(mesh, planes):
 
 
 def section(mesh, planes):
-    """Seconds to make a Trimesh of the whole mesh, and for curves or bare segments in all planes."""
+    """{stage: seconds} to make a Trimesh of the whole mesh, and for curves or bare segments in all planes."""
     from trimesh.intersections import mesh_plane
 
     making, whole = timed(triangles, mesh)
@@ -161,7 +162,7 @@ PEERS = (bisect, section) if find_spec("trimesh") else (bisect,)
 
 
 def measure(bpy, extension, faces):
-    """Seconds by stage on a sheet of that many faces; and its true number of faces, and of rays."""
+    """{stage: median seconds} on a sheet of about that many faces, with the numbers of "faces" and "rays"."""
     obj = live.sheet(bpy, faces)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     first, (surface, point, normal) = timed(first_touch, extension, obj, depsgraph)
@@ -175,7 +176,7 @@ def measure(bpy, extension, faces):
 
 def print_table(rows):
     columns = [name for name in COLUMNS if name in rows[0]]
-    print("Milliseconds.\n")
+    print("Times are in milliseconds.\n")
     cells = [
         [f"{row['faces']}", f"{row['rays']}", *(f"{1e3 * row[name]:.2f}" for name in columns)] for row in rows
     ]
@@ -220,7 +221,7 @@ def main():
         measure(bpy, extension, 1000)  # This imports everything.
         rows = [measure(bpy, extension, faces) for faces in (QUICK_FACES if options.quick else FACES)]
     if section not in PEERS:
-        print("trimesh is not installed and left out.\n")
+        print("trimesh is not installed, so it is left out.\n")
     print_table(rows)
     header = ["faces", "rays", *(f"{name}, ms" for name in COLUMNS if name in rows[0])]
     cells = [

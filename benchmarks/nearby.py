@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How an automatic extent follows while a point is dragged, beside new touches and an extent that stays.
 
-`python -m benchmarks.nearby [--paths N]`, from the root of a checkout; bpy to read the scans. From N random
-points (seeded, by area) of each scan a point slides over it in a random direction, in 25 steps of .4 % of
-its size. At each place it is touched near the last touch (`core.explore_nearby`), anew (`core.explore`), and
-with the extent and step of the first touch of its path. The Markdown table has the shares of touches that
-are sure; of those near the last the fits, and how long their half curves are beside those of new touches,
-in the geometric mean; the share of updates in which their extent changes by more than a tenth; and medians
-of processor time.
+`python -m benchmarks.nearby [--paths N]`, from the root of a checkout; it needs bpy to read the scans. From N
+random points (seeded, by area) of each scan a point slides over it in a random direction, in up to 25 steps
+of .4 % of its size. At each place the scan is touched in three ways: near the last touch
+(`core.explore_nearby`), anew (`core.explore`), and with the extent and step of the first touch of the path.
+The Markdown table has the shares of touches that are sure. For touches near the last one it has the mean
+number of fits, the geometric mean of their extent over that of new touches, and the share of updates in which
+their extent changes by more than a tenth. It ends with medians of processor time.
 """
 
 import argparse
@@ -29,11 +29,11 @@ from .real import Scan
 PLANES = [SamplingPlane(math.pi * i / 3) for i in range(3)]
 STEPS, STEP, LIFT = 25, 0.004, 0.02  # The number of steps of a path, and shares of the size.
 FARTHEST = 0.5  # A share of the size, as in Blender.
-JUMP = math.log(1.1)
+JUMP = math.log(1.1)  # Changes of the extent by a larger factor are counted.
 
 
 def path(scan, point, normal, rng):
-    """Points and normals along a curve on a scan, which may end early."""
+    """Yields points (3,) and normals (3,) along a curve on a scan, which may end early."""
     ahead = np.cross(normal, rng.normal(size=3))
     for _ in range(STEPS):
         ahead -= (ahead @ normal) * normal
@@ -46,7 +46,7 @@ def path(scan, point, normal, rng):
 
 
 def timed(touch):
-    """(whether a touch is sure, what it found, seconds); it finds None if it is refused."""
+    """(whether a touch is sure, what it found or None if it was refused, seconds)."""
     start = process_time()
     try:
         found = touch()
@@ -57,7 +57,7 @@ def timed(touch):
 
 
 def along(scan, point, normal, rng, fits):
-    """Rows of a path: the three touches as in `timed`, and the fits of the one near the last."""
+    """Yields (near, number of its fits, new, kept) for each place of a path, with touches as from `timed`."""
     first = explore(scan, point, normal, PLANES, farthest=FARTHEST)
     reaches = reaches_of(first)
 
@@ -126,7 +126,7 @@ def main():
         ],
         [*rows, summary("all", everything)],
     )
-    print(f"Processor time; {machine('bpy')}.")
+    print(f"Times are processor time; {machine('bpy')}.")
 
 
 if __name__ == "__main__":

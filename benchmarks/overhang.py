@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a patch has nothing below it: beside edges, holes and corners that no curve crosses.
+"""How much of a patch has nothing below it, as beside edges, holes and corners that no curve crosses.
 
 `python -m benchmarks.overhang ZIP [--touches N]`, from the root of a checkout; ZIP is the built extension.
 A machined block and a plate with a hole are touched at random points (seeded, by area) with three planes.
-Prints Markdown: shares of the patches' area, that are farther than a tenth of its radius from the mesh.
+It prints a Markdown table of the shares of the patches' areas that are farther from the mesh than a tenth of
+the patch's radius.
 """
 
 import argparse
@@ -19,8 +20,8 @@ from . import SCANS_FOLDER, machine, table
 from .scans import random_places, sampling_planes
 
 EXTENTS = (1.0 / 8.0, 1.0 / 16.0, 0.0)  # Shares of the object's size; 0 is automatic.
-NEAR, GRID = 0.1, 400  # A share of the radius, and the number of points of a patch.
-AROUND, HOLE = 96, 0.3  # Corners and radius of the hole in a plate of side 2.
+NEAR, GRID = 0.1, 400  # A share of the radius, and the number of points of a patch that are compared.
+AROUND, HOLE = 96, 0.3  # The number of corners and the radius of the hole in a plate of side 2.
 
 
 def main():
@@ -42,7 +43,7 @@ def main():
 
 
 def _shares(extension, obj, share, count):
-    """Shares (n,) of the patches' area that have nothing below them."""
+    """The share of its area that has nothing below it, for each patch, (n,)."""
     import bpy
 
     modules = extension.tactile_addon.touch

@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The experiments of Jia and Tian's sections IV and V again, beside their figures.
 
-`python -m benchmarks.paper ZIP`, from the root of a checkout; ZIP is the built extension, in whose Blender
-scans are read and pictures drawn. Prints Markdown:
+`python -m benchmarks.paper ZIP`, from the root of a checkout; ZIP is the built extension. Blender, with it
+installed, reads the scans and draws the pictures. The command prints Markdown:
 
 (a) Figures 3 and 4: a bottle's neck under no constraint and by TAGC, verified on nine more curves;
 (b) Table II: distances of contacts and of mesh vertices to the patches;
-(c) where the two differ, and why.
+(c) where our results and the paper's differ, and why.
 
-Table I and the two patches of Figures 3 and 4 are drawn to build/paper/*.jpg. Without the scans, what is
-exact remains. Lengths are in mm.
+Table I and the two patches of Figures 3 and 4 are drawn to build/paper/*.jpg. Without the scans, only exact
+surfaces are touched. Lengths are in mm.
 """
 
 import argparse
@@ -30,17 +30,17 @@ from tools import blender
 from . import SCANS_FOLDER, accuracy, machine, paper_pictures, table, timed
 from .scans import AZIMUTHS, SCANS
 
-NOISE = 0.05  # The noise of a contact; the paper's fits are off theirs by as much.
+NOISE = 0.05  # The noise of a contact: the paper's fits are off their contacts by as much.
 SEEDS = 9
 TURN = 60.0 / SEEDS  # Planes turn by so many degrees from seed to seed, so that no direction is favored.
 NINE = (15.0, 30.0, 45.0, 75.0, 90.0, 105.0, 135.0, 150.0, 165.0)  # The azimuths of the verifying curves.
-LEAN = np.array([3.0, -2.0, 4.0])  # Planes lean by so many degrees, and by multiples of that.
-LEANS = (0.0, 1.0, 2.0, 4.0)
-DRAWN = 2.0  # This multiple is off by about as much as the paper's fit without a constraint.
-# The rows that are drawn, with their labels: our pebble is the lemon.
+LEAN = np.array([3.0, -2.0, 4.0])  # Angles in degrees by which the three planes lean from the normal,
+LEANS = (0.0, 1.0, 2.0, 4.0)  # and the multiples of these angles that are tried.
+DRAWN = 2.0  # With this multiple the fit without a constraint is off by about as much as the paper's.
+# The rows of Table I that are drawn, with their labels. The lemon stands for the paper's pebble.
 DRAWN_ROWS = {"shell": "shell", "pear": "pear", "pebble": "lemon"}
 NECK_EXTENT, NECK_STEPS = 11.7, 9
-VERTICES = 1500  # An exact surface has about so many vertices.
+VERTICES = 1500  # The number of points on an exact surface that count as its vertices.
 LEAST_SQUARES, TAGC, QV, BAYES = "least-squares", "tagc", "quadratic-variation", "bayes"
 METHODS = (LEAST_SQUARES, TAGC, QV, BAYES)
 TABLE_II = (TAGC, QV, BAYES)
@@ -48,11 +48,11 @@ NECK = "bottle neck"
 EXACT, SCAN = "exact", "scan"
 EXACT_NECK, SCANNED_NECK = "exact neck", "scanned neck"
 CONVEX = ("shell", "pebble")  # These exact surfaces are convex all over the patch.
-SHORT = 0.75  # A shorter extent, as a share, shows its effect.
+SHORT = 0.75  # The share of the extent at which the fit is repeated, to show the effect of the extent.
 
 
 class Figures(NamedTuple):
-    """What Figures 3 and 4 have: (6) on three and on nine curves, the total absolute curvature."""
+    """The numbers of Figures 3 and 4: (6) on three and on nine curves, and the total absolute curvature."""
 
     three: float
     nine: float
@@ -60,7 +60,7 @@ class Figures(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A row of Table II; distances by method."""
+    """A row of Table II, with {method: mean distance}; `mesh` is the number of all vertices."""
 
     contacts: float
     to_contacts: dict
@@ -81,8 +81,8 @@ PAPER_TABLE = {
     NECK: Row(57, {TAGC: 0.0514}, None, {TAGC: 0.130}, None),
 }
 PAPER_MINUTES = 10.0
-PAPER_WEIGHT = 9.99  # The paper's lambda of (9) for the neck in 1/mm^2; it does not tell the others.
-QV_WEIGHT = 1e5  # It is nearly the paper's constraint f(a) = 0.
+PAPER_WEIGHT = 9.99  # The paper's lambda of (9) for the neck, in 1/mm^2; the paper does not tell the others.
+QV_WEIGHT = 1e5  # This weight is nearly the paper's constraint f(a) = 0.
 
 
 # What is touched ---------------------------------------------------------------------------------------
@@ -97,12 +97,12 @@ class Place(NamedTuple):
     outward: np.ndarray
     extent: float
     steps: int
-    over: Callable  # A function: the vertices over a reconstruction's domain, in its frame.
-    mesh: int | None = None  # The number of all vertices.
+    over: Callable  # A function: from a reconstruction to the vertices (n, 3) over its domain, in its frame.
+    mesh: int | None = None  # The number of all vertices of a scan.
 
     @property
     def weight(self):
-        """The paper's, in unit radius."""
+        """The paper's lambda, in unit radius."""
         return PAPER_WEIGHT * self.extent**2
 
     def contours(self, azimuths, seed, lean=0.0):
@@ -125,7 +125,7 @@ def exact(name, surface, extent, steps):
 
 
 def exact_places():
-    """Surfaces as curved and as large as the paper's objects may be; the neck is as the paper gives it."""
+    """Yields surfaces as curved and large as the paper's objects may be; the paper gives the neck."""
     yield exact(NECK, surfaces.bottle_neck(), NECK_EXTENT, NECK_STEPS)
     like = (("torus outer", "shell", 16), ("pear", "pear", 10), ("ellipsoid", "pebble", 13))
     for name, stands_for, steps in like:
@@ -133,7 +133,7 @@ def exact_places():
 
 
 def scan_places(extension):
-    """Each scan of an object of the paper's kind, in mm, alone in the scene as long as it is looked at."""
+    """Yields a Place on each scan of an object of the paper's kind, in mm; the scan is alone in the scene."""
     import bpy
     from mathutils import Matrix
 
@@ -151,7 +151,7 @@ def scan_places(extension):
 
 
 def _within_reach(surface, r):
-    """The mesh vertices over the domain that a finger can touch from outside."""
+    """The mesh vertices (n, 3) over the domain that a finger can touch from outside, in the frame of r."""
     _, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius)
     return r.frame.to_local(vertices[core.reachable(r.geometry, surface, vertices, normals)])
 
@@ -167,7 +167,7 @@ class Tested(NamedTuple):
     row: Row
     milliseconds: dict
     shorter: Row  # TAGC alone, at a shorter extent.
-    alike: Row  # With TAGC's weight for QV as well.
+    alike: Row  # TAGC and QV, both with TAGC's weight.
 
 
 class Fit(NamedTuple):
@@ -189,7 +189,7 @@ def _in_frame(r, curves):
 
 
 def figures(place, *methods, lean=0.0):
-    """Figures and milliseconds, (SEEDS, 4), by method."""
+    """{method: (SEEDS, 4)}: the three numbers of Figures, and the milliseconds of a fit."""
     runs = {method: [] for method in methods}
     for seed in range(SEEDS):
         nine = place.contours(NINE, seed + 1000 * SEEDS)
@@ -201,7 +201,7 @@ def figures(place, *methods, lean=0.0):
 
 
 def table_row(place, *methods, **options):
-    """Medians over the seeds: a Row, and milliseconds by method."""
+    """Medians over the seeds: a Row, and {method: milliseconds}."""
     runs = {method: [] for method in methods}
     for seed in range(SEEDS):
         for method in methods:
@@ -235,7 +235,7 @@ def true_curvature(surface, r):
 
 
 def print_figures(measured):
-    """measured : {title: {method: the array of figures()}}"""
+    """measured : {title: {method: (SEEDS, 4)}}, as `figures` returns them"""
     print("(a) Figures 3 and 4\n")
     rows = []
     for method, paper in PAPER_FIGURES.items():
@@ -323,7 +323,7 @@ def _between_the_curves(measured):
     yield "**No constraint.** A polynomial along three lines shows three numbers of each degree, so planes"
     yield "through one line show three of the four cubic coefficients and three of the five quartic ones. The"
     yield "other three come from how far the planes lean from the normal as it is found:"
-    yield f"off by {', '.join(f'{off[lean]:.3g} mm ({_degrees(lean)})' for lean in LEANS)}."
+    yield f"the fit is off by {', '.join(f'{off[lean]:.3g} mm ({_degrees(lean)})' for lean in LEANS)}."
     yield f"The paper's {paper.nine} mm is nearest to {_degrees(nearest)}; its planes are vertical, and it"
     yield "does not tell how far from the normal that is. The total absolute curvature of the upright fit is"
     yield f"{curvature / paper.curvature:.2f} times the paper's."
@@ -352,16 +352,17 @@ def _distances_to_meshes(tested, kind):
     )
     to_bayes = [of.row.to_vertices[TAGC] / of.row.to_vertices[BAYES] for of in ours]
     yield f"**Distances to the mesh, {kind}.** TAGC's are {_span(ratios)} times the paper's, on other"
-    yield f"objects; at {SHORT:g} of these extents {_span(shorter)} times. They are {_span(to_bayes)} times"
-    yield "those of bayes. **What does not repeat:** TAGC is at least as near as QV, to contacts and to"
-    yield f"vertices, in {_nearer(PAPER_TABLE.values())} in the paper and in {_nearer(of.row for of in ours)}"
-    yield f"here; in {_nearer(of.alike for of in ours)} with TAGC's weight for QV, far from f = 0."
+    yield f"objects; at {SHORT:g} of these extents they are {_span(shorter)} times the paper's. They are"
+    yield f"{_span(to_bayes)} times those of bayes. **What does not repeat:** TAGC is at least as near as QV,"
+    yield f"to contacts and to vertices, in {_nearer(PAPER_TABLE.values())} comparisons in the paper and in"
+    yield f"{_nearer(of.row for of in ours)} here. If QV has TAGC's weight, which is far from f = 0, it is in"
+    yield f"{_nearer(of.alike for of in ours)}."
     vertices = [row.vertices for row in PAPER_TABLE.values() if row.vertices]
     if kind == SCAN:
-        yield f"Our scans are coarser, {_span([of.row.vertices for of in ours], '.0f')} vertices under a"
-        yield f"patch, not {_span(vertices, '.0f')}; the paper's have an error of their own, to 0.127 mm."
-        yield "It registers its patches onto the meshes, and what that leaves is in its distances; ours are"
-        yield "touched on the mesh itself, so registration is no part of this run."
+        yield f"Our scans are coarser: they have {_span([of.row.vertices for of in ours], '.0f')} vertices"
+        yield f"under a patch, not {_span(vertices, '.0f')}. The paper's have an error of their own, up to"
+        yield "0.127 mm. The paper registers its patches onto the meshes, and what that leaves is in its"
+        yield "distances; ours are touched on the mesh itself, so registration is no part of this run."
 
 
 def _nearer(rows):
@@ -397,14 +398,14 @@ def _time(neck):
     quick, descent = np.median(runs, axis=0)
     share = round(6e4 * PAPER_MINUTES / descent, -3)
     yield f"**Time.** The paper's steepest descent takes {descent:.0f} ms here, Newton's {quick:.0f} ms,"
-    yield f"against {PAPER_MINUTES:.0f} minutes: the former 1/{share:.0f} of it."
+    yield f"against the paper's {PAPER_MINUTES:.0f} minutes; the descent takes 1/{share:.0f} of these."
 
 
 # Pictures ----------------------------------------------------------------------------------------------
 
 
 def draw_neck(extension, neck):
-    """Figures 3 and 4: of the seeds, the one that puts TAGC in the middle."""
+    """Draws Figures 3 and 4 for the seed with the median error of TAGC; returns {method: error in mm}."""
     seed = int(np.argsort(figures(neck, TAGC, lean=DRAWN)[TAGC][:, 1])[SEEDS // 2])
     errors = {}
     for method in (LEAST_SQUARES, TAGC):
@@ -429,8 +430,8 @@ def draw_sheets(scanned, errors):
         f"TAGC (Figure 4): {errors[TAGC]:.2f} mm off",
     )
     caption = (
-        "large red balls: 57 contacts · small blue ones: 171 points on nine more curves, their mean miss"
-        f" above\nplanes leaning {_degrees(DRAWN)} · the left patch goes on, cut off"
+        "large red balls: 57 contacts · small blue ones: 171 points on nine more curves, their mean error"
+        f" above\nplanes leaning {_degrees(DRAWN)} · the left patch goes on: it is cut off"
         f" {paper_pictures.TALL:.0f} mm above and below the point"
     )
     paper_pictures.sheet("figures_3_4", [[LEAST_SQUARES, TAGC]], titles, (), caption)
@@ -462,7 +463,7 @@ def main():
             draw_sheets(scanned, draw_neck(extension, neck))
     print(_caption(), end="\n\n")
     if not scanned:
-        print(f"Skipped, for want of the scans in {SCANS_FOLDER}: all rows of scans, and Table I.\n")
+        print(f"All rows of scans and Table I are skipped, because there are no scans in {SCANS_FOLDER}.\n")
     print_figures(measured)
     print_table(tested)
     print_differences(neck, measured, tested)
@@ -471,10 +472,10 @@ def main():
 
 def _caption():
     return (
-        f"Lengths in mm, medians over {SEEDS} seeds, which draw {NOISE:g} mm of noise across the curves"
-        f" and turn the three planes, 60 degrees apart, by {TURN:.2g} degrees more each. The reference point"
-        " counts in each curve, as 57 = 3 x 19 and 171 = 9 x 19 suggest. TAGC has the paper's weight,"
-        f" {PAPER_WEIGHT} per mm² in (9), QV {QV_WEIGHT:.0f} in unit radius. On"
+        f"Lengths are in mm. Medians are over {SEEDS} seeds: each draws {NOISE:g} mm of noise across the"
+        f" curves and turns the three planes, 60 degrees apart, {TURN:.2g} degrees farther. The reference"
+        " point counts in each curve, as 57 = 3 x 19 and 171 = 9 x 19 suggest. TAGC has the paper's weight,"
+        f" {PAPER_WEIGHT} per mm² in (9), and QV has {QV_WEIGHT:.0f} in unit radius. On"
         f" {machine('numpy', 'scipy')}."
     )
 

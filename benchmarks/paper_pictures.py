@@ -11,10 +11,10 @@ from tools import demo
 from . import ROOT
 
 OUTPUT = ROOT / "build" / "paper"
-CUT = 1.65  # A mesh is shown within so many radii of the reference point.
+CUT = 1.65  # Radii around the reference point within which a mesh is shown.
 TALL = 8.19  # The neck's patches are shown so many mm above and below the point.
 FINE = 0.01  # The distance of vertices in a cut patch, as a share of the radius.
-SIZE = 480  # A picture in a sheet has so many pixels.
+SIZE = 480  # The width and height of a picture in a sheet, in pixels.
 INKS = {
     "black": (0.004, 0.004, 0.004, 1.0),
     "red": (0.85, 0.01, 0.01, 1.0),
@@ -94,7 +94,7 @@ class Stage:
     def photograph(self, name, center, view, up, width, overlays=()):
         """Renders to build/paper/NAME.png what is seen from `view`, with `up` upward.
 
-        Overlays come nearer for that, which an orthographic camera does not show.
+        Overlays are moved toward the camera, which an orthographic picture does not show.
         """
         import bpy
         from mathutils import Matrix, Vector
@@ -118,7 +118,7 @@ class Stage:
 
 
 def draw_row(extension, place, r, contours):
-    """A row of Table I: the scan, alone in the scene, and its patch from outside and from inside."""
+    """Draws a row of Table I: the scan, alone in the scene, and its patch from outside and from inside."""
     import bpy
 
     scene = bpy.context.scene
@@ -144,7 +144,7 @@ def draw_row(extension, place, r, contours):
 
 
 def _cut(stage, obj, place, r):
-    """The mesh around the patch, each vertex colored by its unit outward normal as R, G, B."""
+    """Adds the mesh around the patch, each vertex colored by its unit outward normal as R, G, B."""
     mesh = obj.data
     mesh.calc_loop_triangles()
     points, normals = np.empty((2, len(mesh.vertices), 3), dtype=np.float32)
@@ -156,7 +156,7 @@ def _cut(stage, obj, place, r):
     near = (np.hypot(x, y) < CUT * r.radius) & (np.abs(z) < CUT * r.radius)
     for i in np.flatnonzero(near):  # What lies below another layer would hide the view from inside.
         near[i] = not is_hidden(place.surface, points[i].tolist(), up, 2.0 * CUT * r.radius)
-    # Emission is linear, but these colors are as seen.
+    # Emission takes linear colors, but these are colors as they are seen.
     colors = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
     attributes = [("normal_color", "FLOAT_COLOR", colors.astype(np.float32))]
     material = stage.mesh_data.emission("Normals", attribute="normal_color")
@@ -164,7 +164,7 @@ def _cut(stage, obj, place, r):
 
 
 def draw_neck(extension, name, r, contacts, verifying):
-    """A patch, with red contacts and blue verifying points, both in its frame."""
+    """Draws a patch, with red contacts and blue verifying points, both in its frame."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -180,7 +180,7 @@ def draw_neck(extension, name, r, contacts, verifying):
 
 
 def _cut_off(mesh, height):
-    """What of the mesh is farther than that from z = 0 goes."""
+    """Removes the part of the mesh that is farther than `height` from z = 0."""
     import bmesh
 
     form = bmesh.new()
@@ -194,7 +194,7 @@ def _cut_off(mesh, height):
 
 
 def sheet(name, pictures, column_titles, row_titles, caption):
-    """build/paper/NAME.jpg from the pictures of that folder, row by row, under their titles."""
+    """Writes build/paper/NAME.jpg from pictures of that folder, row by row, under their titles."""
     from .plot import plt
 
     rows, columns = len(pictures), len(pictures[0])

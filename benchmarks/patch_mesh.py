@@ -4,10 +4,11 @@
 
 `python -m benchmarks.patch_mesh`, from the root of a checkout.
 
-Exact surfaces are touched along three curves, and each patch is meshed as Blender shows it. Deviations are
-in height, at 45 points of each triangle, in thousandths of the radius, as the tolerance and the standard
-deviation it is a share of. The last column is what a uniform grid of squares, each cut in two, takes to
-deviate as much at most inside the domain, whose boundary it follows by steps of its squares.
+Exact surfaces are touched along three curves, and each patch is meshed as Blender shows it. Deviations of the
+mesh from the polynomial are in height, at 45 points of each triangle. They are in thousandths of the radius,
+like the standard deviation and the tolerance, which is a share of it. The last column is the number of
+vertices of a uniform grid of squares, each cut in two, whose largest deviation inside the domain is the same;
+that grid follows the boundary only in steps of its squares.
 """
 
 import numpy as np
@@ -32,19 +33,19 @@ TOUCHES = [  # Name, surface, extent and noise.
     ("quartic", surfaces.quartic(), 20.0, 0.0),
     ("sine", surfaces.sine(), 12.0, 0.02),
 ]
-STEPS = 8  # A triangle is sampled with so many steps.
-HALVINGS = 12  # The interval of the grid's spacing is halved so often.
+STEPS = 8  # The number of steps along each side of a triangle where it is sampled.
+HALVINGS = 12  # The number of times that the interval of the grid's spacing is halved.
 
 
 def between(r: Reconstruction, points, triangles):
-    """x, y of points all over the triangles, and the deviation there, each (k, m)."""
+    """x, y of k points in each of m triangles, and the deviation in height there, each (k, m)."""
     shares = [(i, j, STEPS - i - j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]
     x, y, z = np.einsum("wk,tkd->dwt", np.array(shares) / STEPS, points[triangles])
     return x, y, np.abs(r.height(x, y) - z)
 
 
 def grid(r, spacing):
-    """The greatest deviation of a uniform grid over the domain, and its vertices."""
+    """The greatest deviation of a uniform grid over the domain, and the number of its vertices."""
     reach = np.ceil(np.abs(r.domain.boundary(360)).max() / spacing) + 1
     axis = spacing * np.arange(-reach, reach + 1)
     x, y = (values.ravel() for values in np.meshgrid(axis, axis))
@@ -57,7 +58,7 @@ def grid(r, spacing):
 
 
 def grid_vertices(r, deviation):
-    """The vertices of the widest uniform grid, no wider than the radius, that deviates by no more."""
+    """The number of vertices of the widest uniform grid, up to the radius, that deviates by no more."""
     low, high = r.radius / 200.0, r.radius
     if grid(r, high)[0] <= deviation:
         return grid(r, high)[1]

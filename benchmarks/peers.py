@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What people would use instead: from a case of benchmarks.accuracy to a surface, from a mesh to curvatures.
+"""What people would use instead: peers that fit a surface to a case of benchmarks.accuracy, or take a mesh.
 
-Peers that fit the contacts start from the paper's frame, in unit radius. Where one asks for a setting that
-its user would have to find, several were tried on the exact surfaces at all three noise levels, and what came
-out best over these is the default here. Optional packages are imported where they are used.
+Peers that fit the contacts start from the paper's frame, in unit radius. Where one needs a setting that its
+user would have to find, several were tried on the exact surfaces at all three noise levels, and the one that
+was best over these is used. Peers that take a mesh return the normal and both kappas at its first vertex.
+Optional packages are imported where they are used.
 """
 
 import warnings
@@ -17,7 +18,10 @@ from core.patch.monge import exponents, monomials
 
 
 class Fit(NamedTuple):
-    """A fitted surface in its own frame; kappas and height_std where the method has them."""
+    """A fitted surface in its own frame; kappas and height_std are None where the method has none.
+
+    height and height_std are functions of x and y in the frame, in length.
+    """
 
     axes: np.ndarray
     height: object
@@ -26,13 +30,16 @@ class Fit(NamedTuple):
 
 
 def _start(case):
-    """What the peers start from: the paper's frame and quadric, the contacts there with the point, and L."""
+    """The paper's frame and quadric (a Reconstruction), contacts (n, 3) in it and in unit radius, and L.
+
+    The reference point is the first contact.
+    """
     r = reconstruct(case.point, case.contours, outward=case.axes[:, 2], method="least-squares", degree=2)
     return r, np.vstack([np.zeros(3), r.contacts]) / r.radius, r.radius
 
 
 def _scaled_fit(r, height):
-    """The fit whose height in unit radius is a function of points (m, 2)."""
+    """The Fit in the frame of r; `height` maps points (m, 2) to heights (m,), both in unit radius."""
     return Fit(r.frame.axes, lambda x, y: r.radius * height(np.column_stack([x, y]) / r.radius))
 
 
@@ -40,7 +47,10 @@ def _scaled_fit(r, height):
 
 
 def gaussian_process(case, nu=2.5):
-    """Hyperparameters by maximum likelihood, noise among them; nu = inf is the squared exponential."""
+    """A process whose hyperparameters, with the noise, have the maximum likelihood.
+
+    nu : the order of the Matérn covariance; np.inf is the squared exponential
+    """
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
@@ -48,13 +58,13 @@ def gaussian_process(case, nu=2.5):
     kernel = ConstantKernel(1.0, (1e-4, 1e4)) * Matern(1.0, (0.05, 20.0), nu=nu)
     process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-9, 0.1)), normalize_y=True)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of hyperparameters at their bounds
+        warnings.simplefilter("ignore")  # It warns of hyperparameters at their bounds.
         process.fit(contacts[:, :2], contacts[:, 2])
     return _scaled_fit(r, process.predict)
 
 
 def quadric_process(case):
-    """A process of what a quadric leaves over, with its deviation: what suits real surfaces better."""
+    """A quadric and a process of its residuals, with a deviation; this suits real surfaces better."""
     r, contacts, _ = _start(case)
     height, height_std = matern_on_quadric(contacts)
     fit = _scaled_fit(r, height)
@@ -62,9 +72,9 @@ def quadric_process(case):
 
 
 def matern_on_quadric(contacts, noisiest=0.1):
-    """Fits contacts (n, 3) in unit radius: functions of points (m, 2) for the height and its deviation.
+    """Fits contacts (n, 3) in unit radius; returns functions of points (m, 2): height and deviation, (m,).
 
-    noisiest : variance of the noise at most, over that of what the quadric leaves
+    noisiest : the largest variance of the noise, as a multiple of that of the quadric's residuals
     """
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
@@ -77,7 +87,7 @@ def matern_on_quadric(contacts, noisiest=0.1):
     kernel = ConstantKernel(1.0, (1e-4, 1e4)) * Matern(0.5, (0.05, 20.0), nu=2.5)
     process = GaussianProcessRegressor(kernel + WhiteKernel(1e-4, (1e-9, noisiest)))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of hyperparameters at their bounds
+        warnings.simplefilter("ignore")  # It warns of hyperparameters at their bounds.
         process.fit(contacts[:, :2], left / scale)
 
     def height_std(points):
@@ -88,7 +98,7 @@ def matern_on_quadric(contacts, noisiest=0.1):
 
 
 def radial_basis(case, kernel, **options):
-    """Options are RBFInterpolator's; smoothing is in unit radius."""
+    """scipy's RBFInterpolator with these options; smoothing is in unit radius."""
     from scipy.interpolate import RBFInterpolator
 
     r, contacts, _ = _start(case)
@@ -96,9 +106,9 @@ def radial_basis(case, kernel, **options):
 
 
 def moving_least_squares(case, width=0.5):
-    """A quadric for each point asked for, weighted by a Gaussian of `width`, in L.
+    """A quadric for each point at which the height is asked, weighted by a Gaussian of `width`, in L.
 
-    Narrow weights see one curve at a time, which carries no quadric.
+    Narrower weights would see one curve at a time, which does not determine a quadric.
     """
     r, contacts, _ = _start(case)
     terms = exponents(0, 2)
@@ -116,7 +126,7 @@ def moving_least_squares(case, width=0.5):
 
 
 def jet(case, degree):
-    """All terms by least squares in the paper's frame, as a jet fit does; kappas by the shape operator."""
+    """A polynomial with all terms, by least squares in the paper's frame; kappas by its shape operator."""
     r, contacts, radius = _start(case)
     terms = exponents(1, degree)
     x, y, z = contacts.T
@@ -132,9 +142,10 @@ def jet(case, degree):
 
 
 def smoothing_spline(case, degree=2, misfit=5e-3):
-    """FITPACK's surfit, told the noise and a misfit, in L, of its own: without one it adds knots for ever.
+    """FITPACK's surfit, which is told the noise and a `misfit` of its own, in L.
 
-    Quadratic: between three lines a cubic spline is as free as a jet.
+    Without the misfit it would add knots without end. The spline is quadratic, because between three lines a
+    cubic one is as free as a jet.
     """
     from scipy.interpolate import SmoothBivariateSpline
 
@@ -148,10 +159,12 @@ def smoothing_spline(case, degree=2, misfit=5e-3):
 
 
 def nurbs(case, samples=(25, 61)):
-    """The tensor product through rings and half curves, three of these repeated on either side to close it.
+    """The tensor product that interpolates rings and half curves.
 
-    Interpolated: approximation by fewer controls came out worse, with noise as well. A ring of zero radius
-    has no parameters, so the innermost one is a thousandth of the next. Heights are linear between samples.
+    The last three half curves are repeated before the first and the first four after the last, so that it
+    closes. Approximation by fewer control points came out worse, with noise as well. A ring of zero radius
+    has no parameters, so the innermost one has a thousandth of the next radius. Heights are linear between
+    samples.
     """
     from geomdl import fitting
     from scipy.interpolate import LinearNDInterpolator
@@ -178,10 +191,11 @@ def nurbs(case, samples=(25, 61)):
 
 
 def screened_poisson(case, true_normals, neighbors=40):
-    """Poisson, with the surface's own normals at the contacts, which no curve tells, or the neighbors'.
+    """pymeshlab's screened Poisson reconstruction of the contacts with normals.
 
-    Fewer neighbors are all of one curve, which has no normal. A finer octree changes nothing but the time.
-    Heights are linear between the vertices of the upper side.
+    The normals are the surface's own, which no curve tells, or are estimated from neighboring contacts. Fewer
+    neighbors would all be of one curve, which does not determine a normal. A finer octree changes only the
+    time. Heights are linear between the vertices of the upper side.
     """
     import pymeshlab
     from scipy.interpolate import LinearNDInterpolator
@@ -190,7 +204,7 @@ def screened_poisson(case, true_normals, neighbors=40):
     normals = np.vstack([contour.normals for contour in case.contours]) @ r.frame.axes
     offsets = np.vstack([contour.points for contour in case.contours]) - case.point
     given = normals[np.linalg.norm(offsets, axis=1) > 0.0]
-    normals = np.vstack([case.axes[:, 2] @ r.frame.axes, given])  # They are in the order of the contacts.
+    normals = np.vstack([case.axes[:, 2] @ r.frame.axes, given])  # The contacts have the same order.
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=contacts, v_normals_matrix=normals))
     if not true_normals:
@@ -204,11 +218,11 @@ def screened_poisson(case, true_normals, neighbors=40):
     return _scaled_fit(r, LinearNDInterpolator(vertices[above, :2], vertices[above, 2]))
 
 
-# Curvatures at the first vertex of a dense mesh: the normal, and both kappas ---------------------------
+# Peers on a dense mesh: the normal (3,) at its first vertex, and both kappas (2,) -----------------------
 
 
 def igl_curvature(vertices, triangles, rings):
-    """Quadrics over so many rings (5 is the default), normals weighted by angle."""
+    """libigl's quadrics over so many rings (its default is 5), with normals weighted by angle."""
     import igl
 
     k1, k2 = igl.principal_curvature(vertices, triangles, rings)[2:4]
@@ -217,7 +231,7 @@ def igl_curvature(vertices, triangles, rings):
 
 
 def meshlab_curvature(vertices, triangles, method):
-    """One of the filter's methods, asked twice: it gives one number a call. Normals weighted by angle."""
+    """A method of pymeshlab's filter, called twice for one kappa each; normals are weighted by angle."""
     import pymeshlab
 
     meshes = pymeshlab.MeshSet(verbose=False)
@@ -231,7 +245,7 @@ def meshlab_curvature(vertices, triangles, method):
 
 
 def trimesh_curvature(vertices, triangles, radius):
-    """Cohen-Steiner and Morvan's measures of a ball, over the area of a disk, as K and H."""
+    """K and H from Cohen-Steiner and Morvan's curvature measures of a ball, over the area of its disk."""
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, triangles, process=False)

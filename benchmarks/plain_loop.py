@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The loop over touches that one would write without a cluster; benchmarks.cluster starts it.
 
-`python -m benchmarks.plain_loop FILES OPTIONS`, both JSON: it touches each file once, because workers are
-warm too, says that it is ready, waits for a line, and prints the seconds that it took and the processor's.
+`python -m benchmarks.plain_loop FILES OPTIONS`, both JSON. It touches each file once, because the workers it
+is compared with are warm too. Then it prints "ready", waits for a line, makes all touches, and prints the
+seconds and the seconds of processor time that these took.
 """
 
 import json
@@ -19,7 +20,7 @@ from tools import blender
 
 
 def touch_all(files, options):
-    """Makes and keeps the touches of a data set, in batches as there, judged and compared with the mesh."""
+    """Makes and keeps the touches of a data set in its batches, with their status and error on the mesh."""
     kept = []
     for name, path in files:
         target = touchable(path, name)

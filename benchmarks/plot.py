@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the charts have in common: a look that fits a README column, colors for all eyes, labels, files."""
+"""What the charts have in common: a look that fits a README's column, colors, labels and files."""
 
 import csv
 import textwrap
@@ -17,7 +17,7 @@ from . import ROOT
 
 OUTPUT = ROOT / "build" / "charts"
 LABEL_SIZE, CAPTION_SIZE = 7.5, 7.0
-# Okabe and Ito's colors, told apart by color-blind readers; marks and labels tell the same again.
+# Color-blind readers can tell Okabe and Ito's colors apart. Marks and labels repeat what the colors say.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
     "#000000", "#e69f00", "#56b4e9", "#009e73", "#0072b2", "#d55e00", "#cc79a7",
 )  # fmt: skip
@@ -31,7 +31,7 @@ plt.rcParams.update({
 def save(figure, name, caption, header, rows):
     """Writes build/charts/NAME.png, with the caption below, and NAME.csv, the table behind it."""
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    # Wrapped here, by an average character: matplotlib's own wrapping forgets what a tight box cuts off.
+    # This wraps by the width of an average character: matplotlib's own wrapping forgets the tight box.
     width = int(72.0 * figure.get_figwidth() / (0.55 * CAPTION_SIZE))
     caption = textwrap.fill(caption, width, break_on_hyphens=False)
     figure.text(0.01, 0.0, caption, ha="left", va="top", fontsize=CAPTION_SIZE, color="#555555")
@@ -47,7 +47,7 @@ def dark(color):
 
 
 def label(axes, texts, places):
-    """Texts beside their places, joined to them by a line where it is seen."""
+    """Writes texts, pairs (words, color), beside their places (n, 2), each joined to its place by a line."""
     line = {"arrowstyle": "-", "lw": 0.4, "shrinkA": 0, "shrinkB": 2}
     look = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": LABEL_SIZE}
     halo = [withStroke(linewidth=1.8, foreground="white")]
@@ -58,9 +58,9 @@ def label(axes, texts, places):
 
 
 def _moves(axes, texts, places):
-    """Ways from the places to the centers of their texts, in points, so that these cover little else.
+    """Ways (n, 2) from places to the centers of their texts, in points, so that texts cover little else.
 
-    Each text in turn, four times over, takes the nearest of 80 positions that overlaps least.
+    Each text in turn, four times over, takes one of 80 positions: a near one that overlaps little.
     """
     to_points = 72.0 / axes.figure.dpi
     marks = axes.transData.transform(places) * to_points
@@ -82,6 +82,6 @@ def _moves(axes, texts, places):
 
 
 def _overlap(spots, size, centers, sizes):
-    """The area of a box at each spot (m, 2) that other boxes cover."""
+    """The area (m,) that other boxes cover of a box of this size centered at each of the spots (m, 2)."""
     apart = np.abs(spots[:, None] - centers)
     return np.prod(np.maximum((size + sizes) / 2.0 - apart, 0.0), axis=2).sum(axis=1)

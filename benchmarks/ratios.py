@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How long fits and automatic touches take beside those of an older checkout and scipy's thin plate.
 
-What `python -m benchmarks.speed --base ROOT` prints; ROOT is any worktree of this repository. Either checkout
-runs in a process of its own on the same cases, by turns, so that what else the machine does meets both.
+`python -m benchmarks.speed --base ROOT` prints it; ROOT is any worktree of this repository. Each checkout
+runs in a process of its own on the same cases. The two take turns, so that other programs slow down both.
 """
 
 import pickle
@@ -21,14 +21,15 @@ from core import SamplingPlane, reconstruct, track
 from . import ROOT, SCANS_FOLDER, accuracy, table
 from .real import Scan
 
-BATCH = 20  # So many touches of each scan are made at once.
-POINTS, PLANES, EXTENT, STEPS = 6, (3, 5), 1.0 / 16.0, 12  # of each scan; of its size
-# The kinds of touches, with the number of rounds.
+BATCH = 20  # The number of touches of each scan that are made at once.
+# Points of each scan, numbers of planes, the extent as a share of its size, and steps of a half curve.
+POINTS, PLANES, EXTENT, STEPS = 6, (3, 5), 1.0 / 16.0, 12
+# What is timed, with the number of rounds, of which the fastest counts.
 KINDS = {"batch": 1, "planes": 1, "touch": 2, "fit": 5, "spline": 5}
 
 
 def compare(base, cases, tasks):
-    """A Markdown table of the medians of `tasks`, some of KINDS, here and in the checkout `base`."""
+    """Prints a Markdown table of the medians of `tasks`, some of KINDS, here and in the checkout `base`."""
     cases, smooth = cases
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         path = Path(folder, "cases")
@@ -48,7 +49,7 @@ def compare(base, cases, tasks):
 
 
 def _asked(ask, case, rounds):
-    """The least seconds of each of (worker, task), by turns."""
+    """The least seconds of each (worker, task) of `ask` over so many rounds, in which they take turns."""
     return np.min([[answer(each, f"{task} {case}") for each, task in ask] for _ in range(rounds)], axis=0)
 
 
@@ -72,14 +73,14 @@ def worker(script, root, *arguments):
 
 
 def answer(worker, task):
-    """The seconds that a task takes there."""
+    """The seconds that a task takes in the process `worker`."""
     worker.stdin.write(f"{task}\n")
     worker.stdin.flush()
     return float(worker.stdout.readline())
 
 
 def cases():
-    """What speed_worker.py reads; and which of the fits have no residual, booleans."""
+    """The cases that speed_worker.py reads, and which of its fits have no residual, booleans (n,)."""
     scans = [Scan(path) for path in sorted(SCANS_FOLDER.glob("*.*"))]
     places = [list(scan.places(POINTS, 1)) for scan in scans]
     together = [[np.array(part) for part in zip(*scan.places(BATCH, 2), strict=True)] for scan in scans]
@@ -97,7 +98,7 @@ def cases():
 
 
 def _exact():
-    """The touches of benchmarks.accuracy: point, outward, contours."""
+    """The touches of benchmarks.accuracy, as (point, outward, contours)."""
     cases = [
         accuracy.exact_case(name, planes, noise, 0)
         for name in accuracy.SURFACES
@@ -108,13 +109,13 @@ def _exact():
 
 
 def _fixed(scan, places):
-    """Touches of an extent that is given, of a scan."""
+    """Yields touches of a scan with a given extent, as (point, outward, contours)."""
     for point, outward in places:
         for count in PLANES:
             planes = [SamplingPlane(np.pi * i / count) for i in range(count)]
             try:
                 contours = track(scan, point, outward, planes, extent=EXTENT, step=EXTENT / STEPS)
                 reconstruct(point, contours, outward=outward)
-            except ValueError:  # an edge or a hole: no touch
+            except ValueError:  # There is an edge or a hole.
                 continue
             yield point, outward, contours

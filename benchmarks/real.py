@@ -3,21 +3,21 @@
 """How near the fits come to real surfaces, and whether their intervals are true there.
 
 `python -m benchmarks.real [--points N] [--only fixed | automatic | choose | taps] [--chart]`, from the root
-of a checkout; bpy to read the scans and to cast rays, scikit-learn for the Gaussian process. Prints Markdown
-tables:
+of a checkout. It needs bpy to read the scans and to cast rays, and scikit-learn for the Gaussian process. It
+prints Markdown tables:
 
-(a) scans touched without noise at random points (seeded, by area) with three to six planes, half curves of
-1/32, 1/16 and 1/8 of the object in twelve steps: the mean |dz| over some 90 points of the mesh above the
-domain in permille of the radius, the share of them within the 90 % interval, and the interval's mean
-score (its width, and twenty times what is beyond it);
-(b) the same error against the time of a fit and 300 heights;
-(c) touches that choose extent and step by themselves, with three planes: how many are sure, in doubt and
-refused, how many doubts are right, and how many of the sure are off.
+(a) Scans are touched without noise at random points (seeded, by area) with three to six planes, and half
+    curves of 1/32, 1/16 and 1/8 of the object in twelve steps. The error is the mean |dz| over up to some 90
+    points of the mesh above the domain, in permille of the radius. With it come the share of these points
+    within the 90 % interval, and the interval's mean score: its width, and twenty times what is beyond it.
+(b) The same error is set against the time of a fit and 300 heights.
+(c) Touches with three planes choose their extent and step: the table counts those that are sure, in doubt and
+    refused, the doubts that are right, and the sure touches that are off.
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
-With `--chart` the same is drawn, build/charts/real_surfaces.png.
-With `choose` the residual's constants are chosen on all scans but one, for each, and judged on that one;
-with `taps` those of the taps.
+`--chart`, without `--only`, also draws build/charts/real_surfaces.png. `--only choose` chooses the constants
+of the residual for each scan on all others, and judges them on that one; `--only taps` does so with the
+constants of the taps.
 """
 
 import argparse
@@ -47,13 +47,14 @@ PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
 # At most so many points of the mesh above a domain are compared, and at least so many.
 HOLD_OUT, LEAST = 90, 20
 LAYERS = 4
-NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 8, 0.3, 0.2  # toward a surface: a step in radii, and of its height
+# Newton's method toward a surface: the number of steps, the longest step in radii, and the least slope.
+NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 8, 0.3, 0.2
 WIDE, OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 0.02, 3.0, 5.0, 10.0, 0.05
-DENSE = 150  # The true frame is fitted to so many points.
+DENSE = 150  # The number of points of the mesh to which the true frame is fitted.
 
 
 class Scan:
-    """A mesh of size 1 in Blender's tree, centered."""
+    """A scan, centered and scaled to size 1, that casts rays by Blender's tree of its faces."""
 
     def __init__(self, path):
         import bpy
@@ -80,19 +81,22 @@ class Scan:
         return None if hit is None else (tuple(hit), tuple(normal))
 
     def places(self, count, seed):
-        """Random points and normals, by area."""
+        """Pairs of a random point (3,) and the normal (3,) there, random by area."""
         faces = np.random.default_rng(seed).choice(len(self.areas), count, p=self.areas / self.areas.sum())
         return zip(self.centers[faces], self.normals[faces], strict=True)
 
     def above(self, r, flat):
-        """Where there are, points (m, 3) of the layers nearest to r along its normal above (n, 2)."""
+        """Points (m, 3) of the scan along the normal of r over the points `flat` (n, 2), where there are any.
+
+        They are of the layers nearest to r whose outside is up.
+        """
         up = r.frame.axes[:, 2]
         starts = r.frame.to_world(np.column_stack([flat, r.height(*flat.T)]))
         hits = [self._nearest(start, up, r.radius) for start in starts]
         return np.array([hit for hit in hits if hit is not None]).reshape(-1, 3)
 
     def _nearest(self, start, up, reach):
-        """The hit of the layer nearest to `start` along `up`, either way, whose outside is up."""
+        """The hit of the layer nearest to `start` along `up` or -up whose outside is up, or None."""
         found = None
         for direction in (up, -up):
             gone = 0.0
@@ -127,7 +131,7 @@ class Score(NamedTuple):
 
 @contextmanager
 def constants(**values):
-    """Those of the residual or the taps, for a while."""
+    """Sets constants of the residual, the taps or the status within this context."""
     modules = [
         m
         for m in (geometry, residual, residual_evidence, rough_fit, one_touch, taps, status)
@@ -173,7 +177,7 @@ PEERS = tuple(METHODS)[2:]
 
 
 def touches(scan, count):
-    """((planes, extent), Touch) at as many points."""
+    """Yields ((planes, extent), Touch, radius) at `count` points; extent is the denominator of the share."""
     for point, normal in scan.places(count, 0):
         for extent in EXTENTS:
             for planes in PLANES:
@@ -183,7 +187,7 @@ def touches(scan, count):
                     contours = track(scan, point, normal, azimuths, **lengths)
                     paper = {"outward": normal, "method": "least-squares", "degree": 2}
                     r = reconstruct(point, contours, **paper)
-                except ValueError:  # an edge or a hole: no touch
+                except ValueError:  # There is an edge or a hole.
                     continue
                 hold_out = scan.above(r, r.domain.grid(HOLD_OUT)[0]) - point
                 if len(hold_out) >= LEAST:
@@ -201,13 +205,14 @@ def score(fit, touch, radius):
 
 
 def met(fit, touch, radius):
-    """Where the surface meets the paper's normals through held-out points, (m, 3) in the frame of the fit.
+    """Where the surface meets the paper's normals through held-out points.
 
-    Also how far along them that is, and how much nearer to it in height a unit along them leads.
+    Returns these places (m, 3) in the frame of the fit, how far along the normals they are (m,), and by how
+    much a unit along the normals changes the height over the surface (m,).
     """
     at, normal = touch.hold_out @ fit.axes, fit.axes.T @ touch.axes[:, 2]
     off, change, small = np.zeros(len(at)), np.ones(len(at)), 1e-4 * radius
-    # Along the heights themselves one step is exact, however long.
+    # If the normal is the direction of the heights, one step is exact, however long.
     steps, farthest = (NEWTON_STEPS, FARTHEST * radius) if normal[2] < 1.0 - 1e-12 else (1, np.inf)
     for _ in range(steps):
         above = fit.height(*at[:, :2].T) - at[:, 2]
@@ -219,7 +224,7 @@ def met(fit, touch, radius):
 
 
 def fixed_scores(scan, count, methods):
-    """{(planes, extent): {method: mean Score}} of a scan, and seconds {(method, planes): [...]}."""
+    """{(planes, extent): {method: mean Score}} of a scan, and {(method, planes): [seconds]}."""
     scores, seconds = defaultdict(lambda: defaultdict(list)), defaultdict(list)
     for cell, touch, radius in touches(scan, count):
         for name, method in methods.items():
@@ -236,7 +241,7 @@ def fixed_scores(scan, count, methods):
 
 
 def fixed_row(title, of):
-    """A row of the table, by {method: Score}."""
+    """A row of the table of `of`, {method: Score}, beginning with the cells `title`."""
     best = min(of[peer].error for peer in PEERS)
     return [
         *title,
@@ -257,9 +262,9 @@ def fixed_tables(scores):
         there = [of[cell] for of in scores.values() if cell in of]
         means = {m: Score(*np.mean([of[m] for of in there], axis=0)) for m in METHODS}
         rows.append(fixed_row([f"{cell[0]}", f"1/{cell[1]}"], means))
-    print("(a) Means over the scans.\n")
+    print("(a) Means over the scans, by planes and extent.\n")
     table(head, rows, left=2)
-    print("Each scan, the mean over the extents.\n")
+    print("The same for each scan, as means over the extents.\n")
     rows = []
     for scan, of in scores.items():
         for planes in PLANES:
@@ -270,7 +275,7 @@ def fixed_tables(scores):
 
 
 def time_table(scores, seconds):
-    print("(b) Error, the mean of all cells and scans, and the median ms of the processor for each.\n")
+    print("(b) The mean error over all planes, extents and scans, and the median processor time in ms.\n")
     rows = []
     for method in METHODS:
         error = np.mean([cell[method].error for of in scores.values() for cell in of.values()])
@@ -280,7 +285,7 @@ def time_table(scores, seconds):
 
 
 def automatic_row(scan, count):
-    """A line of (c), in numbers."""
+    """The numbers of a row of (c), the mean error in permille, and the worst sure error in deviations."""
     planes = [SamplingPlane(math.pi * i / 3) for i in range(3)]
     sure, doubtful, refused, seconds = [], [], 0, []
     for point, normal in scan.places(count, 1):
@@ -309,15 +314,15 @@ def automatic_row(scan, count):
 
 
 def _off(scan, r):
-    """The mean |dz| over the domain."""
+    """The mean |dz| over the domain, a length; 0 where the scan is nowhere above it."""
     local = r.frame.to_local(scan.above(r, r.domain.grid(HOLD_OUT)[0]))
     return float(np.abs(r.height(*local[:, :2].T) - local[:, 2]).mean()) if len(local) else 0.0
 
 
 def _turned(scan, r):
-    """Whether the frame is off by TURNED degrees, where curvatures are not ALIKE; by a dense quartic fit.
+    """Whether the frame is off that of a dense quartic fit by more than TURNED degrees.
 
-    Not where the message says that there are no principal directions.
+    It never is where curvatures are ALIKE, or where the message says that there are no principal directions.
     """
     if r.posterior.is_round:
         return False
@@ -335,11 +340,11 @@ def _turned(scan, r):
 
 def automatic_table(rows):
     print(
-        "(c) Automatic touches. Right is a doubt where the heights are off by over 2 % of the radius or three"
+        "(c) Automatic touches. A doubt is right where the heights are off by over 2 % of the radius or three"
     )
     print(
-        "deviations, or the frame by 10 degrees where curvatures differ. Areas in permille of size squared, "
-        "ms of the processor.\n"
+        "deviations, or the frame by 10 degrees where curvatures differ. Areas are in permille of the size "
+        "squared, the radius in permille of the size, times in ms of the processor.\n"
     )
     head = "scan|sure|in doubt|refused|doubts right|sure, off > 2 %|> 5 deviations|turned|all areas|radius|ms"
     total = [sum(row[i] for row in rows.values()) for i in range(8)]
@@ -347,7 +352,7 @@ def automatic_table(rows):
     table(head.split("|"), [*lines, ["all", *(f"{v:.0f}" for v in total), "", ""]])
 
 
-# Constants, each time without one scan ---------------------------------------------------------------
+# Constants, chosen without one scan each time --------------------------------------------------------
 
 
 SETTINGS = {
@@ -362,7 +367,10 @@ SETTINGS = {
 
 
 def choose(scans, count):
-    """For each scan the setting of the least interval score on the others, relative to the process's."""
+    """Prints for each scan the setting with the least interval score on the others.
+
+    Scores and errors are shares of those of the process.
+    """
     methods = {PROCESS: quadric_process} | {name: partial(ours, **v) for name, v in SETTINGS.items()}
     scores = {scan.name: fixed_scores(scan, count, methods)[0] for scan in scans}
 
@@ -385,6 +393,7 @@ def choose(scans, count):
     )
 
 
+# Values of the taps' constants that are tried instead of what they are, one at a time.
 TAPS = {
     "TOO_FAR_OFF": (5.0, 7.0, 14.0, 20.0),
     "CONTRADICTING": (2.0, 4.0),
@@ -392,15 +401,16 @@ TAPS = {
     "WITHIN": (0.5, 0.75),
     "SHORTER": (1.1, 1.3),
     "DOUBTFUL_GAP": (0.05, 0.2),
-}  # instead of what they are, one at a time
-ENOUGH_AREA = 0.99  # of the largest: what is less costs more than it is worth
+}
+ENOUGH_AREA = 0.99  # The least share of the largest area: less area costs more than it is worth.
 
 
 def choose_taps(scans, count):
-    """For each scan the constants of the taps chosen on the others.
+    """Prints for each scan the constants of the taps that the others choose.
 
-    Of those with the fewest sure touches off by more than 5 deviations, and with ENOUGH_AREA (the mean over
-    scans of its share of what it is now), the one whose worst sure touch is off by the fewest deviations.
+    Candidates are the settings with the fewest sure touches that are off by more than 5 deviations, and with
+    ENOUGH_AREA among these. The area is relative to that of the constants as they are, averaged over scans.
+    The candidate whose worst sure touch is off by the fewest deviations is chosen.
     """
     now = "as they are"
     settings = {now: {}} | {f"{name} {v:g}": {name: v} for name, values in TAPS.items() for v in values}
@@ -424,9 +434,9 @@ def choose_taps(scans, count):
 
     names = [scan.name for scan in scans]
     head = ["sure", "off > 2 %", "> 5 deviations", "all areas", "share", "worst"]
-    print("Each setting on all scans.\n")
+    print("Each setting is judged on all scans.\n")
     table(["setting", *head], [[s, *told(s, names)] for s in settings])
-    print("Each scan with what the others choose.\n")
+    print("Each scan is judged with the setting that the others choose.\n")
     lines = []
     for left in [*([name] for name in names), []]:
         others = [name for name in names if name not in left]
@@ -441,9 +451,9 @@ def choose_taps(scans, count):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--points", type=int, default=100, help="of each scan (%(default)s)")
-    parser.add_argument("--only", choices=("fixed", "automatic", "choose", "taps"), help="a part")
-    parser.add_argument("--chart", action="store_true", help="draw as well")
-    parser.add_argument("--scan", default="", help="only those with this in their names")
+    parser.add_argument("--only", choices=("fixed", "automatic", "choose", "taps"), help="only this part")
+    parser.add_argument("--chart", action="store_true", help="draw the chart as well")
+    parser.add_argument("--scan", default="", help="only scans with this in their names")
     options = parser.parse_args()
     paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
     if not paths:

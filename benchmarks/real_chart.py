@@ -18,9 +18,10 @@ STYLES = (  # These are in the order of benchmarks.real's methods.
 
 
 def draw(scores, seconds, automatic):
-    """The chart of the scores and seconds of fixed touches, and the error and milliseconds of automatic ones.
+    """Draws and saves the chart of touches with a given extent, and of automatic ones.
 
-    scores : {scan: {(planes, extent): {method: Score}}}; seconds : {(method, planes): [...]}
+    scores : {scan: {(planes, extent): {method: Score}}}; seconds : {(method, planes): [seconds]}
+    automatic : (mean error in permille of the radius, milliseconds) of automatic touches
     """
     methods = list(next(iter(next(iter(scores.values())).values())))
     counts = sorted({cell[0] for of in scores.values() for cell in of})
@@ -57,9 +58,9 @@ def draw(scores, seconds, automatic):
     look = {"ncols": 6, "fontsize": plot.LABEL_SIZE, "title_fontproperties": {"size": 12, "weight": "bold"}}
     figure.legend(handles, labels, loc="outside upper center", title=title, **look)
     caption = (
-        f"{len(scores)} scans, half curves of 1/32, 1/16 and 1/8 of the object, without noise. On the right "
-        "medians of the processor's time for a fit and 300 heights with three to six planes; the star is a "
-        "touch with three planes that chooses its extent and step, ray casts and all its fits included. "
+        f"{len(scores)} scans, half curves of 1/32, 1/16 and 1/8 of the object, without noise. The times are "
+        "medians of processor time for a fit and 300 heights with three to six planes; the star is a touch "
+        "with three planes that chooses its extent and step, ray casts and all its fits included. "
         f"On {machine('numpy', 'scipy')}."
     )
     rows.append(["automatic touch", 3, automatic[0], "", automatic[1]])

@@ -3,9 +3,9 @@
 """What becomes of touches all over scans that are creased, holed, nested, thin or far from the origin.
 
 `python -m benchmarks.refusals ZIP [--touches N]`, from the root of a checkout; ZIP is the built extension.
-Each scan is touched at random points (seeded, by area), with fixed extents and degree 4. Prints Markdown:
-how many patches there are, how many of them with a warning, how many refusals, and why; and how many patches
-are `silent`: without a warning, and off the mesh by more than five times their own deviation, in the mean.
+Each scan is touched at random points (seeded, by area), with fixed extents and degree 4. The Markdown tables
+count patches, those of them with a warning, refusals, and the reasons given. `silent` patches have no warning
+although their mean distance from the mesh is more than five times their own deviation.
 """
 
 import argparse
@@ -21,8 +21,8 @@ from tools import blender
 from . import SCANS_FOLDER, machine, table
 from .scans import random_places, sampling_planes
 
-SILENT = 5.0
-EXTENTS = (1.0 / 8.0, 1.0 / 32.0)  # Shares of the object's size: the extent of a map, and one for details.
+SILENT = 5.0  # A patch without a warning is silent if it is off by more deviations.
+EXTENTS = (1.0 / 8.0, 1.0 / 32.0)  # Shares of the object's size; the shorter one is for details.
 
 
 def main():
@@ -50,7 +50,7 @@ def main():
 
 
 def _touches(extension, path, share, count):
-    """A row of the table, and how often what was said."""
+    """A row of the table, and a Counter of the reasons for warnings and refusals."""
     import bpy
 
     extension.tactile_addon.files.mesh_file.open_file(path)
@@ -83,7 +83,7 @@ def _touches(extension, path, share, count):
 
 
 def _kind(message):
-    """A message without its numbers and its advice."""
+    """A message without its advice, with # for each number, so that equal reasons are counted together."""
     message = re.split(r"\. \d of ", message)[0]
     return re.sub(r"-?\d[\d.]*(e[+-]\d+)?", "#", message.rsplit(": ", 1)[0])
 

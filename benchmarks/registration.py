@@ -5,14 +5,16 @@
 `python -m benchmarks.registration`, from the root of a checkout, with the Python that `make chart` has
 prepared. At random points (seeded, by area) of each scan, scaled to 100 mm, three contours of a fifth of its
 size to either side are tracked with 0.1 mm of noise, moved by a random rigid motion, reconstructed and
-registered. A place is right within 1 mm and 2 degrees.
+registered. A pose is right within 1 mm and 2 degrees.
 
 The exhaustive search puts the reference point on every vertex, aligns the tangent planes, turns the contours
 in steps of 10 degrees (their ends then move by no more than the scans' vertices are apart) and measures to
-the planes of the nearest vertices; its best poses are refined as those of core.register are. It is the judge
-of what is ambiguous too: where a pose of its own that is not right has less than 1.5 times the residual of
-the true one. It takes an hour, nearly all of it for the exhaustive search, twenty seconds
-a case and two minutes on the femur; `--cases 2` takes six minutes.
+the planes of the nearest vertices; its best poses are refined as those of core.register are. It also decides
+which cases are ambiguous: those where it finds a pose that is not right and has less than 1.5 times the
+residual of the true one.
+
+The command takes an hour, nearly all of it for the exhaustive search, which needs twenty seconds a case and
+two minutes on the femur; `--cases 2` takes six minutes.
 """
 
 import argparse
@@ -21,7 +23,7 @@ import sys
 from pathlib import Path
 from statistics import median
 
-import bpy  # noqa: F401  brings mathutils
+import bpy  # noqa: F401  # It brings mathutils.
 import numpy as np
 import trimesh
 from mathutils.bvhtree import BVHTree
@@ -39,15 +41,15 @@ SIZE, NOISE = 100.0, 0.1  # mm
 SHARE = 0.2  # The extent as a share of the size.
 STEPS = 12
 PLANES = surfaces.planes((0, 60, 120))
-NEAR, TURN = 1.0, math.radians(2.0)  # mm
+NEAR, TURN = 1.0, math.radians(2.0)  # mm, radians
 AMBIGUOUS = 1.5
 FINE_TURNS = 36
-FIRST, KEPT = 6, 300  # All poses are judged by so many contacts first; so many are refined.
-REFINED = 50  # So many of those are refined to the nearest triangles.
+FIRST, KEPT = 6, 300  # The number of contacts that judge all poses first, and of poses that are refined.
+REFINED = 50  # The number of these poses that are refined further, to the nearest triangles.
 
 
 class Scan:
-    """A scan of 100 mm, to touch."""
+    """A scan, scaled to 100 mm and centered, that can be touched."""
 
     def __init__(self, name):
         mesh = trimesh.load(SCANS_FOLDER / name)
@@ -60,7 +62,7 @@ class Scan:
         return None if point is None or not any(normal) else (point, normal)
 
     def cases(self, count):
-        """Reconstructions of touches, moved, with the rigid motions that bring them back."""
+        """[(moved reconstruction, rotation (3, 3), shift (3,))], with the motions that bring them back."""
         rng = np.random.default_rng(0)
         corners = self.vertices[self.faces]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -88,7 +90,7 @@ def is_right(r, truth, pose):
 
 
 def true_residual(r, turn, shift, scan):
-    """RMS distance of the contacts where they belong."""
+    """The RMS distance of the contacts from the mesh, in the true pose."""
     points = r.frame.to_world(r.contacts) @ turn.T + shift
     return math.sqrt(np.mean([scan.tree.find_nearest(point)[3] ** 2 for point in points]))
 
@@ -103,9 +105,10 @@ class Exhaustive:
         self.tree = cKDTree(self.vertices)
 
     def places(self, contacts):
-        """The KEPT best of all vertices and turns.
+        """The KEPT best poses of all vertices and turns: axes (KEPT, 3, 3) and origins (KEPT, 3).
 
-        A pose is out once a few contacts alone are worse than the last of these: nothing is lost by that.
+        A pose is dropped if a few contacts alone are worse than all contacts in the last of KEPT poses. No
+        better pose is lost by that, because more contacts only add to a sum of squares.
         """
         turn = 2.0 * np.pi / FINE_TURNS * np.arange(FINE_TURNS)
         about = Rotation.from_rotvec(turn[:, None] * [0.0, 0.0, 1.0]).as_matrix()
@@ -118,7 +121,7 @@ class Exhaustive:
         return self.axes[vertex[best]] @ about[turned[best]], self.vertices[vertex[best]]
 
     def _squares(self, contacts, vertex, turned, about):
-        """Sums of the squared distances of contacts to the planes of the nearest vertices."""
+        """Sums (n,) over contacts of squared distances to the planes of the nearest vertices, for n poses."""
         squares = []
         for start in range(0, len(vertex), 20000):
             v, t = vertex[start : start + 20000], turned[start : start + 20000]
@@ -156,10 +159,11 @@ def main():
     )
     table([*head.split("|"), "said so", "said in vain"], rows)
     print(
-        f"Half contours of {SHARE * SIZE:g} mm on objects of {SIZE:g} mm, noise {NOISE:g} mm. The first "
-        "`right` are of the unambiguous cases. `better`: cases where the exhaustive search has found a "
-        "residual that is 5 % less. `said so`, `in vain`: by core.register, of the ambiguous and of the "
-        f"unambiguous cases. Times are medians, {machine('numpy', 'scipy')}."
+        f"Half contours of {SHARE * SIZE:g} mm on objects of {SIZE:g} mm, noise {NOISE:g} mm. Both `right` "
+        "before `ambiguous` count unambiguous cases, both after it ambiguous ones. `better` counts cases "
+        "where the exhaustive search finds a residual that is 5 % less. `said so` and `said in vain` count "
+        "the ambiguous and the unambiguous cases that core.register calls ambiguous. Times are medians, "
+        f"{machine('numpy', 'scipy')}."
     )
 
 
@@ -188,7 +192,11 @@ def _row(name, options):
 
 
 def _outcome(scan, exhaustive, r, truth):
-    """What comes of one case: five answers, and the seconds of both searches."""
+    """What comes of one case: five booleans, and the seconds of both searches.
+
+    The booleans tell whether it is ambiguous, whether core.register is right and calls it ambiguous, and
+    whether the exhaustive search is right and has a clearly smaller residual.
+    """
     seconds, (pose, *_) = timed(core.register, r, scan.vertices, scan.faces)
     long, (others, residuals) = timed(exhaustive.search, r)
     rights = np.array([is_right(r, truth, other) for other in others])

@@ -3,14 +3,16 @@
 """How near the fits come to what a real robot has felt, and whether their intervals are true there.
 
 `python -m benchmarks.robot FOLDER [--points N] [--radius MM]`, from the root of a checkout; FOLDER has a copy
-of github.com/vu-arma-dev/robot-palpation-data. mat-io, which reads it, needs numpy 2, as Python 3.13 has it.
+of github.com/vu-arma-dev/robot-palpation-data. mat-io, which reads it, needs numpy 2, which only the
+environment for Python 3.13 has. The command prints Markdown tables.
 
-Prints Markdown tables. A surgical robot has wiped over kidney and organ phantoms, under control of the force,
-in rows; contact = position - 3.15 mm x force direction where |force| > 0.1 N. At seeded random places of each
-exploration, blocks of contacts that follow each other are held out, a fifth of them. Of the others within the
-radius all are fitted as strokes, or three curves of 50 contacts cut out of them, with and without the others.
-The held-out contacts over the domain tell the error, and whether an interval of deviation and scatter holds
-them; the scatter of a method is that of the contacts it was given about its own surface.
+A surgical robot has wiped over kidney and organ phantoms in rows, under force control. Where |force| > 0.1 N,
+there is a contact at position - 3.15 mm x force direction. At seeded random places of each exploration, about
+a fifth of all blocks of successive contacts are held out. The other contacts within the radius are fitted in
+three ways: all of them as strokes; three curves of some 50 contacts each that are cut out of them; and these
+curves together with the strokes. The held-out contacts over the domain tell the error, and whether an
+interval of deviation and scatter holds them. The scatter is that of the contacts given to a method about its
+surface.
 """
 
 import argparse
@@ -32,11 +34,11 @@ from . import machine, table, timed
 from .peers import matern_on_quadric
 
 BALL, LEAST_FORCE = 3.15, 0.1  # mm, N
-BLOCK, SHARE = 60, 5  # Contacts form blocks in their order, and one block in so many is held out.
-BAND, IN_BAND = 0.35, 50  # A curve takes contacts within so many mm of its plane, and so many of them.
-FEWEST = 300  # A place needs so many contacts.
-SUBSET, MOST = 200, 600  # A process and a spline are fitted to so many random contacts.
-SMOOTHINGS = (0.1, 1.0, 10.0)  # In unit radius; the best ones of 0.01 to 100 are among them.
+BLOCK, SHARE = 60, 5  # The number of contacts in a block; one block in SHARE is held out, on average.
+BAND, IN_BAND = 0.35, 50  # A curve has contacts up to BAND mm from its plane, and some IN_BAND of these.
+FEWEST = 300  # The least number of contacts that are given at a place.
+SUBSET, MOST = 200, 600  # The numbers of random contacts to which a process and a spline are fitted.
+SMOOTHINGS = (0.1, 1.0, 10.0)  # In unit radius; the best values between 0.01 and 100 are among them.
 
 
 class Place(NamedTuple):
@@ -49,7 +51,7 @@ class Place(NamedTuple):
 
 
 class Score(NamedTuple):
-    """Mean |dz| in mm, over what deviation and scatter expect of it, the share within 90 %, and seconds."""
+    """The mean |dz| in mm, that over what deviation and scatter expect, the share within 90 %, seconds."""
 
     error: float
     ratio: float
@@ -58,7 +60,7 @@ class Score(NamedTuple):
 
 
 def explorations(folder):
-    """(name, contacts (n, 3), force directions (n, 3)) of each, contacts in the order of time."""
+    """Yields (name, contacts (n, 3), force directions (n, 3)) of each exploration, in the order of time."""
     from matio import load_from_mat
 
     for path in sorted(Path(folder).rglob("exploration/*.mat")):
@@ -74,7 +76,7 @@ def explorations(folder):
 
 
 def places(contacts, directions, count, radius):
-    """Places at random contacts; some that have too few around them are left out."""
+    """Yields Places at random contacts; those with too few contacts around them are left out."""
     rng = np.random.default_rng(0)
     for i in rng.integers(len(contacts), size=count):
         blocks = (np.arange(len(contacts)) + rng.integers(BLOCK)) // BLOCK
@@ -86,7 +88,7 @@ def places(contacts, directions, count, radius):
 
 
 def curves(r, given):
-    """Three bands of contacts through the origin of a reconstruction, thinned."""
+    """Yields three thinned bands of contacts through the origin of a reconstruction, as Contours."""
     local = r.frame.to_local(given)
     for azimuth in np.pi / 3.0 * np.arange(3):
         across = local[:, 1] * math.cos(azimuth) - local[:, 0] * math.sin(azimuth)
@@ -95,7 +97,7 @@ def curves(r, given):
         yield Contour(band[along][:: max(1, len(band) // IN_BAND)])
 
 
-# Peers: contacts in a frame and in unit radius -> height, deviation ------------------------------------
+# Peers: from contacts in a frame and in unit radius to functions for height and deviation -------------
 
 
 def process(contacts, thin):
@@ -111,13 +113,13 @@ def spline(contacts, thin, **options):
 
 
 def some(contacts, most):
-    """Random contacts, so many at most."""
+    """Random contacts, at most `most` of them."""
     chosen = np.random.default_rng(0).permutation(len(contacts))[:most]
     return contacts[chosen]
 
 
 def averaged(contacts):
-    """What the strokes are thinned to."""
+    """The means to which a reconstruction thins strokes."""
     return means(contacts, np.array([1.0, 0.0]))[0]
 
 
@@ -142,7 +144,7 @@ ALL, CROSSED, BOTH = "strokes alone", "three curves", "curves and strokes"
 
 
 def scored(at, height, height_std, given, held_out, seconds):
-    """Scores of fits to contacts (n, 3) in unit radius, `at` mm."""
+    """The Score of a fit to contacts (n, 3) in unit radius, which is `at` mm."""
     off = np.abs(held_out[:, 2] - height(held_out[:, :2]))
     if height_std is None:
         return Score(at * off.mean(), np.nan, np.nan, seconds)
@@ -152,19 +154,19 @@ def scored(at, height, height_std, given, held_out, seconds):
 
 
 def of_reconstruction(r, seconds, judge, place):
-    """Score of one of ours, on the same contacts as all, along the normal of `judge`."""
+    """The Score of a reconstruction, on the contacts over the domain of `judge`, as for all methods."""
     given, held_out = in_unit_radius(r, judge, place)
     height, std = (lambda p, f=f: f(*(r.radius * p).T) / r.radius for f in (r.height, r.height_std))
     return scored(r.radius, height, std, given, held_out, seconds)
 
 
 def in_unit_radius(r, judge, place):
-    """Given and held-out contacts over the domain of `judge`, in the frame and the radius of r."""
+    """Given and held-out contacts over the domain of `judge`, in the frame of r and in its unit radius."""
     return (r.frame.to_local(inside(judge, points)) / r.radius for points in (place.given, place.held_out))
 
 
 def inside(r, points):
-    """Contacts over the domain, and not of another side."""
+    """Contacts over the domain that are at most a radius above or below it, so not of another side."""
     local = r.frame.to_local(points)
     return points[r.domain.contains(*local[:, :2].T) & (np.abs(local[:, 2]) <= r.radius)]
 
@@ -190,13 +192,13 @@ def scores_at(place, radius):
             options = {"outward": place.outward, "strokes": strokes}
             seconds, r = timed(reconstruct, judge.frame.origin, crossed, **options)
             scores[name] = of_reconstruction(r, seconds, judge, place)
-    except ValueError:  # The rows are too far apart for curves.
+    except ValueError:  # The rows are too far apart for curves to be cut out.
         pass
     return scores
 
 
 def best(scores, prefix):
-    """The one method of that name with the least mean error over all places."""
+    """The method with the least mean error over all places, of those whose names begin with `prefix`."""
     names = {name for of in scores for name in of if name.startswith(prefix)}
     return min(names, key=lambda name: np.mean([of[name].error for of in scores if name in of]))
 
@@ -213,9 +215,9 @@ def row(name, scores):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", help="of the data")
+    parser.add_argument("folder", help="the folder of the data")
     parser.add_argument("--points", type=int, default=20, help="of each exploration (%(default)s)")
-    parser.add_argument("--radius", type=float, default=8.0, help="mm (%(default)s)")
+    parser.add_argument("--radius", type=float, default=8.0, help="of a patch, in mm (%(default)s)")
     options = parser.parse_args()
     scores = defaultdict(list)
     for name, contacts, directions in explorations(options.folder):

@@ -6,8 +6,8 @@
 
 At one fixed point of each scan the extension tracks three curves 60 degrees apart, with a simulated
 sensor's noise, and fits a patch by each method. The Markdown table says how far the patch is from the
-contacts, (6), and from the mesh vertices in its domain, and what tracking and fit take on one thread.
-A second table does the same at random points (seeded) all over each scan, for the default and TAGC.
+contacts, (6), and from the mesh vertices in its domain, and how long tracking and fit take on one thread.
+A second table does the same at random points (seeded) all over each scan, for "bayes" and TAGC.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from tools import blender
 
 from . import SCANS_FOLDER, machine, table
 
-METHODS = {  # The methods at their defaults, and their names.
+METHODS = {  # The methods with their default weights, and their names in the table.
     "bayes": "bayes",
     "tagc": "tagc, weight 1e3",
     "quadratic-variation": "quadratic-variation, weight 1e5",
@@ -30,17 +30,17 @@ METHODS = {  # The methods at their defaults, and their names.
 }
 AZIMUTHS = (0.0, 60.0, 120.0)
 RUNS = 7
-LEAST_VERTICES = 20  # A mean distance counts if so many vertices are over the patch.
+LEAST_VERTICES = 20  # A mean distance counts if at least so many vertices are over the patch.
 
 
 class Scan(NamedTuple):
-    """A touch, in the file's unit; printed in `unit`, `scale` of them in a file unit."""
+    """A touch, with lengths in the file's unit; they are printed in `unit`, of which that has `scale`."""
 
     name: str
     file: str
     location: tuple[float, float, float]
     extent: float
-    steps: int  # With so many steps of a half curve there are about as many contacts as in the paper.
+    steps: int  # The number of steps of a half curve, which makes about as many contacts as in the paper.
     noise: float
     unit: str
     scale: float
@@ -54,9 +54,10 @@ class Scan(NamedTuple):
         return {"extent": self.extent, "step": self.extent / self.steps, "noise": self.noise}
 
 
-# Chosen by renders and mesh curvature: the pear's belly, the lemon's side, the hollow shoulder under the
-# bottle's cap (a saddle, as the paper's), the great saddle of Eros (2 km was tried as well). The shell's
-# base is its widest place without ribs: at six points before it, 8 mm lost curves to ribs.
+# Renders and mesh curvature led to these places: the pear's belly, the lemon's side, the hollow shoulder
+# under the bottle's cap (a saddle, like the paper's), and the great saddle of Eros (an extent of 2 km was
+# tried as well). The shell's base is its widest place without ribs: at six points tried before, curves of
+# 8 mm were lost to ribs.
 SCANS = (
     Scan("shell", "shell_gastropod.stl", (-19.0, 1.0, 17.0), 8.0, 16, 0.05, "mm", 1.0),
     Scan("pear", "pear.ply", (-0.033, 0.0, 0.0652), 0.012, 10, 5e-5, "mm", 1e3),
@@ -70,12 +71,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, help="the built extension")
     parser.add_argument(
-        "--data", type=Path, default=SCANS_FOLDER, metavar="FOLDER", help="of the scans (%(default)s)"
+        "--data", type=Path, default=SCANS_FOLDER, metavar="FOLDER", help="that of the scans (%(default)s)"
     )
     parser.add_argument(
-        "--share", type=float, default=1.0, help="of the extents, to touch less (%(default)s)"
+        "--share", type=float, default=1.0, help="the share of the extents to touch (%(default)s)"
     )
-    parser.add_argument("--touches", type=int, default=40, help="at random points of each (%(default)s)")
+    parser.add_argument("--touches", type=int, default=40, help="at random points of each scan (%(default)s)")
     options = parser.parse_args()
     for path in (options.zip, *(options.data / scan.file for scan in SCANS)):
         if not path.is_file():
@@ -88,13 +89,13 @@ def main():
     head = "object, extent|method|contacts|fit error (6)|vertices|mean distance|max|ms"
     table(head.split("|"), rows, left=2)
     print(_caption(), end="\n\n")
-    print(f"Medians over {options.touches} random touches. Calibration: distance over mean height std.\n")
+    print(f"Medians over {options.touches} random touches. Calibration is distance over mean height std.\n")
     head = "object, extent|bayes|tagc|ratio|height std|calibration|uncertain|ms"
     table(head.split("|"), touches)
 
 
 def _rows(extension, scan, data):
-    """A line of the table for each method."""
+    """Yields a row of the table for each method."""
     import bpy
 
     extension.tactile_addon.files.mesh_file.open_file(data / scan.file)
@@ -118,7 +119,7 @@ def _rows(extension, scan, data):
 
 
 def _random_pairs(extension, scan, data, count):
-    """Reports of both methods at random points, where both give a patch."""
+    """Yields the reports of "bayes" and TAGC at random points where both give a patch."""
     import bpy
 
     extension.tactile_addon.files.mesh_file.open_file(data / scan.file)
@@ -129,14 +130,14 @@ def _random_pairs(extension, scan, data, count):
         fit = {"seed": index, "degree": 4, **scan.lengths}
         try:
             bayes, tagc = (_report(*touched, method=method, **fit) for method in ("bayes", "tagc"))
-        except ValueError:  # an edge or a hole: no touch
+        except ValueError:  # There is an edge or a hole.
             continue
         if min(bayes["vertices"], tagc["vertices"]) >= LEAST_VERTICES:
             yield bayes, tagc
 
 
 def _random_row(extension, scan, data, count):
-    """A line of the second table: medians over that many random points."""
+    """A row of the second table: medians over `count` random points."""
     found = list(islice(_random_pairs(extension, scan, data, 4 * count), count))
     ours, papers = (
         median(scan.scale * reports[i]["vertex_distance_mean"] for reports in found) for i in (0, 1)
@@ -162,7 +163,7 @@ def sampling_planes(extension):
 
 
 def random_places(obj, count):
-    """(face, its center in the world), random by area but seeded."""
+    """Yields (index of a face, its center in the world); faces are random by area, but seeded."""
     import numpy as np
 
     areas = np.array([face.area for face in obj.data.polygons])
@@ -177,8 +178,9 @@ def _report(extension, *place, **inputs):
 
 def _caption():
     return (
-        "Lengths in mm, of Eros in km; sensor noise 0.05 mm, of Eros 0.0163 km; seed 0; contacts without the "
-        f"reference point. ms: tracking and fit, median of {RUNS} runs, {machine('bpy', 'numpy', 'scipy')}."
+        "Lengths are in mm, for Eros in km; sensor noise 0.05 mm, for Eros 0.0163 km; seed 0. Contacts are "
+        "counted without the reference point. ms: tracking and fit, median of "
+        f"{RUNS} runs, {machine('bpy', 'numpy', 'scipy')}."
     )
 
 

@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the time of a fit goes, what its solvers gain, and what fitting many at once gains.
 
-`python -m benchmarks.speed [--base ROOT [TASK ...]]`, from the root of a checkout. With --base it prints how
-long fits and automatic touches take beside those of that checkout and beside scipy's thin plate (ratios.py;
-bpy to read the scans and to cast rays), and nothing else. Otherwise, on the touches of benchmarks.accuracy
-(eleven exact surfaces, three plane sets, three noise levels, 75 contacts) it prints Markdown tables:
+`python -m benchmarks.speed [--base ROOT [TASK ...]]`, from the root of a checkout. With --base it only prints
+how long fits and automatic touches take beside those of that checkout and beside scipy's thin plate
+(ratios.py, which needs bpy to read the scans and to cast rays). Otherwise it prints Markdown tables, on the
+touches of benchmarks.accuracy (eleven exact surfaces, three plane sets, three noise levels, 75 contacts):
 
-(a) the minimization of (9), by Newton's method, by scipy's L-BFGS-B from the same start and on the same grid,
-    and by the paper's steepest descent from the paper's start;
+(a) the minimization of (9) by Newton's method, by scipy's L-BFGS-B from the same start and on the same grid,
+    and from the paper's start by Newton's method and by the paper's steepest descent;
 (b) fits a second, one by one and by core.reconstruct_many;
-(c) the parts of one fit.
+(c) the times of the parts of one fit.
 """
 
 import argparse
@@ -33,7 +33,7 @@ from . import accuracy, machine, ratios, table, timed
 WITHIN = 1e-6  # Minima within this share of the objective count as the same.
 TIGHT = {"maxiter": 1000, "ftol": 1e-12, "gtol": 1e-9}
 WEIGHT = 1000.0
-COPIES = 7  # For (b) the touches are there so many times.
+COPIES = 7  # The number of times that (b) repeats the touches.
 RUNS = 5
 
 
@@ -59,7 +59,7 @@ def fit(case, **options):
 
 
 def problem(case):
-    """The objective of a touch as its fit has it, and the paper's start."""
+    """The objective (9) as the fit of a touch minimizes it, and the paper's start."""
     found = []
 
     def caught(*problem):
@@ -72,7 +72,7 @@ def problem(case):
 
 
 def minima(case):
-    """Minima of a touch, by solver and start."""
+    """{solver and start: Minimum} of a touch."""
     objective, papers = problem(case)
 
     def value_and_gradient(a):
@@ -107,7 +107,7 @@ def solvers(cases):
         if run[elsewhere].value < ours * (1.0 - WITHIN):
             another.append(1.0 - run[elsewhere].value / ours)
     slow = median(run[descent].seconds for run in runs)
-    print(f"(a) Minima of (9), weight {WEIGHT:g}, 600 grid points, {len(cases)} touches: medians.\n")
+    print(f"(a) Minima of (9), weight {WEIGHT:g}, 600 grid points; medians over {len(cases)} touches.\n")
     rows = []
     for name in runs[0]:
         seconds = median(run[name].seconds for run in runs)
@@ -115,9 +115,10 @@ def solvers(cases):
         rows.append([name, f"{1e3 * seconds:.1f}", f"{slow / seconds:.1f}", f"{mean:.4f}"])
     table(["solver", "ms", "times as fast as the descent", "mean objective"], rows)
     print(
-        f"Newton against L-BFGS-B: within {WITHIN:g} of it in {len(same)} of {len(cases)}, lower in "
-        f"{len(lower)}, higher, in another minimum, in {len(higher)}. From the paper's start Newton finds a "
-        f"lower minimum in {len(another)}, by {100 * median(another or [0.0]):.1f} % in the median.\n"
+        f"The minimum of Newton's method is within {WITHIN:g} of that of L-BFGS-B in {len(same)} of "
+        f"{len(cases)} touches, lower in {len(lower)}, and higher, another minimum, in {len(higher)}. From "
+        f"the paper's start Newton's method finds a lower one than from the quadric in {len(another)}, by "
+        f"{100 * median(another or [0.0]):.1f} % in the median.\n"
     )
 
 
@@ -137,7 +138,7 @@ def many(cases):
         runs.append((len(copies) / seconds, len(copies) / alone))
     off = max(_departure(a, b) for a, b in zip(stacked, single, strict=True))
     at_once, one_by_one = np.median(runs, axis=0)
-    print(f"(b) {len(copies)} fits of the default.\n")
+    print(f"(b) {len(copies)} fits by bayes.\n")
     rows = [["reconstruct", f"{one_by_one:.0f}"], ["reconstruct_many", f"{at_once:.0f}"]]
     table(["", "fits a second"], rows)
     print(f"The heights of the two differ by {off:.1g} of the radius at most.\n")
@@ -181,7 +182,7 @@ def parts(cases):
         totals.append(timed(lambda case=case: fit(case))[0])
         for each in patches:
             each.stop()
-    print("(c) One fit of the default: medians in ms.\n")
+    print("(c) One fit by bayes of degree 4: medians in ms.\n")
     rows = [[name, f"{1e3 * median(times):.2f}"] for name, times in spent.items()]
     table(["part", "ms"], [*rows, ["all", f"{1e3 * median(totals):.2f}"]])
 
@@ -189,7 +190,7 @@ def parts(cases):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--base", type=Path, metavar="ROOT", help="a checkout to compare with")
-    parser.add_argument("tasks", nargs="*", choices=[*ratios.KINDS, []], help="some of what is compared")
+    parser.add_argument("tasks", nargs="*", choices=[*ratios.KINDS, []], help="what to compare (all)")
     options = parser.parse_args()
     if options.base:
         with blender.quiet():

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Times the core of any checkout, so that two can be compared in one run; benchmarks.ratios starts it.
 
-`python benchmarks/speed_worker.py ROOT CASES`, CASES pickled: each line of the input names a task and a case,
-`touch 3`, and is answered by seconds of processor time, which what else the machine does changes least. It
-uses what checkouts have in common; what the newer core does by itself, it does step by step with the older.
+`python benchmarks/speed_worker.py ROOT CASES`, where CASES is a pickled file. Each line of the input names a
+task and a case, as in `touch 3`, and is answered by seconds of processor time, which other programs change
+least. The script uses what all checkouts have in common; what a newer core does by itself, it does step by
+step with an older one.
 """
 
 import math
@@ -19,12 +20,12 @@ sys.path.insert(0, sys.argv[1])  # This comes before the folder of this file, wh
 import core
 
 FARTHEST, HEIGHTS = 0.5, 300  # A share of the scan's size, and a number of heights.
-HELPS, MOST_PLANES = 0.1, 6
+HELPS, MOST_PLANES = 0.1, 6  # The least share that one more plane takes off the deviation, and a number.
 EVEN = [core.SamplingPlane(math.pi * i / 3) for i in range(3)]
 
 
 class Mesh:
-    """A mesh in Blender's tree."""
+    """A mesh that casts rays by Blender's tree of its faces."""
 
     def __init__(self, points, faces):
         import bpy  # noqa: F401  # It brings mathutils.
@@ -44,14 +45,14 @@ def fit(point, outward, contours):
 
 
 def places():
-    """Over the unit disk, (n, 2)."""
+    """Points over the unit disk, (HEIGHTS, 2)."""
     azimuths = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(HEIGHTS)
     radii = 0.9 * np.sqrt((np.arange(HEIGHTS) + 0.5) / HEIGHTS)
     return np.column_stack([radii * np.cos(azimuths), radii * np.sin(azimuths)])
 
 
 def spline(contacts):
-    """scipy's thin plate on contacts (n, 3) in unit radius, and its heights."""
+    """The heights of scipy's thin plate on contacts (n, 3) in unit radius."""
     from scipy.interpolate import RBFInterpolator
 
     of = RBFInterpolator(contacts[:, :2], contacts[:, 2], kernel="thin_plate_spline", smoothing=1e-3)
@@ -63,7 +64,7 @@ def touch(scan, point, outward, planes=EVEN, farthest=FARTHEST, **more):
 
 
 def touch_with_planes(scan, point, outward):
-    """Planes are added while they help."""
+    """An automatic touch to which planes are added while they help."""
     if hasattr(core, "explore_many"):
         return touch(scan, point, outward, tolerance=0.0)
     found, planes = touch(scan, point, outward), EVEN

@@ -3,18 +3,20 @@
 """Where reconstructions fail, and whether they say so.
 
 `python -m benchmarks.stability [--seeds N]`, from the root of a checkout. One circumstance after the other is
-led from harmless to hopeless on exact surfaces, with every method. Prints Markdown; writes
-build/charts/stability.png, the sheet of all sweeps, and stability.csv. A warning or a refusal is due wherever
+led from harmless to hopeless on exact surfaces, with every method. The command prints Markdown and writes
+build/charts/stability.png, the sheet of all sweeps, and stability.csv. Lengths are in mm.
+
+A warning or a refusal is due wherever
 
 - the mean |dz| over the domain is more than three times the patch's own mean height_std, or
 - the frame is turned by more than 10 degrees, where |kappa1 - kappa2| L > 0.05, and the message does not
-  say that there are no principal directions;
+  say that there are no principal directions.
 
-of the cases where all is harmless and none is due, 5 % at most are to be warned of; and the uncertainty
-stated is not to be blown up: the median of mean height_std over mean |dz| is to be 2 at most. In mm.
+Where all is harmless and no warning is due, at most 5 % of the cases may have one. The stated uncertainty may
+not be too large either: the median of mean height_std over mean |dz| should be at most 2.
 
-A last table is of what no contact can tell, whatever the method, and of measured normals that are turned:
-how often a warning was due, and how often the default gave one.
+The first table, which `--untold` prints alone, is about what no contact can tell, whatever the method, and
+about measured normals that are turned: how often a warning was due, and how often "bayes" gave one.
 """
 
 import argparse
@@ -34,28 +36,28 @@ from .accuracy import SURFACES, TURN, above, darboux, table
 SEEDS = 3
 TOO_FAR, TURNED, UMBILIC, SMALL = 3.0, 10.0, 0.05, 0.01  # The numbers of the rule.
 NOISE, NORMAL_STD = 0.05, 0.02  # mm, radians
-STEPS = 12  # A half curve has so many.
+STEPS = 12  # The number of steps of a half curve.
 HOLD_OUT = 100
-SADDLE = "monkey saddle"  # Planes along its lines see nothing, so it has a sweep of its own.
+SADDLE = "monkey saddle"  # Planes along its lines show only a plane, so it has a sweep of its own.
 
 
 class Setting(NamedTuple):
-    """One touch; what is not said is harmless. Lengths in shares of the extent, angles in degrees."""
+    """One touch; the defaults are harmless. Lengths are shares of the extent, angles are in degrees."""
 
     azimuths: tuple = (0.0, 60.0, 120.0)
     tilts: tuple = (0.0, 0.0, 0.0)
     turn: float = TURN  # The angle between azimuth 0 and d1.
     step: float = 1.0 / STEPS
-    noise: float | None = None  # None for NOISE
+    noise: float | None = None  # With None it is NOISE.
     change: Callable | None = None  # Changes curves: (curves, point, extent, rng) -> curves.
     wrap: Callable | None = None  # Changes the surface: (surface, axes, extent) -> surface.
-    scale: float = 1.0
+    scale: float = 1.0  # All coordinates are multiplied by it.
     offset: float = 0.0  # All coordinates are moved by so many extents and rounded to single precision.
     normals: float | None = None  # Measured normals are turned by so many degrees, but claim NORMAL_STD.
 
 
 class Sweep(NamedTuple):
-    """A circumstance: what it is called, its values, those of them that are harmless, and what they mean."""
+    """A circumstance: its title, its values, the harmless ones of them, and what each value means."""
 
     title: str
     values: tuple
@@ -65,12 +67,12 @@ class Sweep(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What one method made of one touch; numbers are NaN where it was refused."""
+    """What one method made of one touch; the numbers are NaN where the touch was refused."""
 
     status: str
-    error: float = np.nan  # The mean of |dz| as a share of the radius.
+    error: float = np.nan  # The mean |dz| as a share of the radius.
     std: float = np.nan  # The mean height_std as a share of the radius.
-    turn: float = np.nan  # In degrees; 0 if the point is an umbilic, or said to be one.
+    turn: float = np.nan  # The frame's error in degrees; 0 at what is, or is said to be, an umbilic.
     condition: float = np.nan
 
     @property
@@ -83,7 +85,7 @@ class Outcome(NamedTuple):
 
 
 def touch(surface, extent, setting, seed):
-    """(point, outward, contours); a ValueError where it is refused."""
+    """(point, outward, contours). Raises ValueError where the touch is refused."""
     rng = np.random.default_rng(seed)
     axes, _ = darboux(surface)
     planes = [
@@ -120,7 +122,7 @@ def touch(surface, extent, setting, seed):
 
 
 def _measured_normals(contour, axes, degrees, rng):
-    """Contacts of a contour, scattered, and turned about d1."""
+    """Normals (n, 3) at the contacts of a contour, scattered by NORMAL_STD and turned about d1."""
     angle = np.radians(degrees)
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
     found = contour.normals + rng.normal(0.0, NORMAL_STD, contour.normals.shape)
@@ -128,7 +130,7 @@ def _measured_normals(contour, axes, degrees, rng):
 
 
 def outcome(surface, setting, point, outward, contours, method):
-    """What one method makes of a touch."""
+    """The Outcome of one method on a touch."""
     try:
         r = reconstruct(point, contours, outward=outward, method=method, degree=4)
     except ValueError:
@@ -152,7 +154,7 @@ def outcome(surface, setting, point, outward, contours, method):
 
 
 def outliers(share, curves, point, extent, rng):
-    """A share of the contacts lifted or lowered by a tenth of the extent, normally distributed."""
+    """The curves with a share of the contacts lifted or lowered, normally, by a tenth of the extent."""
     return [
         np.where(
             (rng.random(len(curve)) < share)[:, None] & (curve != point).any(axis=1, keepdims=True),
@@ -164,31 +166,34 @@ def outliers(share, curves, point, extent, rng):
 
 
 def short(share, curves, point, extent, rng):
-    """The first curve cut off at both ends."""
+    """The curves, the first one cut to a share of the extent at both ends."""
     near = np.linalg.norm(curves[0] - point, axis=1) <= share * extent * 1.001
     return [curves[0][near], *curves[1:]]
 
 
 def apart(distance, curves, point, extent, rng):
-    """Curves that miss the point by a distance, each in a direction of its own."""
+    """The curves moved by a distance, each in a direction of its own, so that they miss the point."""
     shifts = rng.normal(size=(len(curves), 3))
     shifts *= distance / np.linalg.norm(shifts, axis=1, keepdims=True)
     return [curve + shift for curve, shift in zip(curves, shifts, strict=True)]
 
 
 def turned_curve(degrees, curves, point, extent, rng):
-    """The first curve turned about the normal, as if the plane's azimuth had been noted wrongly."""
+    """The curves, the first one turned about the normal, as if the azimuth of its plane were wrong."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return [point + (curves[0] - point) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), *curves[1:]]
 
 
 def upside_down(which, curves, point, extent, rng):
-    """The first curve with its heights negated."""
+    """The curves, the first one with its heights negated if `which` is 1."""
     return [point + (curves[0] - point) * [1.0, 1.0, -1.0 if which else 1.0], *curves[1:]]
 
 
 def late(distance, outward, curves, point, extent, rng):
-    """Contacts noted where the finger has got to: felt from end to end, or from the point outward."""
+    """The curves with contacts recorded too late, so that they are moved the way the finger slides.
+
+    outward : whether the finger slides from the point outward, rather than from end to end
+    """
     found = []
     for curve in curves:
         run = (curve[-1] - curve[0]) / np.linalg.norm(curve[-1] - curve[0])
@@ -202,7 +207,7 @@ def late(distance, outward, curves, point, extent, rng):
 
 
 class Facets:
-    """A surface as triangles with edges of about a size, in Blender's tree."""
+    """A surface as triangles with edges of about `size`, which cast rays by Blender's tree."""
 
     def __init__(self, size, surface, axes, extent):
         import bpy  # noqa: F401  # It brings mathutils.
@@ -228,7 +233,7 @@ def facets(share, surface, axes, extent):
 
 
 def graphs(k1, k2):
-    """A quadric with these curvatures, and one with higher terms."""
+    """{name: (surface, extent)}: a quadric with these curvatures, and the same with higher terms."""
     quadric = {(2, 0): k1 / 2.0, (0, 2): k2 / 2.0}
     higher = {(3, 0): 2e-4, (2, 1): -3e-4, (1, 2): 1e-4, (0, 3): 2e-4, (4, 0): -2e-6, (2, 2): 3e-6}
     return {
@@ -238,7 +243,7 @@ def graphs(k1, k2):
 
 
 def by_curvature(share):
-    """The surfaces, touched as far as a share of their least radius of curvature."""
+    """{name: (surface, extent)}, where the extent is a share of the least radius of curvature."""
     curvature = {n: max(abs(s.k1), abs(s.k2)) for n, (s, _) in SURFACES.items() if n != SADDLE}
     return {name: (SURFACES[name][0], share / k) for name, k in curvature.items() if k}
 
@@ -280,9 +285,9 @@ SWEEPS = (
 )  # fmt: skip
 
 
-# Surfaces are upright at the origin, because curves are changed in the axes of the world.
+# The normals of these surfaces are along z, because curves are changed in the axes of the world.
 BENT = {"quadric": (-0.04, -0.01), "saddle": (-0.04, 0.02)}
-LINES = {  # r^n sin(n theta), which is 0 along planes at 0, 60 and 120 degrees.
+LINES = {  # The polynomials r^n sin(n theta) are 0 along planes at 0, 60 and 120 degrees.
     "sin 3 theta": {(2, 1): 3, (0, 3): -1},
     "sin 6 theta": {(5, 1): 6, (3, 3): -20, (1, 5): 6},
     "sin 9 theta": {(8, 1): 9, (6, 3): -84, (4, 5): 126, (2, 7): -36, (0, 9): 1},
@@ -290,7 +295,7 @@ LINES = {  # r^n sin(n theta), which is 0 along planes at 0, 60 and 120 degrees.
 
 
 def hidden(name, share):
-    """Quadrics with something beside them: a share of the radius at the rim, and zero along the curves."""
+    """Quadrics and a term of LINES, which is a share of the radius at the rim and 0 along the curves."""
     order = max(map(sum, LINES[name]))
     beside = {ij: share * c / 13.0 ** (order - 1) for ij, c in LINES[name].items()}
     bent = {n: {(2, 0): k1 / 2.0, (0, 2): k2 / 2.0} for n, (k1, k2) in BENT.items()}
@@ -302,7 +307,7 @@ def upright(value):
 
 
 def waves(length):
-    """Quadrics with waves of this length beside them, in mm, along and across."""
+    """Quadrics with oblique waves of this length in mm added, with amplitudes of 0.1 and 0.3 mm."""
     found = {}
     for name, (k1, k2) in BENT.items():
         for height in (0.1, 0.3):
@@ -348,7 +353,7 @@ ALL = SWEEPS + UNTOLD
 
 
 class Key(NamedTuple):
-    """A touch: the number of the sweep, its value, the surface and the seed."""
+    """A touch, by the number of its sweep in ALL, the value, the name of the surface, and the seed."""
 
     sweep: int
     value: float
@@ -380,7 +385,10 @@ def is_quiet(found):
 
 
 def _harmless(of):
-    """Outcomes without a due, where all is harmless, to this method too: its median error is below 1 %."""
+    """Outcomes at harmless values where no warning is due.
+
+    A value must be harmless to the method too: its median error there is below SMALL.
+    """
     rows = {}
     for key, found in of:
         if key.is_benign:
@@ -391,10 +399,11 @@ def _harmless(of):
 
 def rule_table(results):
     print(
-        "Of each method: cases where a warning or a refusal is due, and where it was not given; the harmless"
+        "For each method the cases where a warning or a refusal is due (all refusals count) and those where"
     )
     print(
-        "cases, and the share of them that were warned of; and mean height_std over mean |dz|, the median.\n"
+        "it was not given; the harmless cases, and the share of them that were warned of; and the median of "
+        "mean height_std over mean |dz|.\n"
     )
     rows = []
     for method in METHODS:
@@ -412,7 +421,7 @@ def rule_table(results):
             f"{np.median(widths):.2f}",
         ])  # fmt: skip
     table(["method", "cases", "due", "due, not given", "harmless", "warned of", "width"], rows)
-    print("Not given:\n")
+    print("A warning was due and not given for:\n")
     for key, found in results.items():
         for method in METHODS:
             f = found[method]
@@ -425,7 +434,7 @@ def rule_table(results):
 
 
 def untold_table(results):
-    print("What no contact can tell, and normals that contradict them; of the default, medians in % of L.\n")
+    print("What no contact can tell, and normals that contradict contacts: bayes, medians in % of L.\n")
     rows = []
     for number, sweep in enumerate(UNTOLD, len(SWEEPS)):
         for value in sweep.values:
@@ -458,7 +467,7 @@ HEAD = [
 
 
 def rows_of(results):
-    """A row for each sweep, value and method; medians of what was not refused, and shares."""
+    """A row for each sweep, value and method: medians over what was not refused, and shares of all."""
     rows = []
     for number, sweep in enumerate(SWEEPS):
         for value in sweep.values:
@@ -508,7 +517,7 @@ def draw(rows, caption):
 
 
 def panel(axes, sweep, of, first):
-    """Errors, condition numbers and shares of a sweep, one below the other."""
+    """Draws errors, condition numbers and shares of a sweep, one below the other."""
     places = np.arange(len(sweep.values))
     errors, conditions, shares = axes
     errors.set_title(sweep.title, fontsize=8)
@@ -568,7 +577,7 @@ def key(axes):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of the noise (%(default)s)")
-    parser.add_argument("--untold", action="store_true", help="the last table alone")
+    parser.add_argument("--untold", action="store_true", help="the first table alone")
     options = parser.parse_args()
     keys = [
         Key(number, value, surface, seed)
@@ -587,10 +596,10 @@ def main():
     rule_table(results)
     caption = (
         "Medians over ten exact surfaces (quadrics and quartics near the special points) and "
-        f"{options.seeds} seeds. What is not said is harmless: planes 60 degrees apart, {STEPS} steps to a "
+        f"{options.seeds} seeds. All else is harmless: planes 60 degrees apart, {STEPS} steps to a "
         f"side, noise of {NOISE:g} "
-        "mm, radii L of 12 to 15 mm. Error: mean |dz| over the domain. Below it the condition number, and "
-        f"the share of the touches that were warned of or refused. On {machine('numpy', 'scipy', 'bpy')}."
+        "mm, radii L of 12 to 15 mm. Error: mean |dz| over the domain. Below it are the condition number and "
+        f"the shares of the touches warned of and refused. On {machine('numpy', 'scipy', 'bpy')}."
     )
     draw(rows_of(results), caption)
 

@@ -4,12 +4,12 @@
 
 `python -m benchmarks.stability_map ZIP`, from the root of a checkout; ZIP is the built extension.
 
-The wavy sheet of benchmarks.live is mapped with the operator's defaults, as a script does, with another
-spacing each time for more points. The Markdown table has the median run of a few on one thread, in one
-Blender without a window: `points/s` is the whole operator, from the mesh to the painted copy; then, in
-milliseconds a point, tracking with its ray casts, the fit with deviation, condition number and status,
-the distances to the mesh, and thinning and painting; and in seconds what is done once, the tree of the
-faces among it.
+The wavy sheet of benchmarks.live is mapped by the operator, as a script does it, with the faces, spacings and
+extents of CASES and defaults for the rest. The Markdown table has the median of a few runs on one thread, in
+one Blender without a window. `points/s` is of the whole operator, from the mesh to the painted copy. The next
+columns are milliseconds a point: tracking with its ray casts; the fit with deviation, condition number and
+status; the distances to the mesh; and thinning and painting. The last column is the seconds of what is done
+once, such as the tree of the faces.
 """
 
 import argparse
@@ -22,8 +22,8 @@ from tools import blender
 from . import machine, table
 from .live import Clock, sheet
 
-EXTENT = 0.25  # an eighth of the sheet
-CASES = [  # faces, spacing, extent
+EXTENT = 0.25  # An eighth of the sheet.
+CASES = [  # Faces, spacing and extent; 0 leaves a length to the operator.
     (10_000, 0.0, EXTENT),
     (100_000, 0.0, EXTENT),
     (100_000, 0.02, EXTENT),
@@ -34,7 +34,7 @@ RUNS = 3
 
 
 def measure(bpy, clock, faces, spacing, extent):
-    """A row of the table."""
+    """A row of the table, of the run with the median time."""
     sheet(bpy, faces)
     runs = []
     for _ in range(RUNS):
@@ -91,7 +91,7 @@ def main():
     with blender.quiet():
         rows = [measure(bpy, clock, *case) for case in CASES]
     table(columns, rows, left=0)
-    print(f"Milliseconds a point, median of {RUNS} runs; {machine('bpy')}.")
+    print(f"Times are milliseconds a point, in the median of {RUNS} runs; {machine('bpy')}.")
 
 
 if __name__ == "__main__":

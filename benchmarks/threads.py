@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What threads of numpy's and scipy's linear algebra do to an automatic touch, by the clock.
 
-`python -m benchmarks.threads`, from the root of a checkout (bpy to cast rays), prints a Markdown table:
-medians of touches on one thread; as users have it, scipy's OpenBLAS on one thread while it is called and
-numpy's on as many as there are processors; and as it would be with threads for both. Each row is a process
-of its own.
+`python -m benchmarks.threads`, from the root of a checkout, prints a Markdown table of medians; it needs bpy
+to cast rays. The first row is on one thread. The second is as users have it: scipy's OpenBLAS has one thread
+while core calls it, and numpy's has as many as there are processors. The third is as it would be if both had
+threads. Each row is a process of its own.
 """
 
 import os
@@ -18,12 +18,13 @@ from time import perf_counter
 import numpy as np
 
 ROWS = {"one thread": "1", "as users have it": "", "threads for both": "both"}
-TOUCHES, ROUGH, FINE = 30, 0.02, 160  # the bumps of a ball of radius 1, and its faces along a meridian
+# The number of touches, the height of the bumps of a ball of radius 1, and its vertices along a meridian.
+TOUCHES, ROUGH, FINE = 30, 0.02, 160
 
 
 def ball():
     """A ball with bumps, in Blender's tree."""
-    import bpy  # noqa: F401  # which brings mathutils
+    import bpy  # noqa: F401  # It brings mathutils.
     from mathutils.bvhtree import BVHTree
 
     polar, around = np.meshgrid(np.linspace(0.0, np.pi, FINE), np.linspace(0.0, 2.0 * np.pi, 2 * FINE))
@@ -35,7 +36,7 @@ def ball():
 
 
 def seconds():
-    """The median of automatic touches all round the ball's middle."""
+    """The median seconds of automatic touches all around the ball."""
     import core
 
     surface, took = Tree(ball()), []
@@ -49,7 +50,7 @@ def seconds():
 
 
 class Tree:
-    """A tree as core's Surface."""
+    """Blender's tree as a surface that core can touch."""
 
     def __init__(self, tree):
         self.tree = tree
@@ -76,7 +77,7 @@ def main():
         ["touches", "ms", "times"],
         [[t, f"{1e3 * each:.2f}", f"{each / least:.1f}"] for t, each in took.items()],
     )
-    print(f"{os.cpu_count()} processors; but for the second and third row {machine('numpy', 'scipy')}.")
+    print(f"{os.cpu_count()} processors. The first row is on {machine('numpy', 'scipy')}.")
 
 
 if __name__ == "__main__" and __package__:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender as a Python module with the built extension installed in it, as its users install it.
 
-Import it before bpy, which reads the folder of the user's files once, on import: this replaces it by one of
-the project's.
+Import this module before bpy, because bpy reads once, on import, where the folder of the user's files is:
+this module replaces that by a folder of the project's.
 """
 
 import importlib

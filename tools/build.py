@@ -24,11 +24,11 @@ import markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 MANIFEST = ROOT / "blender_manifest.toml"
-# Blender's list of patterns can only exclude. So what ships is named here, and nothing else that lies in a
-# checkout, such as an environment or a scan, can get into a release.
+# Blender's own list of patterns can only exclude files. So what ships is named here, and nothing else that
+# lies in a checkout, such as an environment or a scan, can get into a release.
 SHIPPED = ("__init__.py", "LICENSE", "core", "presets", "tactile_addon")
-# The page that Blender's Online Manual opens and those that it leads to are made into HTML with their
-# pictures.
+# These pages ship as HTML, with their pictures: the first is what Blender's Online Manual opens, the others
+# are those that it leads to.
 DOCS = ROOT / "docs"
 MANUAL = ("viewport", "lesson", "messages")
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Tactile Patch</title>
@@ -41,8 +41,8 @@ pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
 LEAD = """<!doctype html><meta charset="utf-8"><title>Tactile Patch</title>
 <meta http-equiv="refresh" content="0; url=viewport.html#{}">
 """
-# For the Python of the wheels: the first Blender that has it, and the first one that does not have it any
-# more.
+# For each Python of the wheels, the first Blender that has it and, if there is one, the first that no longer
+# has it.
 SERIES = {"311": ("4.5.0", "5.1.0"), "313": ("5.1.0",)}
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}
 
@@ -95,7 +95,7 @@ def build(
     folder: Path,
     series: tuple[str, ...] = (),
 ) -> None:
-    """Make a zip for each platform, for a series of Blender or all; for no platform one without wheels."""
+    """Make a zip for each platform, or one without wheels for none; for one series of Blender, or for all."""
     with tempfile.TemporaryDirectory(dir=folder) as temporary:
         source, output = Path(temporary, "source"), Path(temporary, "zip")
         output.mkdir()
@@ -119,14 +119,14 @@ def host_platform() -> str:
 
 
 def wheel_platform(wheel: str) -> str:
-    """The platform, by Blender's name, that a wheel is for."""
+    """The platform of a wheel, by Blender's name."""
     tag = Path(wheel).stem.rsplit("-", 1)[1]
     system = {"man": "linux", "win": "windows", "mac": "macos"}[tag[:3]]
     return f"{system}-{'arm64' if tag.endswith('arm64') else 'x64'}"
 
 
 def packaging_tool() -> Path:
-    """Blender's command line for extensions; finding it does not start Blender."""
+    """The path of Blender's command line for extensions, found without starting Blender."""
     spec = importlib.util.find_spec("bpy")
     if spec is not None and spec.origin is not None:
         found = Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
@@ -136,13 +136,13 @@ def packaging_tool() -> Path:
 
 
 def download(wheel: Path) -> None:
-    """Fetch the file a wheel's name describes, unless it is there."""
+    """Fetch the wheel that this path names from PyPI, unless it is there."""
     if wheel.exists():
         return
     print(f"Downloading {wheel.name}", file=sys.stderr)
     name, version, python, abi, tags = wheel.stem.split("-")
     wheel.parent.mkdir(exist_ok=True)
-    # It goes into its own folder first, because an interrupted download must not pass for a wheel later.
+    # The file goes into its own folder first, because a part of a wheel must not pass for a wheel later.
     with tempfile.TemporaryDirectory(dir=wheel.parent) as folder:
         command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
         command += ["--only-binary=:all:", "--implementation", "cp", "--abi", abi]
@@ -156,7 +156,7 @@ def download(wheel: Path) -> None:
 
 
 def stage(folder: Path, platforms: list[str], wheels: list[str], series: tuple[str, ...] = ()) -> None:
-    """Lay out what ships in `folder`, its manifest cut down to these platforms, wheels and Blenders."""
+    """Copy what ships to `folder`, with a manifest of these platforms, wheels and Blenders only."""
     for name in SHIPPED:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name)
@@ -179,14 +179,14 @@ def stage(folder: Path, platforms: list[str], wheels: list[str], series: tuple[s
         lines = "".join(f'{key} = "{value}"\n' for key, value in limits.items())
         text = re.sub(r"^blender_version_min = .*\n", lines, text, flags=re.MULTILINE)
         expected |= limits
-    # The text is edited, so that everything else stays as it is written. This notices if an edit has missed.
+    # The text is edited so that all else stays as it is written. This notices if an edit has missed.
     if tomllib.loads(text) != {key: value for key, value in expected.items() if value}:
         sys.exit(f"{MANIFEST.name}: platforms and wheels must be plain arrays, `key = [...]`.")
     (folder / MANIFEST.name).write_text(text, encoding="utf-8")
 
 
 def write_manual(folder: Path) -> None:
-    """The manual as pages of HTML, with the pictures they show."""
+    """Write the manual to `folder` as pages of HTML, with the pictures they show."""
     folder.mkdir()
     for name in MANUAL:
         text = shipped_links((DOCS / f"{name}.md").read_text(encoding="utf-8"))
@@ -200,7 +200,7 @@ def write_manual(folder: Path) -> None:
 
 
 def shipped_links(text: str) -> str:
-    """Markdown whose links to other pages of the docs lead to HTML, or are words where those do not ship."""
+    """Markdown whose links to pages of the docs lead to HTML, or are plain words where no page ships."""
 
     def lead(found: re.Match[str]) -> str:
         words, name, anchor = found.groups()
@@ -210,7 +210,7 @@ def shipped_links(text: str) -> str:
 
 
 def run(tool: Path, *arguments: str | Path) -> None:
-    """Run Blender's tool; what it says shows only when it fails."""
+    """Run Blender's tool; what it prints is shown only when it fails."""
     result = subprocess.run(
         [sys.executable, tool, *arguments],
         stdout=subprocess.PIPE,

@@ -13,7 +13,7 @@ STYLE_URL = re.compile(r"url\(\s*['\"]?([^'\")]+)|@import\s+['\"]([^'\"]+)")
 
 
 class Page(HTMLParser):
-    """The ids of a page, and (tag, attribute, address) of what it names."""
+    """The ids of a page, and (tag, attribute, address) of all that it links to or loads."""
 
     def __init__(self, path):
         super().__init__()
@@ -21,7 +21,7 @@ class Page(HTMLParser):
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag, attributes):
-        """Notes what the tag names."""
+        """Notes the ids and addresses of a tag."""
         for name, value in attributes:
             if name in ("id", "name"):
                 self.ids.add(value)
@@ -30,7 +30,7 @@ class Page(HTMLParser):
 
 
 def problems(folder):
-    """A sentence for everything in the folder that is broken or that another host would be asked for."""
+    """Yields a sentence for each link that is broken and for all that is loaded from another host."""
     pages = {path: Page(path) for path in sorted(folder.rglob("*.html"))}
     for path, page in pages.items():
         for tag, name, address in page.addresses:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A small data set of touches, made by two workers in a minute: `python -m tools.dataset`.
 
-It touches the scans of ../shared/data, or Suzanne and simple shapes where these are not here, tabulates what
-was found, and draws all contacts, colored by how far the patches are off the mesh.
+It touches the scans of ../shared/data, or Suzanne and simple shapes if there are no scans, tabulates what was
+found, and draws the contacts, colored by how far the patches are off the mesh.
 """
 
 import argparse
@@ -45,7 +45,7 @@ def main():
         str(options.output),
     ]
     code = subprocess.run(command, cwd=ROOT).returncode
-    if code not in (0, 3):  # With 3 there are objects that could not be touched.
+    if code not in (0, 3):  # The code is 3 if some objects could not be touched.
         sys.exit(code)
     stored = pq.read_table(options.output / "objects.parquet").to_pylist()
     columns = ["hash", "mesh_error", "radius", "contacts", "normals"]
@@ -58,7 +58,7 @@ def main():
 
 
 def shapes(folder):
-    """Writes Suzanne and some primitives as .ply, if there are no scans."""
+    """Writes Suzanne and some primitives to `folder` as .ply; returns it."""
     import bpy
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -80,7 +80,7 @@ def shapes(folder):
 
 
 def of_object(touches, facts):
-    """Patches of an object: errors and radii in shares of its size, contacts and normals of each."""
+    """The patches of an object: errors and radii in shares of its size, contacts and normals of each."""
     rows = [
         row for row in touches.to_pylist() if row["hash"] == facts["hash"] and row["mesh_error"] is not None
     ]
@@ -101,11 +101,11 @@ def print_table(found):
         radius, off = 100.0 * np.median(patches["radii"]), 1e3 * np.median(patches["errors"])
         each = 1e3 * facts["seconds"] / facts["touches"]
         print(f"{facts['object'][:23]:24}{counts}{radius:11.1f}{off:15.2f}{each:6.1f}")
-    print("Medians of the patches, in shares of the object's size; processor time of a touch.\n")
+    print("Radius and off: medians over patches, as shares of the size; ms: processor time of a touch.\n")
 
 
 def draw(found, path):
-    """Draws each object's contacts that face the viewer, in the colors of their patch's error."""
+    """Draws the contacts of each object that face the viewer, colored by the error of their patch."""
     across = min(len(found), 3)
     down = -(-len(found) // across)
     figure, axes = pyplot.subplots(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main job, start to end: a mesh is touched in Blender, a patch rebuilt, reported, drawn and saved.
+"""The main job from start to end: Blender touches a mesh, and a patch is fitted, reported, drawn and saved.
 
 `make demo` runs it on Suzanne, `make demo MESH=FILE` on a .ply, .stl, .obj or .blend file.
 """
@@ -13,11 +13,11 @@ import numpy as np
 
 from tools import blender
 
-SPOT = (0.32, -0.19, 0.84)  # It is on Suzanne's forehead.
-NOISE = 1.0 / 1200.0  # As a share of the object's size: 0.05 mm on 60 mm.
+SPOT = (0.32, -0.19, 0.84)  # This place is on Suzanne's forehead.
+NOISE = 1.0 / 1200.0  # A share of the object's size, as 0.05 mm is of 60 mm.
 WIDTH, HEIGHT = 1200, 900
 BAR_STEPS = 128
-BAR_REACH = 1.5  # The bar reaches so many patch radii to either end.
+BAR_REACH = 1.5  # Half the length of the color bar, in radii of the patch.
 
 
 def main():
@@ -42,7 +42,7 @@ def main():
 
 
 def touch(extension, mesh=""):
-    """Fills the scene with the mesh and reconstructs one patch on it; returns the patch object."""
+    """Fills the scene with the mesh, or Suzanne, and reconstructs a patch on it; returns the patch object."""
     import bpy
 
     if mesh:
@@ -50,7 +50,7 @@ def touch(extension, mesh=""):
         target = next(o for o in bpy.context.scene.objects if o.type == "MESH" and len(o.data.polygons))
         corners = np.array([target.matrix_world @ type(target.location)(c) for c in target.bound_box])
         location, size = corners.mean(axis=0), np.ptp(corners, axis=0).max()
-        # The ray comes from the front and a little above, as people look at things.
+        # The ray comes from the front and somewhat above, from where people look at things.
         ray = np.array([0.0, 2.0, -1.0]) / np.sqrt(5.0)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         hit, point, *_ = bpy.context.scene.ray_cast(depsgraph, location - 2.0 * size * ray, ray)
@@ -83,7 +83,7 @@ def compose(extension, patch, unit):
 
 
 def stage(extension, report):
-    """Sets up camera, light and look around the patch of a report; returns what places labels there."""
+    """Sets up camera, light and materials around the patch of a report; returns an _Overlay for labels."""
     import bpy
     from mathutils import Matrix, Vector
 
@@ -158,7 +158,7 @@ def color_bar(extension, put, limit, unit):
 
 
 def look(scene, source):
-    """Gives the mesh clay and a light background, and lets colors reach the file as they are."""
+    """Gives the mesh a clay material and a light background, and saves colors unchanged."""
     import bpy
 
     if not any(slot.material for slot in source.material_slots):
@@ -178,9 +178,10 @@ def look(scene, source):
 
 
 def render(patch, path, samples=32):
-    """Draws the scene with Cycles. Patch and contours, which lie in the mesh, come nearer for that.
+    """Draws the scene with Cycles to `path`.
 
-    The camera is orthographic, so this does not show.
+    Patch and contours lie in the mesh, so they are moved toward the camera for the picture. The camera is
+    orthographic, so this does not show.
     """
     import bpy
 
@@ -193,7 +194,7 @@ def render(patch, path, samples=32):
 
 
 def photograph(scene, path, width, height, samples=32):
-    """Draws the scene as it is with Cycles, as .png."""
+    """Draws the scene as it is with Cycles to the .png file `path`."""
     import bpy
 
     scene.render.engine, scene.cycles.device = "CYCLES", "CPU"

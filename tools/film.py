@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The moving picture of the README: a finger slides along three curves, a patch appears, its planes turn.
 
-`make film` draws it with Blender as a Python module, in some minutes, and writes docs/film.webp.
+`make film` draws it with Blender as a Python module in some minutes, and writes docs/film.webp.
 """
 
 import argparse
@@ -16,8 +16,8 @@ from tools import blender, demo
 OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "film.webp"
 WIDTH, HEIGHT, SAMPLES, QUALITY = 560, 420, 16, 88
 LARGEST = 300_000  # The film has at most so many bytes, so that the README opens at once.
-STROKES, TURNS = 7, 15  # Each curve takes so many pictures, and the turn takes so many.
-SHORT, LONG = 90, 1500  # Pictures stay for so many milliseconds.
+STROKES, TURNS = 7, 15  # The numbers of pictures of each curve, and of the turn of the planes.
+SHORT, LONG = 90, 1500  # The milliseconds that a picture is shown.
 CAPTIONS = (
     "A finger slides along three curves",
     "From them alone: the patch, by Gaussian curvature",
@@ -29,12 +29,12 @@ CURVE, FINGER = (0.02, 0.02, 0.02, 1.0), (0.9, 0.35, 0.02, 1.0)
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--zip", required=True, type=Path, help="the built extension")
-    parser.add_argument("--frames", type=Path, help="a folder for the single pictures, to look at")
+    parser.add_argument("--frames", type=Path, help="a folder to keep the single pictures in")
     options = parser.parse_args()
     try:
         from PIL import Image
     except ImportError:
-        sys.exit("film: Pillow writes the moving picture: make film installs it")
+        sys.exit("film: Pillow, which writes the moving picture, is missing: make film installs it")
     folder = options.frames or blender.BUILD / "film"
     folder.mkdir(parents=True, exist_ok=True)
     extension = blender.start(options.zip)
@@ -77,7 +77,7 @@ class Film:
         self.hide_results()
 
     def shots(self):
-        """(path, milliseconds) of every picture."""
+        """Yields (path, milliseconds) of each picture."""
         curves = [self.curve(contour) for contour in self.contours()]
         finger = self.finger()
         yield from self.slides(curves, finger)
@@ -94,7 +94,7 @@ class Film:
         yield self.shot(LONG)
 
     def slides(self, curves, finger):
-        """One curve after the other, with the finger at its end."""
+        """Yields the shots in which one curve after the other grows, with the finger at its end."""
         self.caption.data.body = CAPTIONS[0]
         for curve in curves:
             curve.hide_render = True
@@ -114,7 +114,7 @@ class Film:
         return [c.points for c in self.extension.reconstruction_of(self.patch).contours]
 
     def curve(self, points):
-        """A tube along points (n, 3), in front of the mesh."""
+        """Adds a tube along points (n, 3), in front of the mesh, and returns it."""
         import bpy
 
         data = bpy.data.curves.new("Curve", "CURVE")
@@ -126,7 +126,7 @@ class Film:
         return self.link("Curve", data, CURVE)
 
     def finger(self):
-        """A ball."""
+        """Adds a ball to the scene and returns it."""
         import bpy
 
         bpy.ops.mesh.primitive_uv_sphere_add(radius=0.09 * self.report["radius"])
@@ -146,7 +146,7 @@ class Film:
         return obj
 
     def touch_again(self, angle):
-        """The patch with all planes turned by so much, in place of the one before."""
+        """Replaces the patch by one with all planes turned by an angle in radians."""
         import bpy
 
         report = self.report

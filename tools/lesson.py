@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures of docs/lesson.md: one plane and its circle, curvature against its angle, Gaussian curvature.
 
-`make lesson` draws them. Curvatures are those that core finds, from three curves of the surface.
+`make lesson` draws them. The curvatures are those that core finds from three curves on each surface.
 """
 
 from pathlib import Path
@@ -17,7 +17,7 @@ from matplotlib.patches import Arc
 import core
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-REACH = 0.75  # The patches reach so far, in units of 1 / |k1|.
+REACH = 0.75  # The radius of the patches, in units of 1 / |k1|.
 BLUE, RED, BLACK, GRAY = "#0072b2", "#d55e00", "#222222", "#999999"
 SHAPES = {"cap (top of an egg)": (-1.0, -0.5), "pipe": (-1.0, 0.0), "saddle": (-1.0, 0.7)}
 
@@ -29,7 +29,7 @@ def main():
 
 
 def felt(k1, k2):
-    """What core finds at the top of z = (k1 x^2 + k2 y^2) / 2, from curves at 0, 60 and 120 degrees."""
+    """(k1, k2) that core finds at the top of z = (k1 x^2 + k2 y^2) / 2, from curves at 0, 60, 120 degrees."""
     s = np.linspace(-0.3, 0.3, 13)
     contours = []
     for azimuth in np.radians([0.0, 60.0, 120.0]):
@@ -44,7 +44,7 @@ def height(k1, k2, x, y):
 
 
 def one():
-    """The curve of one plane, its circle, and the normal."""
+    """Draws the curve of one plane, its circle, and the normal."""
     figure, axes = plt.subplots(figsize=(6.4, 3.2))
     x = np.linspace(-1.5, 1.5, 301)
     axes.plot(x, -0.5 * x**2 + 0.06 * x**4, color=BLACK, lw=2.5)
@@ -64,7 +64,7 @@ def one():
 
 
 def turn(found):
-    """Normal curvature against the angle of the plane."""
+    """Draws normal curvature against the angle of the plane."""
     figure, row = plt.subplots(1, 3, figsize=(9.0, 2.8), sharey=True)
     angles = np.linspace(0.0, 180.0, 181)
     for axes, (name, (k1, k2)) in zip(row, found.items(), strict=True):
@@ -83,7 +83,7 @@ def turn(found):
 
 
 def gauss(found):
-    """The three patches in the colors of their Gaussian curvature."""
+    """Draws the three patches in the colors of their Gaussian curvature."""
     figure = plt.figure(figsize=(9.0, 3.2))
     rho, phi = np.meshgrid(np.linspace(0.0, REACH, 30), np.linspace(0.0, 2.0 * np.pi, 73))
     x, y = rho * np.cos(phi), rho * np.sin(phi)

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Changes core in one place after the other, and says which changes no test notices.
 
-`python -m tools.mutants [--count N] [--seed N] [--first N] [MODULE ...]`, from the root of a checkout. Of all
-places where an operator, a number, a comparison or a condition could be another one, so many are drawn; each
-is changed in a copy of the checkout, and its module's tests are run until one fails. What does not end in
-time counts as noticed. Prints the changes that survive, and how many died.
+`python -m tools.mutants [--count N] [--seed N] [--first N] [MODULE ...]`, from the root of a checkout. It
+draws --count of all places where an operator, a number, a comparison or a condition could be another one.
+Each is changed in a copy of the checkout, and the tests of its module run until one fails. A change whose
+tests do not end in time counts as noticed. The command prints the changes that survive or time out, and how
+many were noticed.
 """
 
 import argparse
@@ -77,7 +78,7 @@ NAMES = {"maximum": "minimum", "minimum": "maximum", "max": "min", "min": "max",
 
 
 class Mutant(NamedTuple):
-    """One changed place of a module: its source, and a line that describes it."""
+    """A module with one place changed: its name, a line that describes the change, and its new source."""
 
     module: str
     said: str
@@ -85,7 +86,7 @@ class Mutant(NamedTuple):
 
 
 def places_of(module: str) -> list[tuple[str, int]]:
-    """The places that can be changed in a module of core, as the module and the number of a tree's node."""
+    """The places that can be changed in a module of core: (module, number of the node in its syntax tree)."""
     nodes = list(ast.walk(_tree(module)))
     # No test could notice a changed annotation.
     types = [getattr(node, name, None) for node in nodes for name in ("annotation", "returns")]
@@ -94,7 +95,7 @@ def places_of(module: str) -> list[tuple[str, int]]:
 
 
 def mutant_at(module: str, number: int) -> Mutant:
-    """The change of one place."""
+    """The Mutant of one place."""
     tree = _tree(module)
     node = list(ast.walk(tree))[number]
     before, change = ast.unparse(node), _change(node)
@@ -109,7 +110,7 @@ def _tree(module: str) -> ast.Module:
 
 
 def _change(node: ast.AST) -> Callable[[ast.AST], None] | None:
-    """A function that changes a node of this kind, or None if it stays."""
+    """A function that changes a node like this one, or None if such nodes stay as they are."""
     if isinstance(node, ast.BinOp | ast.BoolOp | ast.AugAssign) and type(node.op) in OPERATORS:
         return lambda n: setattr(n, "op", OPERATORS[type(n.op)]())  # type: ignore[attr-defined]
     if isinstance(node, ast.Compare) and type(node.ops[0]) in OPERATORS:
@@ -130,14 +131,14 @@ def _change(node: ast.AST) -> Callable[[ast.AST], None] | None:
 
 
 def outcome(mutant: Mutant, place: Path, seconds: float) -> str:
-    """ "died", "survived" or "timed out"."""
+    """Runs the tests of a mutant in the copy `place`: "died", "survived" or "timed out"."""
     path = place / "core" / f"{mutant.module}.py"
     original = path.read_text(encoding="utf-8")
     path.write_text(mutant.source, encoding="utf-8")
     names = TESTS[mutant.module].split()
     tests = [str(found) for name in names for found in (place / "tests/core").rglob(f"test_{name}.py")]
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    # These are seconds of the processor and not of the clock, so that a busy machine kills nothing.
+    # These are seconds of the processor and not of the clock, so that a busy machine ends no tests.
     limit = (int(seconds), int(seconds))
     try:
         run = subprocess.run(
@@ -157,18 +158,18 @@ def outcome(mutant: Mutant, place: Path, seconds: float) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Which changes of core no test notices.")
     parser.add_argument(
-        "modules", nargs="*", metavar="MODULE", help="of core, as in bayes/joint_fit; all of them"
+        "modules", nargs="*", metavar="MODULE", help="modules of core, as in bayes/joint_fit (all)"
     )
-    parser.add_argument("--count", type=int, default=300, help="of changes (%(default)s)")
-    parser.add_argument("--first", type=int, default=0, help="of those drawn, to go on with (%(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the draw (%(default)s)")
+    parser.add_argument("--count", type=int, default=300, help="number of changes (%(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="the drawn change to begin with (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the draw (%(default)s)")
     parser.add_argument(
-        "--seconds", type=float, default=120.0, help="of the processor, for a module's tests (%(default)g)"
+        "--seconds", type=float, default=120.0, help="of processor time, for a module's tests (%(default)g)"
     )
     options = parser.parse_args()
     every = [place for module in options.modules or TESTS for place in places_of(module)]
     drawn = random.Random(options.seed).sample(every, min(options.count, len(every)))[options.first :]
-    # This happens first, because the checkout may change meanwhile.
+    # All changes are made first, because the checkout may change while tests run.
     chosen = [mutant_at(*place) for place in drawn]
     outcomes = []
     with tempfile.TemporaryDirectory() as folder:
@@ -183,7 +184,7 @@ def main() -> None:
             print(f"\r{len(outcomes)} of {len(chosen)}", end="", file=sys.stderr, flush=True)
     survived, late = outcomes.count("survived"), outcomes.count("timed out")
     print(f"{len(outcomes) - survived} of {len(outcomes)} changes were noticed, {late} by the time limit.")
-    print(f"Seed {options.seed}, of {len(every)} changes that there could be.")
+    print(f"They were drawn by seed {options.seed} from {len(every)} possible ones.")
 
 
 if __name__ == "__main__":

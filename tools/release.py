@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes all files of a release in build/release/VERSION, or says in a sentence why there can be none.
 
-- A zip for each system, and one without wheels: one download for all Blenders, to be installed from disk.
-- repository/: a static repository of Blender's own (index.json, and index.html with links to drop into
-  Blender). Its zips are for one system and one series of Blender each, half the download, and Blender takes
-  the one that fits.
-- CHANGES.md, the changelog's section, and SHA256SUMS.
+- The zips are for one system and all Blenders each, to be installed from disk. One has no wheels.
+- repository/ is a static repository as Blender defines it (index.json, and index.html with links to drop into
+  Blender). Its zips are for one system and one series of Blender each, so they are half as large, and Blender
+  takes the one that fits.
+- CHANGES.md is the changelog's section, and SHA256SUMS has the checksums of the zips.
 """
 
 import hashlib
@@ -56,7 +56,7 @@ def manifest_version(root: Path) -> str:
 
 
 def disagreements(root: Path) -> Iterator[str]:
-    """A sentence for each thing that does not agree with the manifest's version."""
+    """Yields a sentence for each thing that does not agree with the manifest's version."""
     version = manifest_version(root)
     if not VERSION.fullmatch(version):
         yield f'blender_manifest.toml has the version "{version}": expected three numbers, as in 1.0.0'
@@ -76,7 +76,7 @@ def disagreements(root: Path) -> Iterator[str]:
 
 
 def section(root: Path, version: str) -> tuple[str | None, str]:
-    """Date and text of the changelog's first section, None and "" where it is not that of the version."""
+    """Date and text of the changelog's first section; None and "" if it is of another version."""
     found = SECTION.search((root / "CHANGELOG.md").read_text(encoding="utf-8"))
     if found is None or found[1] != version:
         return None, ""
@@ -84,7 +84,7 @@ def section(root: Path, version: str) -> tuple[str | None, str]:
 
 
 def git(root: Path, *arguments: str) -> str:
-    """The output of git."""
+    """The output of a git command in the checkout `root`."""
     return subprocess.run(
         ["git", *arguments], cwd=root, check=True, capture_output=True, text=True
     ).stdout.strip()
@@ -98,12 +98,12 @@ def run(script: str, *arguments: str | Path) -> None:
 
 
 def generate(repository: Path) -> None:
-    """Write the repository's index.json and index.html, with Blender's own tool."""
+    """Write the repository's index.json and index.html by Blender's own tool."""
     build.run(build.packaging_tool(), "server-generate", "--repo-dir", repository, "--html")
 
 
 def write_checksums(folder: Path) -> None:
-    """SHA256SUMS of all zips, as sha256sum --check reads them."""
+    """Write SHA256SUMS of all zips, as sha256sum --check reads it."""
     lines = [
         f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder).as_posix()}\n"
         for path in sorted(folder.rglob("*.zip"))

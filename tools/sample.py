@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sample scene, examples/sample.blend: a vase, a probe where its neck begins, and a note.
 
-`make sample` makes it, with Blender 4.5, so that all Blenders from 4.5 on open it.
+`make sample` makes it. It should be made in Blender 4.5, so that all Blenders from 4.5 on open it.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from tools import blender
 OUTPUT = Path(__file__).resolve().parents[1] / "examples" / "sample.blend"
 LARGEST = 300_000  # The file has at most so many bytes.
 AROUND, ALONG, SUBDIVISIONS = 32, 20, 3
-HEIGHT, PLACE = 2.4, 1.45  # The heights of the vase, and of the probe on it.
+HEIGHT, PLACE = 2.4, 1.45  # The height of the vase, and that of the probe on it.
 NOTE = """A probe on a vase
 
 Open the sidebar (N), tab Tactile.
@@ -43,7 +43,7 @@ def main():
 
 
 def profile(z):
-    """The radius of the vase at heights z: a belly, a neck and a lip."""
+    """The radius of the vase at heights z; it has a belly, a neck and a lip."""
     return 0.62 + 0.30 * np.cos(2.4 * (z - 0.75)) + 0.08 * (z / HEIGHT) ** 4
 
 
@@ -59,7 +59,7 @@ def make():
     note()
     steepness = (profile(PLACE + 1e-4) - profile(PLACE - 1e-4)) / 2e-4
     front = (0.0, -float(profile(PLACE)), PLACE)
-    # It takes four planes, because three leave more open on a vase than their deviation says.
+    # The probe has four planes, because on a vase the error of three is larger than their deviation says.
     azimuths = [*np.radians([0.0, 45.0, 90.0, 135.0]), 0.0, 0.0]
     outward = (0.0, -1.0, -float(steepness))
     bpy.ops.tactile.pick(

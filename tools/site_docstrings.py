@@ -8,20 +8,20 @@ from textwrap import dedent
 import griffe
 
 ARGUMENT = re.compile(r"^(\w+(?:, \w+)*) : ")
-AGAIN = re.compile(r"; (\w+) : ")  # There may be several arguments in a line.
+AGAIN = re.compile(r"; (\w+) : ")  # A line may describe several arguments.
 
 
 class HouseStyle(griffe.Extension):
-    """Reads arguments as `name : what it is`, with indented lines that belong to them, and `>>>` examples."""
+    """Reads `name : what it is` as an argument, with the indented lines below it, and `>>>` as an example."""
 
     def on_instance(self, *, obj, **_):
-        """Rewrites the docstring of whatever was found."""
+        """Rewrites the docstring of each object that Griffe finds."""
         if obj.docstring is not None:
             obj.docstring.value = markdown_of(obj.docstring.value)
 
 
 def markdown_of(text):
-    """A docstring in the style of this house as Markdown."""
+    """A docstring in the style of this project as Markdown."""
     lines = []
     for block in re.split(r"\n\s*\n", dedent(text)):
         lines += [*_block(block.splitlines()), ""]
@@ -31,7 +31,7 @@ def markdown_of(text):
 def _block(lines):
     if lines and lines[0].startswith(">>>"):
         return ["```pycon", *lines, "```"]
-    if lines and lines[0].startswith("    "):  # It is a formula.
+    if lines and lines[0].startswith("    "):  # The block is a formula.
         return ["```text", *map(dedent, lines), "```"]
     if not any(map(ARGUMENT.match, lines)):
         return lines

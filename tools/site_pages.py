@@ -12,7 +12,7 @@ from latex2mathml.converter import convert
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
-# Pages of the checkout that the site has, too; their links begin in another folder there.
+# Pages outside of docs that the site has too. Their links start in another folder there.
 OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 FENCE = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
 CODE = re.compile(r"`[^`]*`")
@@ -40,9 +40,9 @@ def on_page_markdown(markdown, **_):
 
     text = CODE.sub(keep, FENCE.sub(keep, markdown))
     text = DISPLAY.sub(lambda m: convert(m[1].strip(), display="block"), text)
-    # It is in a span, because a line that begins with <math> would be a block of its own.
+    # Formulas are in a span, because a line that begins with <math> would be a block of its own.
     text = INLINE.sub(lambda m: f"<span>{convert(m[1])}</span>", text)
-    # Parts that were kept first are not inside of parts that were kept later.
+    # Parts are put back in reverse, because a part that was kept later may contain earlier ones.
     for number in reversed(range(len(kept))):
         text = text.replace(f"\0{number}\0", kept[number])
     return text

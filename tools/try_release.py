@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Install a release as its users do, in a Blender without any settings, and make a patch with it.
 
-It comes from the repository, as by Get Extensions, and from the zip for this system, as by Install from Disk.
+It comes from the repository, as by Get Extensions, and then from this system's zip, as by Install from Disk.
 """
 
 import argparse
@@ -18,7 +18,7 @@ REPOSITORY = "tried"
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    help = "the folder that make release has written (that of this version)"
+    help = "the folder that make release has written (default: that of this version)"
     parser.add_argument("release", nargs="?", type=Path, default=release.folder_of_version(), help=help)
     folder = parser.parse_args().release.resolve()
     with tempfile.TemporaryDirectory() as user:
@@ -39,12 +39,12 @@ def main():
 
 
 def index_of(bpy):
-    """The place of the repository among Blender's own."""
+    """The index of the repository in the list of Blender's preferences."""
     return [repo.module for repo in bpy.context.preferences.extensions.repos].index(REPOSITORY)
 
 
 def install_from(bpy, url):
-    """Adds the repository and installs what it offers to this Blender."""
+    """Adds the repository and installs the zip that it offers to this Blender."""
     bpy.context.preferences.system.use_online_access = True  # Blender asks for it even for files.
     bpy.context.preferences.extensions.repos.new(name=REPOSITORY, module=REPOSITORY, remote_url=url)
     bpy.ops.extensions.repo_sync(repo_index=index_of(bpy))
