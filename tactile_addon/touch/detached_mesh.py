@@ -3,11 +3,14 @@
 """A mesh that can be touched many times, whatever happens to the scene, and can tell what has happened."""
 
 import zlib
+from time import perf_counter
 
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object
+
+PAUSE = 50.0  # The shape is compared again after so many times as long as that takes.
 
 
 class DetachedMesh(PlacedMesh):
@@ -31,6 +34,7 @@ class DetachedMesh(PlacedMesh):
         # It keeps no reference to the object, which somebody may delete.
         self.name, self._uid = obj.name, obj.session_uid
         self._checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
+        self._compared_until = 0.0
         farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
         self.spacing = farthest * np.finfo(np.float32).eps
         normals = np.empty_like(co)
@@ -55,7 +59,10 @@ class DetachedMesh(PlacedMesh):
         super().__init__(linear, np.zeros(3), lambda *ray: rays(*ray)[:2])
 
     def require_source(self, context):
-        """The object it was made from. Raises ValueError, with a sentence, if that is gone or was moved."""
+        """The object it was made from. Raises ValueError, with a sentence, if that is gone or was moved.
+
+        Now and then it also does what `require_same` does, so that long work does not go on in vain.
+        """
         found = next((o for o in context.view_layer.objects if o.session_uid == self._uid), None)
         if found is None:
             raise ValueError(f'"{self.name}" is gone, so touching was stopped')
@@ -63,15 +70,18 @@ class DetachedMesh(PlacedMesh):
             raise ValueError("Touching was stopped because Object Mode was left: start it again")
         if found.matrix_world != self.matrix:
             raise ValueError(f'"{self.name}" was moved while it was touched: start again')
+        begin = perf_counter()
+        if begin >= self._compared_until:
+            evaluated, _, _ = evaluated_object(found, context.evaluated_depsgraph_get())
+            if zlib.crc32(coordinates(found.name, evaluated)) != self._checksum:
+                raise ValueError(f'"{self.name}" was changed while it was touched: start again')
+            self._compared_until = perf_counter() + PAUSE * (perf_counter() - begin)
         return found
 
     def require_same(self, context):
         """The object that `require_source` finds. Raises ValueError if that has another shape now."""
-        found = self.require_source(context)
-        evaluated, _, _ = evaluated_object(found, context.evaluated_depsgraph_get())
-        if zlib.crc32(coordinates(found.name, evaluated)) != self._checksum:
-            raise ValueError(f'"{self.name}" was changed while it was touched: start again')
-        return found
+        self._compared_until = 0.0
+        return self.require_source(context)
 
     @property
     def origin(self):

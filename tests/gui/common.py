@@ -221,7 +221,7 @@ def disturbed(what, start, is_clean, made, **inputs):
         disturb()
         yield 1
         picture(f"{what}_{disturb.__name__}")
-        yield from until(is_clean, 60)  # a change of the mesh is noticed only in the end
+        yield from until(is_clean, 60)
         check(f"{name}: it stops", is_clean())
         if words:
             check(f"{name}: ... with a sentence", words in last_report(), last_report())

@@ -95,7 +95,7 @@ def by_button():
     check("the button and Return start a map", running())
     yield 1.2
     picture("map_progress")
-    yield from until(lambda: not running())
+    yield from until(lambda: not running(), 120)
     (painted,) = maps() or [None]
     if not check("it ends by itself with a painted copy", painted is not None, data_blocks()):
         return
@@ -182,7 +182,7 @@ def scan():
     obj = bpy.data.objects[name]
     center = obj.matrix_world @ (sum((Vector(corner) for corner in obj.bound_box), Vector()) / 8)
     yield from start(target=name)
-    yield from until(lambda: not running())
+    yield from until(lambda: not running(), 120)
     check("a scan has its map", bool(maps()), data_blocks())
     bpy.data.objects[name].hide_set(True)
     look(center, (0.4, -1, 0.25), 2.0 * max(obj.dimensions))

@@ -58,13 +58,31 @@ def test_a_target_that_does_not_stay_is_told_at_once(empty, ball, taken, disturb
 
 
 @pytest.mark.parametrize("how", ["vertex", "modifier"])
-def test_another_shape_is_told_in_the_end(empty, ball, taken, how):
+def test_another_shape_is_told_soon_and_for_sure_in_the_end(empty, ball, taken, how):
     if how == "vertex":
         ball.data.vertices[0].co.x += 1e-3
         ball.data.update()
     else:
         ball.modifiers.new("Subdivision", "SUBSURF")
     empty.context.view_layer.update()
-    assert taken.require_source(empty.context) == ball
-    with pytest.raises(ValueError, match='"Sphere" was changed while it was touched: start again'):
-        taken.require_same(empty.context)
+    for require in (taken.require_source, taken.require_same):
+        with pytest.raises(ValueError, match='"Sphere" was changed while it was touched: start again'):
+            require(empty.context)
+
+
+def test_the_shape_is_compared_for_a_fiftieth_of_the_time(empty, ball, taken, extension, monkeypatch):
+    module, now, compared = extension.tactile_addon.touch.detached_mesh, [0.0], []
+    inner = module.coordinates
+
+    def coordinates(*arguments):
+        compared.append(now[0])
+        now[0] += 1.0
+        return inner(*arguments)
+
+    monkeypatch.setattr(module, "coordinates", coordinates)
+    monkeypatch.setattr(module, "perf_counter", lambda: now[0])
+    while now[0] < 102.0:
+        assert taken.require_source(empty.context) == ball
+        now[0] += 0.25
+    taken.require_same(empty.context)
+    assert compared == [0.0, 51.0, 102.0]
