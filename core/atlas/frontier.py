@@ -44,7 +44,7 @@ class Place:
     """A place on a rim, its normal and the way away from its patch, (3,) each, and the radius of the patch.
 
     tried : where touches that went on from it were, (3,) each
-    felt : by the share of REACHES, what no patch covers on the disk there; nothing if its middle is covered
+    felt : what no patch covers on the disk at a share of REACHES, (k, 2, 3); none once its middle is covered
     """
 
     point: Vector
@@ -52,7 +52,7 @@ class Place:
     ahead: Vector
     radius: float
     tried: tuple[Vector, ...] = ()
-    felt: dict[float, list[Contact]] = field(default_factory=dict)
+    felt: dict[float, Array] = field(default_factory=dict)
 
 
 class Next(NamedTuple):
@@ -168,11 +168,10 @@ class Frontier:
         """Notes what is uncovered on the disk of each place; what patches cover stays covered."""
         assert self.charts is not None
         disks = [place.felt[share] if share in place.felt else self.disk(place, share) for place in places]
-        flat = np.array([contact for hits in disks for contact in hits]).reshape(-1, 2, 3)
-        ends = np.cumsum([len(hits) for hits in disks])
+        flat, ends = np.concatenate(disks), np.cumsum([len(hits) for hits in disks])
         free = np.split(~covered(self.charts, flat[:, 0], flat[:, 1]), ends[:-1])
         for place, hits, new in zip(places, disks, free, strict=True):
-            place.felt[share] = [hits[i] for i in np.flatnonzero(new)] if new[:1].any() else []
+            place.felt[share] = hits[new & new[:1]]
 
     def _touch(self, place: Place, share: float) -> Next | None:
         """The touch in the middle of what is uncovered on a disk that was felt, if it brings enough."""
@@ -181,8 +180,8 @@ class Frontier:
         area = len(hits) / (DISK_PLACES + 1) * disk
         if area <= max(SLIVER * disk, self.least):
             return None
-        point, outward = hits[_between(np.array([point for point, _ in hits]), place.tried)]
-        return Next(np.array(point), np.array(outward), area, place)
+        point, outward = hits[_between(hits[:, 0], place.tried)]
+        return Next(point, outward, area, place)
 
     def felt(self, hit: Hit | None, way: Vector) -> Contact | None:
         """The contact where a ray in this direction has hit, or None if it came from inside the object."""
@@ -210,14 +209,14 @@ class Frontier:
             at = along(at, way, length)
         return None
 
-    def disk(self, place: Place, share: float) -> list[Contact]:
-        """The contact at a share of the radius ahead of a place, followed by those on a disk around it.
+    def disk(self, place: Place, share: float) -> Array:
+        """The contact at a share of the radius ahead of a place, and those on a disk around it, (k, 2, 3).
 
-        Rays onto the disk measure how much surface there is. Without a contact ahead the list is empty.
+        Rays onto the disk measure how much surface there is. Without a contact ahead there are none.
         """
         contact = self.ahead(place, share * place.radius)
         if contact is None:
-            return []
+            return np.zeros((0, 2, 3))
         point, normal = contact
         radius, down = min(1.0, DISK_REACHES * share) * place.radius, scaled(normal, -1.0)
         above = self.surface.ray_cast(along(point, normal, HAIR * radius), normal, ABOVE * radius)
@@ -227,7 +226,7 @@ class Frontier:
             felt = self.felt(self.surface.ray_cast(start, down, height + ABOVE * radius), down)
             if felt is not None and dot(felt[1], normal) > FACING:
                 hits.append(felt)
-        return hits
+        return np.array(hits)
 
 
 def still_open(places: Sequence[Place], charts: Charts | None) -> list[Place]:
