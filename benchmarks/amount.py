@@ -128,7 +128,7 @@ def _at(surface, extent):
     domain = closed_spline_domain((ends @ place.axes)[:, :2], extent)
     points, _ = domain.grid(accuracy.HOLD_OUT)
     hold_out = accuracy.above(surface, place.axes, place.kappas, points)
-    return None if hold_out is None else (place, hold_out)
+    return None if np.isnan(hold_out).any() else (place, hold_out)
 
 
 def spread(contour, steps):

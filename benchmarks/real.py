@@ -49,7 +49,7 @@ HOLD_OUT, LEAST = 90, 20
 LAYERS = 4
 # Newton's method toward a surface: the number of steps, the longest step in radii, and the least slope.
 NEWTON_STEPS, FARTHEST, LEAST_CHANGE = 8, 0.3, 0.2
-WIDE, OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 0.02, 3.0, 5.0, 10.0, 0.05
+OFF, TOO_FAR, SILENT, TURNED, ALIKE = 0.02, 3.0, 5.0, 10.0, 0.05
 DENSE = 150  # The number of points of the mesh to which the true frame is fitted.
 
 

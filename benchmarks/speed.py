@@ -133,7 +133,7 @@ def many(cases):
     contours = [c.contours for c in copies]
     runs = []
     for _ in range(RUNS):
-        seconds, stacked = timed(lambda: reconstruct_many(points, contours, outward=outward))
+        seconds, stacked = timed(lambda: reconstruct_many(points, contours, outward=outward, degree=4))
         alone, single = timed(lambda: [fit(case) for case in copies])
         runs.append((len(copies) / seconds, len(copies) / alone))
     off = max(_departure(a, b) for a, b in zip(stacked, single, strict=True))
