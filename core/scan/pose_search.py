@@ -30,6 +30,7 @@ POLYNOMIAL_RIDGE = 1e-3  # It keeps a polynomial with few points flat.
 COARSE_CONTACTS = 60  # The coarse search takes at most so many contacts.
 COARSE_PLACES, COARSE_STEPS = 400, 8  # So many places move, in so many steps, to planes of nearest triangles.
 FINE, FINE_STEPS = 24, 20  # So many of them then move to the triangles themselves.
+SETTLED_GAIN = 1e-5  # A place has settled when a step lowers the sum of squares by a smaller share.
 NEAREST_TRIANGLES = 16  # Distances to so many triangles are measured.
 SAME_PLACE, SAME_TURN = 0.05, math.radians(2.0)  # Poses that differ by less count as one.
 AMBIGUOUS = 1.5  # A residual that is larger by less than this factor is about as good.
@@ -157,20 +158,26 @@ def _descended(
     noise alone may shift them to another."""
     from scipy.spatial.transform import Rotation
 
-    distances, slopes = mesh_distances(places, felt, mesh, neighbors)
-    damping = np.full((len(places), 1, 1), 1e-3)
+    places, (distances, slopes) = places.copy(), mesh_distances(places, felt, mesh, neighbors)
+    damping, going = np.full((len(places), 1, 1), 1e-3), np.arange(len(places))
     for _ in range(steps):
-        square = slopes.swapaxes(1, 2) @ slopes
-        shift = damping * np.trace(square, axis1=1, axis2=2)[:, None, None] + 1e-12
-        step = -np.linalg.solve(square + shift * np.eye(6), slopes.swapaxes(1, 2) @ distances)[..., 0]
-        moved = places.copy()
-        moved[..., :3] = Rotation.from_rotvec(step[:, :3]).as_matrix() @ places[..., :3]
+        some, off = slopes[going], distances[going]
+        square = some.swapaxes(1, 2) @ some
+        shift = damping[going] * np.trace(square, axis1=1, axis2=2)[:, None, None] + 1e-12
+        step = -np.linalg.solve(square + shift * np.eye(6), some.swapaxes(1, 2) @ off)[..., 0]
+        moved = places[going]
+        moved[..., :3] = Rotation.from_rotvec(step[:, :3]).as_matrix() @ moved[..., :3]
         moved[..., 3] += step[:, 3:]
-        found = mesh_distances(moved, felt, mesh, neighbors)
-        better = np.sum(found[0] ** 2 - distances**2, axis=1, keepdims=True) < 0.0
-        places, distances = np.where(better, moved, places), np.where(better, found[0], distances)
-        slopes = np.where(better, found[1], slopes)
-        damping *= np.where(better, 0.2, 5.0)
+        found, slope = mesh_distances(moved, felt, mesh, neighbors)
+        before = np.sum(off**2, axis=(1, 2))
+        gain = before - np.sum(found**2, axis=(1, 2))
+        better = gain > 0.0
+        which = going[better]
+        places[which], distances[which], slopes[which] = moved[better], found[better], slope[better]
+        damping[going] *= np.where(better, 0.2, 5.0)[:, None, None]
+        going = going[~better | (gain > SETTLED_GAIN * before)]
+        if not len(going):
+            break
     slopes = slopes * np.repeat([SAME_TURN, SAME_PLACE], 3)
     growth = np.linalg.eigvalsh(slopes.swapaxes(1, 2) @ slopes)[:, 0]
     residuals = np.sqrt(np.mean(distances[..., 0] ** 2, axis=1))
