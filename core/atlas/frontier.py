@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
@@ -98,8 +99,8 @@ class Frontier:
 
     def tried(self, touch: Next) -> None:
         """Queues the place of a touch again after the touch was made: something may be left beyond it."""
-        place, at = touch.place, vector_of(touch.point)
-        self.push(replace(place, tried=(*place.tried, at)), touch.gain)
+        tried = *touch.place.tried, vector_of(touch.point)
+        self.push(replace(touch.place, tried=tried), touch.gain)
 
     def taking(self, count: int) -> Generator[None, None, list[Next]]:
         """At most `count` touches, far apart, that bring most. Yields each time before it looks at places."""
@@ -108,8 +109,7 @@ class Frontier:
         aside: list[tuple[float, int, Place]] = []
         known: dict[Place, Next | None] = {}
         while self.queue and len(found) < count:
-            entry = heapq.heappop(self.queue)
-            place = entry[2]
+            _, _, place = entry = heapq.heappop(self.queue)
             if any(_is_near(place, other) for other in found):
                 aside.append(entry)
                 continue
@@ -118,25 +118,22 @@ class Frontier:
                 continue
             if place not in known:
                 yield
-                some = [place, *(next_[2] for next_ in heapq.nsmallest(LOOK, self.queue))]
-                some = [place for place in some if place not in known]
+                others = (other for _, _, other in heapq.nsmallest(LOOK, self.queue) if other not in known)
+                some = [place, *others]
                 known.update(zip(some, self.beyond(some), strict=True))
             touch = known[place]
-            if touch is None:
-                continue
-            if self.queue and touch.gain < -self.queue[0][0]:
+            if touch is not None and self.queue and touch.gain < -self.queue[0][0]:
                 self.push(place, touch.gain)
-            else:
+            elif touch is not None:
                 found.append(touch)
         for entry in aside:
             heapq.heappush(self.queue, entry)
         return found
 
     def uncovered(self, charts: Charts) -> Generator[None, None, list[Place]]:
-        """Places where a touch would still bring something once patches are joined.
+        """Places where a touch would still bring something. Yields before those where some were in vain.
 
-        Patches alone may be off at their rims by so much that others seem not to cover them. Yields before
-        each place from which touches went on in vain.
+        Patches that are not joined may be so far off at their rims that others seem not to cover these.
         """
         self.charts = charts
         found = still_open([place for _, _, place in sorted(self.queue)], charts)
@@ -157,26 +154,33 @@ class Frontier:
         found: list[Next | None] = [None] * len(places)
         for share in REACHES:
             left = [i for i, touch in enumerate(found) if touch is None]
-            if not left:
-                break
-            self._feel([places[i] for i in left], share)
+            if left:
+                self._feel([places[i] for i in left], share)
             for i in left:
                 found[i] = self._touch(places[i], share)
         return found
 
     def _feel(self, places: Sequence[Place], share: float) -> None:
         """Notes what is uncovered on the disk of each place; what patches cover stays covered."""
+        unfelt, none = [place for place in places if share not in place.felt], np.zeros((0, 2, 3))
+        ahead = [self.ahead(place, share * place.radius) for place in unfelt]
+        met = [contact for contact in ahead if contact is not None]
+        new = dict(zip(met, self._uncovered(np.array(met).reshape(-1, 2, 3)), strict=True))
+        for place, contact in zip(unfelt, ahead, strict=True):
+            place.felt[share] = self.disk(place, share, contact) if contact and new[contact] else none
+        disks = [place.felt[share] for place in places]
+        free = np.split(self._uncovered(np.concatenate(disks)), np.cumsum([len(disk) for disk in disks])[:-1])
+        for place, disk, which in zip(places, disks, free, strict=True):
+            place.felt[share] = disk[which & which[:1]]
+
+    def _uncovered(self, contacts: Array) -> NDArray[np.bool_]:
+        """Which of the contacts (k, 2, 3) no patch covers."""
         assert self.charts is not None
-        disks = [place.felt[share] if share in place.felt else self.disk(place, share) for place in places]
-        flat, ends = np.concatenate(disks), np.cumsum([len(hits) for hits in disks])
-        free = np.split(~covered(self.charts, flat[:, 0], flat[:, 1]), ends[:-1])
-        for place, hits, new in zip(places, disks, free, strict=True):
-            place.felt[share] = hits[new & new[:1]]
+        return ~covered(self.charts, contacts[:, 0], contacts[:, 1])
 
     def _touch(self, place: Place, share: float) -> Next | None:
         """The touch in the middle of what is uncovered on a disk that was felt, if it brings enough."""
-        hits = place.felt[share]
-        disk = math.pi * (min(1.0, DISK_REACHES * share) * place.radius) ** 2
+        hits, disk = place.felt[share], math.pi * (min(1.0, DISK_REACHES * share) * place.radius) ** 2
         area = len(hits) / (DISK_PLACES + 1) * disk
         if area <= max(SLIVER * disk, self.least):
             return None
@@ -209,14 +213,11 @@ class Frontier:
             at = along(at, way, length)
         return None
 
-    def disk(self, place: Place, share: float) -> Array:
+    def disk(self, place: Place, share: float, contact: Contact) -> Array:
         """The contact at a share of the radius ahead of a place, and those on a disk around it, (k, 2, 3).
 
-        Rays onto the disk measure how much surface there is. Without a contact ahead there are none.
+        Rays onto the disk measure how much surface there is.
         """
-        contact = self.ahead(place, share * place.radius)
-        if contact is None:
-            return np.zeros((0, 2, 3))
         point, normal = contact
         radius, down = min(1.0, DISK_REACHES * share) * place.radius, scaled(normal, -1.0)
         above = self.surface.ray_cast(along(point, normal, HAIR * radius), normal, ABOVE * radius)
