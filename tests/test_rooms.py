@@ -77,10 +77,12 @@ def test_no_import_goes_in_a_circle(package):
     TopologicalSorter(graph).prepare()  # raises CycleError, with the circle
 
 
-def test_core_knows_no_blender_and_the_add_on_imports_it_only_as_a_whole():
+def test_core_knows_no_blender_and_the_add_on_none_of_its_rooms():
     for name, path in modules("core"):
         assert all(imported.startswith("core") for imported in imports(name, path)), name
         assert "bpy" not in path.read_text(encoding="utf-8").replace("without bpy", ""), name
+    for name, path in modules("tactile_addon"):
+        assert {found for found in imports(name, path) if "core" in found} <= {"core", "core.arguments"}, name
 
 
 def test_what_is_shipped_knows_no_cluster():

@@ -75,7 +75,7 @@ def steps():
     extents = [reach for reach, *_ in found]
     check("while the point is dragged the extent follows", max(extents) > 1.1 * min(extents), extents)
     check("... and no patch is in doubt", {status for _, status, _ in found} == {"ok"}, found)
-    check("... what is dear waits", not any(complete for *_, complete in found), found)
+    check("... what takes long waits for its end", not any(complete for *_, complete in found), found)
     size = probe().empty_display_size / extent(probe())
     check("... and the handles are as large as the patch", abs(size - 0.6) < 1e-3, size)
     gui.xdo("mouseup", 1)

@@ -106,9 +106,7 @@ def test_whatever_a_waiting_probe_has_not_felt_makes_its_patch_outdated(empty, b
     assert said(probe)[0] == before[0] == "ok"
 
 
-def test_where_a_touch_is_dear_the_patch_says_so_and_is_touched_when_playback_stops(
-    empty, extension, probe, monkeypatch
-):
+def test_without_a_window_every_frame_has_time_for_a_touch(empty, extension, probe, monkeypatch):
     live = extension.tactile_addon.probes.change_handlers
     monkeypatch.setattr(live, "_look_at", counting := Counting(live._look_at))
     empty.context.scene.frame_set(2)
