@@ -28,6 +28,7 @@ LAYER, SLANT = 0.15, 0.5
 INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
 WALLS = 3  # At most so many walls are told apart at a place.
 WELL_INSIDE = 0.8  # What is within this share of a domain's radius is surely on the patch.
+FOOT_STEPS = 6  # The nearest point of the surface is found in so many steps.
 NEIGHBORS = 8  # Where no patch reaches, so many contacts tell of the surface.
 
 
@@ -89,6 +90,26 @@ def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
     known = np.bincount(pairs.place[sure], minlength=len(points)) > 0
     found = blend_of(charts, pairs.chosen((pairs.share < MARGIN) | ~known[pairs.place]), points)
     return found._replace(std=np.where(known, found.std, np.inf))
+
+
+def nearest_feet(charts: Charts, points: Array, feet: Array) -> tuple[Array, Blend]:
+    """The feet (k, 3) of places (k, 3) on the surface, found from places near them, and the field there."""
+    field, share, feet = blended(charts, feet), np.ones((len(points), 1)), feet.copy()
+    for _ in range(FOOT_STEPS):
+        off = points - feet
+        across = off - np.einsum("ki,ki->k", off, field.normal)[:, None] * field.normal
+        length = np.maximum(np.linalg.norm(across, axis=1), 1e-300)
+        room = LAYER * charts.radii[field.node] / length
+        tried = feet + np.minimum(share, room[:, None]) * across
+        for _ in range(2):  # The first one may be beside the surface.
+            there = blended(charts, tried)
+            tried = tried - there.distance[:, None] * there.normal
+        nearer = np.isfinite(there.std)
+        nearer &= ((points - tried) ** 2).sum(axis=1) < (off**2).sum(axis=1)
+        for old, new in zip((feet, *field), (tried, *there), strict=True):
+            old[nearer] = new[nearer]
+        share[~nearer] *= 0.5
+    return feet, field
 
 
 def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:

@@ -14,13 +14,16 @@ from ..arguments import LARGEST, Array, finite_array, number
 from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
-from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
+from .boundaries import Edge, blended_curvatures, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
-from .field import AGREE, FACING, INSIDE, LAYER, Felt, blended, node_weights
+from .field import FACING, INSIDE, Felt, blended, nearest_feet
 from .frontier import Place
 from .join import felt_by, told
-from .meshing import LEAST_DIVISOR, Mesh, meshed
+from .meshing import Mesh, meshed
 
+AGREEING = 0.5  # A guess of a distance tells the side of the surface if it is more than this share of it.
+CLOSE = 0.02  # Farther than this share of a radius from a patch the distance is that of the nearest foot.
+OFF_SURFACE = 3.0  # A place of a patch that is off the field by more deviations is none of the surface.
 GRAPH_VERSION = 1  # The version of the graph as plain values.
 SAMPLE_TURNS, SAMPLES_OUTWARD = 16, 6  # From far away distances are those of so many samples of each patch.
 
@@ -34,11 +37,11 @@ class NextTouch(NamedTuple):
 
 
 class _Samples(NamedTuple):
-    """Points and normals (n, 3) of the surface, deviations (n,), inf at an open rim, and a KD-tree."""
+    """Points (n, 3) of the surface, deviations (n,), inf at an open rim, how far apart, and a KD-tree."""
 
     points: Array
-    normals: Array
     stds: Array
+    apart: Array
     tree: Any
 
 
@@ -124,22 +127,30 @@ class Atlas:
     def distance(self, points: ArrayLike) -> tuple[Array, Array]:
         """Signed distances (n,) of points (n, 3), negative inside, and their standard deviations (n,).
 
-        Beyond the reach of the patches it is the distance of the nearest place that was felt. If that is on
-        an open rim, something unfelt might be nearer, and the deviation is inf.
+        Far from the surface it is the distance of the nearest place on it. If that is on an open rim,
+        something unfelt might be nearer, and the deviation is inf.
         """
         p = finite_array("points", points, (None, 3), LARGEST)
         field = told(self.charts, self._felt, p)
-        distance, std, far = field.distance.copy(), field.std.copy(), np.flatnonzero(~np.isfinite(field.std))
+        distance, std, near = field.distance.copy(), field.std.copy(), np.isfinite(field.std)
+        far = np.flatnonzero(~near | (np.abs(distance) > CLOSE * self.charts.radii[field.node]))
         if len(far):
-            distance[far], std[far] = self._far(p[far])
+            distance[far], std[far] = self._far(p[far], distance[far])
         return distance, std
 
-    def _far(self, points: Array) -> tuple[Array, Array]:
-        """Distances and deviations (n,) from the nearest sample, positive on the side that it faces."""
+    def _far(self, points: Array, guess: Array) -> tuple[Array, Array]:
+        """Distances and deviations (n,) from the nearest feet, given a guess of the distances (n,)."""
         samples = self._samples
-        away, nearest = samples.tree.query(points)
-        ahead = np.einsum("ni,ni->n", points - samples.points[nearest], samples.normals[nearest])
-        return np.copysign(away, ahead), samples.stds[nearest]
+        nearest = samples.tree.query(points)[1]
+        feet, field = nearest_feet(self.charts, points, samples.points[nearest])
+        off, apart = points - feet, samples.apart[nearest]
+        away, ahead = np.linalg.norm(off, axis=1), np.einsum("ni,ni->n", off, field.normal)
+        # If the way to the foot is not along its normal, the foot is at an edge, or another is nearer.
+        missed = np.minimum(away - np.abs(ahead), apart**2 / np.maximum(2.0 * away, 1e-300))
+        std = np.where(np.isfinite(samples.stds[nearest]), np.hypot(field.std, missed), np.inf)
+        # At an edge the normal of one wall does not tell the side.
+        side = np.where(np.abs(guess) > AGREEING * away, guess, ahead)
+        return np.copysign(away, side), std
 
     @cached_property
     def _felt(self) -> Felt:
@@ -160,9 +171,11 @@ class Atlas:
         other = (pairs.share < INSIDE) & (pairs.node != node[pairs.place])
         other &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
         inside = np.bincount(pairs.place[other], minlength=len(points)) > 0
-        stds = blended(charts, points).std
-        stds[(out == 1.0) & ~inside] = np.inf
-        return _Samples(points, normals, stds, cKDTree(points))
+        field, apart = blended(charts, points), np.pi / SAMPLE_TURNS * charts.radii[node]
+        field.std[(out == 1.0) & ~inside] = np.inf
+        # At a rim, or beyond an edge, a patch may be off the surface of all.
+        on = np.abs(field.distance) <= OFF_SURFACE * field.std
+        return _Samples(points[on], field.std[on], apart[on], cKDTree(points[on]))
 
     def mesh(self, edge: float) -> Mesh:
         """The surface as triangles whose edges are about as long as asked.
@@ -195,7 +208,7 @@ class Atlas:
         blended surface; the others follow from these. Where there is no patch, all are 0. Joined patches are
         not asked, because they follow facets, which makes their second derivatives rougher.
         """
-        gauss, mean = _blended_curvatures(self, points, normals)
+        gauss, mean = blended_curvatures(self.patches, self.charts, points, normals)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # half the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,
@@ -206,7 +219,10 @@ class Atlas:
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """Makes the `mesh` in steps: yields the share that is done, and returns the mesh."""
-        return meshed(self.charts, self._felt, number("edge", edge, above=0.0))
+        edge, size = number("edge", edge, above=0.0), float(np.ptp(self._felt.points, axis=0).max())
+        if edge > size:
+            raise ValueError(f"edge: expected at most the size of what was felt, {size:.3g}, got {edge:.3g}")
+        return meshed(self.charts, self._felt, edge)
 
     def to_dict(self) -> dict[str, Any]:
         """The graph as JSON has it: a dict of numbers, words, lists and dicts, in the caller's unit.
@@ -226,23 +242,3 @@ class Atlas:
             "uncovered": [{"point": list(p.point), "outward": list(p.normal)} for p in self.uncovered],
             "next_touch": None if touch is None else plain(touch._asdict()),
         }
-
-
-def _blended_curvatures(atlas: Atlas, points: Array, normals: Array) -> tuple[Array, Array]:
-    """Means of K and of H, (n,) each, at points (n, 3), over the patches that face their normals (n, 3)."""
-    charts = atlas.charts
-    pairs = charts.pairs(points)
-    facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
-    weights = node_weights(charts, pairs) * np.clip((facing - FACING) / (AGREE - FACING), 0.0, 1.0)
-    radii = charts.radii[pairs.node]
-    weights *= np.abs(pairs.distance) < LAYER * radii
-    x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T * radii
-    curvatures, order = np.zeros((2, len(x))), np.argsort(pairs.node, kind="stable")
-    for at in np.split(order, np.flatnonzero(np.diff(pairs.node[order])) + 1):
-        if len(at):
-            d = atlas.patches[pairs.node[at[0]]].patch.derivatives(x[at], y[at])
-            curvatures[:, at] = d.gaussian_curvature, d.mean_curvature
-    count = len(points)
-    total = np.maximum(np.bincount(pairs.place, weights, count), LEAST_DIVISOR)
-    gauss, mean = (np.bincount(pairs.place, weights * each, count) / total for each in curvatures)
-    return gauss, mean

@@ -25,7 +25,8 @@ from ..reconstruction.strokes import gathered
 from .enough import CONTACT_COUNTS, spacing
 from .growth import FELT, GROWN_STD, SEEDS, STRETCH, Felt, Grown
 from .one_touch import Exploration
-from .side_by_side import given
+from .side_by_side import given, planes_of
+from .touches import explore
 
 # benchmarks.nearby judges these.
 LONGER = 1.08  # A half curve becomes longer by this factor at once, and shorter by at least it.
@@ -64,11 +65,13 @@ def explore_nearby(
     step : as in `track`; "auto" takes few contacts, and adds none even if they would tell more
 
     All else is as in `explore`, which also knows what is beyond, and taps between the curves. So the patches
-    of the two differ. Raises what `track` and `reconstruct` raise.
+    of the two differ, except where curves of these lengths cannot be fitted: there `explore` begins anew.
+    Raises what `track` and `reconstruct` raise.
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     options, far = options_of(method, degree, None, weight, solver), number("farthest", farthest, above=0.0)
     least = SEEDS[-1] * far / FELT
+    planes = planes_of(planes)
     lengths = np.clip(finite_array("reaches", reaches, (len(planes), 2)), least, far)
     # With noise, few contacts would not be enough for curves of this length.
     between = given("step", step) or spacing(lengths, CONTACT_COUNTS[1 if noise else 0])
@@ -88,7 +91,26 @@ def explore_nearby(
         spread = r.mean_height_std / (GROWN_STD * r.radius)
         return Grown(felt, counts, 1, felt.misfits(counts, r), spread, r)
 
-    first = grown = tried(lengths)
+    try:
+        first = grown = tried(lengths)
+    except DegenerateCurvesError:
+        # Beside a crease some half curves have too few contacts at this length; a shorter one has more.
+        anew = explore(
+            surface,
+            p,
+            up,
+            planes,
+            farthest=far,
+            step=step,
+            noise=noise,
+            rng=rng,
+            tangent=tangent,
+            method=method,
+            degree=degree,
+            weight=weight,
+            solver=solver,
+        )
+        return Nearby(anew, reaches_of(anew))
     for _ in range(MOST_FITS - 1 if first.doubt > 1.0 else 1):
         shorter = between * _shorter(grown)
         if grown.sure or shorter.max() < least:

@@ -97,7 +97,10 @@ def result_of(steps: Generator[Any, Any, Any]) -> Any:
 def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
     """So many evenly spread planes, or the planes that are given."""
     if not isinstance(planes, int | np.integer):
-        return tuple(list_of("planes", planes, SamplingPlane))
+        found = tuple(list_of("planes", planes, SamplingPlane))
+        if not found:
+            raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got none")
+        return found
     if not 3 <= planes <= MOST_EVEN:
         raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got {planes}")
     return tuple(SamplingPlane(math.pi * i / planes) for i in range(planes))
@@ -124,6 +127,8 @@ def _farthest(feel: Callable[..., list[Contour]]) -> float:
     least, most = (1.0, 2.0) if not ended(1.0) else (0.5, 1.0)
     while ended(least):
         least, most = 0.5 * least, least
+        if least < 1.0 / LONGEST:
+            raise ValueError("All curves end at once, however short they are: take another point")
     while not ended(most):
         least, most = most, 2.0 * most
         if most > LONGEST:

@@ -48,6 +48,11 @@ def test_a_ball_is_closed_and_as_near_as_asked(ball):
     assert len(ball.patches) < 30
 
 
+def test_edges_longer_than_the_object_are_refused(ball):
+    with pytest.raises(ValueError, match="edge: expected at most the size of what was felt, 2, got 1e"):
+        ball.mesh(1e30)
+
+
 def test_triangles_face_outward_and_are_as_large_as_asked(ball):
     mesh = ball.mesh(0.08)
     a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
@@ -66,6 +71,24 @@ def test_distances_are_signed_and_their_deviations_true(ball):
     near = np.abs(radii - 1.0) < 0.02
     assert np.abs(distance - (radii - 1.0))[near].max() < 6e-3
     assert (np.sign(distance) == np.sign(radii - 1.0))[np.abs(radii - 1.0) > 6e-3].all()
+
+
+@pytest.mark.parametrize(
+    ("name", "solid", "known"),
+    [("ball", solids.ball(), 0.99), ("ring", RING, 0.99), ("block", solids.block(), 0.4)],
+    ids=["ball", "ring", "block"],
+)
+def test_far_from_the_surface_distances_are_those_of_the_nearest_place(name, solid, known, request):
+    """Near the block's edges patches end, and the normal of one wall does not tell the side."""
+    atlas = request.getfixturevalue(name)
+    p = np.random.default_rng(5).uniform(-2.0, 2.0, (1500, 3))
+    (distance, std), true = atlas.distance(p), solid.distances(p)
+    finite = np.isfinite(std)
+    off = np.abs(distance - true)[finite]
+    assert finite.mean() > known
+    assert (np.sign(distance) == np.sign(true))[finite & (np.abs(true) > 0.03)].all()
+    assert off.mean() < 5e-3
+    assert np.mean(off <= 5.0 * std[finite] + 1e-3) > 0.98
 
 
 def test_edges_join_neighbors_along_curves_on_the_surface(ball):

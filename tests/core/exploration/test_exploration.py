@@ -441,10 +441,24 @@ def test_planes_may_be_a_number_of_evenly_laid_out_ones(count):
     assert counted.result.patch.k1 == given.result.patch.k1
 
 
-@pytest.mark.parametrize("planes", [2, 25, 0])
+@pytest.mark.parametrize("planes", [2, 25, 0, []])
 def test_too_few_or_too_many_planes_are_refused(planes):
     with pytest.raises(ValueError, match="planes: expected 3 to 24, or sampling planes, got"):
         explore(surfaces.plane(), planes=planes)
+
+
+@pytest.mark.parametrize("rays", [3, 40])
+def test_a_surface_that_stops_answering_is_told_in_a_sentence(rays):
+    class Tiring:
+        left = rays
+
+        def ray_cast(self, *ray):
+            self.left -= 1
+            return surfaces.sphere(20.0).ray_cast(*ray) if self.left >= 0 else None
+
+    ball = surfaces.sphere(20.0)
+    with pytest.raises(ValueError, match="All curves end at once, however short they are"):
+        core.explore(Tiring(), ball.point, ball.normal)
 
 
 def test_six_planes_are_the_most_unless_more_are_wanted(monkeypatch):

@@ -189,3 +189,28 @@ def test_reaches_that_are_none_are_refused(reaches):
         core.explore_nearby(
             surfaces.plane(), np.zeros(3), (0.0, 0.0, 1.0), PLANES, reaches, farthest=FARTHEST
         )
+
+
+def test_where_curves_of_these_lengths_cannot_be_fitted_the_touch_begins_anew():
+    """Beside the apex of a cone all curves end at once, unless their steps are short."""
+    cone = surfaces.Exact(
+        lambda x, y, z: z + 1.5 * np.hypot(x, y),
+        lambda p: np.array([*1.5 * p[:2] / np.hypot(*p[:2]), 1.0]),
+        np.zeros(3),
+        0.0,
+        0.0,
+    )
+    ((point, normal),) = places(cone, [0.3])
+    anew = explore(cone, point, normal)
+    touch, reaches = core.explore_nearby(
+        cone, point, normal, PLANES, np.full((3, 2), FARTHEST), farthest=FARTHEST
+    )
+    assert touch.extent == pytest.approx(anew.extent)
+    assert reaches == pytest.approx(core.reaches_of(anew))
+
+
+@pytest.mark.parametrize("planes", [[], None, 2])
+def test_planes_that_are_none_are_refused(planes):
+    ball = surfaces.sphere(20.0)
+    with pytest.raises(ValueError, match="planes: expected "):
+        core.explore_nearby(ball, ball.point, ball.normal, planes, np.ones((3, 2)), farthest=FARTHEST)

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from core.patch.smoothing_spline import SIDE, bases, smoothing_spline
+from core.patch.smoothing_spline import SIDE, bases, between, smoothing_spline
 
 HALF = 1.3
 
@@ -100,3 +100,9 @@ def test_deviations_are_true_even_if_noise_is_said_to_be_less(given):
         off, stds = misses(spline, wavy, rng)
         scores.append(np.mean(np.abs(off) <= 1.645 * stds))
     assert 0.8 <= np.mean(scores) <= 0.99
+
+
+def test_between_every_other_knot_values_are_interpolated():
+    x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE), indexing="ij")
+    plane = 1.0 + 2.0 * x - 3.0 * y
+    assert between(plane[::2, ::2]) == pytest.approx(plane)
