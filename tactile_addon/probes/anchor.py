@@ -61,7 +61,7 @@ def is_carried(probe):
     """Whether the target has carried the probe away from its own coordinates, as during a gesture."""
     if not is_attached(probe) or probe.constraints or probe.animation_data:
         return False
-    own, there = np.array(probe.matrix_basis), np.array(probe.matrix_world)
+    own, there = (np.array(m, dtype=float) for m in (probe.matrix_basis, probe.matrix_world))
     return not np.abs(own - there).max() <= 2e-6 * np.abs(there).max()
 
 
@@ -143,7 +143,7 @@ def carry(probe, patch):
         motion = now @ np.linalg.inv(before)
     except np.linalg.LinAlgError:
         return
-    turn = np.array(Matrix(motion.tolist()).to_quaternion().to_matrix())
+    turn = np.array(Matrix(motion.tolist()).to_quaternion().to_matrix(), dtype=float)
     if not np.isfinite(motion).all():
         return
     origin = motion[:3, :3] @ frame[:3, 3] + motion[:3, 3]

@@ -30,7 +30,7 @@ def _put(probe, touched):
     location, (e1, n, across) = touched.result.frame.origin, np.transpose(touched.report["axes"])
     turn = Matrix(np.column_stack([e1, -across, n]).tolist())
     wanted = Matrix.LocRotScale(Vector(location), turn.to_quaternion(), None)
-    old, new = np.array(probe.matrix_world.normalized()), np.array(wanted)
+    old, new = (np.array(m, dtype=float) for m in (probe.matrix_world.normalized(), wanted))
     # If it were put there again and again, it would creep by rounding.
     near = 1e-5 * touched.report["extent"]
     is_there = np.allclose(old[:3, :3], new[:3, :3], atol=1e-4) and np.abs(old - new)[:3, 3].max() <= near
@@ -113,7 +113,7 @@ def touch_at(probe, depsgraph, complete, **more):
             f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
         )
     if anchor.is_attached(probe):  # If the target is scaled to 0, so is the probe.
-        require_invertible(settings.target.name, np.array(settings.target.matrix_world)[:3, :3])
+        require_invertible(settings.target.name, np.array(settings.target.matrix_world, dtype=float)[:3, :3])
     if not anchor.can_have_children(probe):
         raise ValueError("the probe has a scale of 0 or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)

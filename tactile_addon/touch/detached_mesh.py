@@ -86,7 +86,7 @@ class DetachedMesh(PlacedMesh):
     @property
     def origin(self):
         """The origin of the points, in the world."""
-        return np.array(self.matrix.translation)
+        return np.array(self.matrix.translation, dtype=float)
 
     def project(self, location):
         """The point of the mesh nearest to a place, the unit normal there, and the distance."""

@@ -61,7 +61,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         obj = shown_probe(context)
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
-        center = np.array(matrix.translation)
+        center = np.array(matrix.translation, dtype=float)
         self._shrink(context, matrix.translation, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)

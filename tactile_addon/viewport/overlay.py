@@ -78,7 +78,7 @@ def draw_plane():
         return
     number = min(settings.active_plane, settings.plane_count - 1)
     t, up, _ = plane_axes(obj.matrix_world, settings, number).T
-    origin, size = np.array(obj.matrix_world.translation), record["extent"]
+    origin, size = np.array(obj.matrix_world.translation, dtype=float), record["extent"]
     corners = [origin + size * (a * t + b * up) for a, b in ((-1, -0.6), (1, -0.6), (1, 0.6), (-1, 0.6))]
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
