@@ -243,7 +243,7 @@ def implicit_basis(points, normals, at, smoothing, offset=0.01):
 
 
 def implicit_process(points, normals, at, length, offset=0.01, most=700):
-    """The same, where f is a process with a Matérn covariance of order 3/2, on `most` of the contacts."""
+    """|f| at points, where f is a process with Matérn covariance 3/2, by `most` of the contacts."""
     some = np.linspace(0, len(points) - 1, min(most, len(points))).astype(int)
     points, normals = points[some], normals[some]
     where = np.vstack([points, points + offset * normals, points - offset * normals])

@@ -6,7 +6,7 @@ While a handle is dragged, each touch is near the one before. Its half curves ar
 become shorter at once if the fit is in doubt, and longer in the next touch if the doubt is small.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -79,20 +79,15 @@ def explore_nearby(
     follow = following(surface, p, up, planes, step=between, noise=noise, rng=rng, tangent=tangent)
     felt = Felt(follow(longest), p, between, None, partial=longest < far)
 
-    def fit(contours: list[Contour], by: Options) -> Reconstruction:
-        (r,) = fitted(p[None], [Given(contours, *gathered(()))], up[None], by)
-        if isinstance(r, DegenerateCurvesError):
-            raise r
-        return r
-
     def tried(lengths: Array) -> Grown:
+        """The touch whose half curves have these lengths. Raises DegenerateCurvesError."""
         counts = np.minimum(np.rint(lengths / between).astype(np.intp), felt.whole)
-        r = fit(felt.shortened(counts), options._replace(method="bayes"))
+        r = _fitted(p, up, felt.shortened(counts), options._replace(method="bayes"))
         spread = r.mean_height_std / (GROWN_STD * r.radius)
         return Grown(felt, counts, 1, felt.misfits(counts, r), spread, r)
 
     try:
-        first = grown = tried(lengths)
+        first = tried(lengths)
     except DegenerateCurvesError:
         # Beside a crease some half curves have too few contacts at this length; a shorter one has more.
         anew = explore(
@@ -111,21 +106,34 @@ def explore_nearby(
             solver=solver,
         )
         return Nearby(anew, reaches_of(anew))
+    grown = _shortened(first, tried, least)
+    contours, r = felt.shortened(grown.counts), grown.result
+    if method != "bayes":
+        r = _fitted(p, up, contours, options)
+    found = Exploration(contours, r, grown.length, between, tuple(planes), (r.mean_height_std,))
+    return Nearby(found, _next(grown, contours))
+
+
+def _fitted(point: Array, outward: Array, contours: list[Contour], options: Options) -> Reconstruction:
+    """The fit of contours. Raises DegenerateCurvesError."""
+    (r,) = fitted(point[None], [Given(contours, *gathered(()))], outward[None], options)
+    if isinstance(r, DegenerateCurvesError):
+        raise r
+    return r
+
+
+def _shortened(first: Grown, tried: Callable[[Array], Grown], least: float) -> Grown:
+    """A touch, or one with shorter half curves, at least `least` long, if length is what puts it in doubt."""
+    grown = first
     for _ in range(MOST_FITS - 1 if first.doubt > 1.0 else 1):
-        shorter = between * _shorter(grown)
+        shorter = first.felt.step * _shorter(grown)
         if grown.sure or shorter.max() < least:
             break
         try:
             grown = tried(shorter)
         except DegenerateCurvesError:
             break
-    if not grown.sure and first.doubt <= 1.0:  # it is not for their length
-        grown = first
-    contours, r = felt.shortened(grown.counts), grown.result
-    if method != "bayes":
-        r = fit(contours, options)
-    found = Exploration(contours, r, grown.length, between, tuple(planes), (r.mean_height_std,))
-    return Nearby(found, _next(grown, contours))
+    return first if not grown.sure and first.doubt <= 1.0 else grown
 
 
 def reaches_of(found: Exploration) -> Array:

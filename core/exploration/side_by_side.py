@@ -175,7 +175,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Op
 
 
 def _with_stds(results: list[Answer]) -> list[Answer]:
-    """The same results, whose mean_height_std is computed for many at once."""
+    """Results whose mean_height_std is computed for many at once."""
     if len(results) == 1:
         return results
     known = iter(with_height_stds([r for r in results if isinstance(r, Reconstruction)]))

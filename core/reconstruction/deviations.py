@@ -21,7 +21,7 @@ def mean_height_stds(results: Sequence[Reconstruction]) -> list[float]:
 
 
 def with_height_stds(results: Sequence[Reconstruction]) -> list[Reconstruction]:
-    """The same reconstructions, which now know their mean_height_std; status and message need it first."""
+    """Reconstructions that know their mean_height_std already; status and message need it first."""
     stds = mean_height_stds(results)
     # Those with a residual know it already, and more than the mean.
     pairs = zip(results, stds, strict=True)

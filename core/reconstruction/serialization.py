@@ -63,7 +63,7 @@ def polynomial_dict(patch: MongePatch) -> dict[str, Any]:
 
 
 def plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The same values, with arrays as lists."""
+    """Values by name, with arrays as lists."""
     return {
         key: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
         for key, value in values.items()

@@ -30,7 +30,7 @@ def shades(values, limit):
 
 
 def diverging(values, limit):
-    """The same colors as linear RGBA, as Blender stores them."""
+    """Colors of shades() as linear RGBA, as Blender stores them."""
     return linear(shades(values, limit))
 
 
