@@ -21,7 +21,7 @@ from .frontier import Place
 from .join import felt_by, told
 from .meshing import Mesh, meshed
 
-AGREEING = 0.5  # A guess of a distance tells the side of the surface if it is more than this share of it.
+AHEAD = 0.5  # The normal at a foot tells the side if the cosine of its angle to the way there is more.
 CLOSE = 0.02  # Farther than this share of a radius from a patch the distance is that of the nearest foot.
 OFF_SURFACE = 3.0  # A place of a patch that is off the field by more deviations is none of the surface.
 GRAPH_VERSION = 1  # The version of the graph as plain values.
@@ -149,7 +149,7 @@ class Atlas:
         missed = np.minimum(away - np.abs(ahead), apart**2 / np.maximum(2.0 * away, 1e-300))
         std = np.where(np.isfinite(samples.stds[nearest]), np.hypot(field.std, missed), np.inf)
         # At an edge the normal of one wall does not tell the side.
-        side = np.where(np.abs(guess) > AGREEING * away, guess, ahead)
+        side = np.where(np.abs(ahead) > AHEAD * away, ahead, guess)
         return np.copysign(away, side), std
 
     @cached_property
