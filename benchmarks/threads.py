@@ -84,7 +84,7 @@ if __name__ == "__main__" and __package__:
     main()
 elif __name__ == "__main__":
     sys.path[0] = str(Path(__file__).parents[1])
-    from core.patch import lapack
+    from core import lapack
 
     if sys.argv[1] == "both":
         lapack._threads = lambda: None

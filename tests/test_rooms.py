@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[1]
 ROOMS = {
     "core": (
         "arguments",
+        "lapack",
         "contours",
         "patch",
         "paper",

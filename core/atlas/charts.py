@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector, cross, vector_of
-from ..patch.smoothing_spline import SIDE, weights_at
+from ..patch.cubic_spline import SIDE, weights_at
 
 # python -m benchmarks.atlas judges these.
 MARGIN = 1.12  # A patch counts to this share of its domain's radius: beside a crease it ends a step early.

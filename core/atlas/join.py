@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Patches of one object as tables, and joined: each becomes a spline through the contacts of all patches.
 
-A patch alone knows only its own few curves, and the blend of such patches is farther off than a surface
-through all contacts. Where patches overlap, they are moved until they agree.
+A patch alone knows only its own few curves. Where patches overlap, they are moved until they agree.
 """
 
 from collections.abc import Generator, Sequence
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Contour
-from ..patch.smoothing_spline import SIDE, between, smoothing_spline
+from ..patch.cubic_spline import SIDE, between
+from ..patch.smoothing_spline import smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .field import FACING, LAYER, Blend, Felt, blended
@@ -225,9 +225,9 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
 
 
 def _square(r: Reconstruction) -> tuple[Array, float]:
-    """The domain's radii, and half the side of the square of knots, with a margin for the spline."""
+    """The domain's radii, and half the side of the square of knots, one of which is beyond the patch."""
     rim = _rim(r)
-    return rim, float(1.05 * MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 5)
+    return rim, float(MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 3)
 
 
 def _rim(r: Reconstruction) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..patch.lapack import inverse_definite, solved_definite
+from ..lapack import inverse_definite, solved_definite
 from ..patch.monge import TERMS, monomials
 from .evidence import (
     FREE_PRECISION,

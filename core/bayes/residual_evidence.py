@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..patch.lapack import cholesky, cholesky_in_place, solved, solved_definite
+from ..lapack import cholesky, cholesky_in_place, solved, solved_definite
 from ..patch.monge import TERMS, monomials
 from ..patch.residual import Residual, kernels, places_factor
 from .evidence import USUAL_WAVINESS, prior_variances

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
 from ..bayes.residual_evidence import MOST_PLACES
-from ..patch.lapack import cholesky, solved
+from ..lapack import cholesky, solved
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.amount chose these.

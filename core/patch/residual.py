@@ -23,8 +23,8 @@ from functools import cached_property
 import numpy as np
 
 from ..arguments import Array
+from ..lapack import cholesky, solved
 from .differential_geometry import Derivatives
-from .lapack import cholesky, solved
 from .monge import TERMS, derived_monomials, monomials
 
 LENGTHS = np.array([0.4, 1.6])  # The lengths l_i, as shares of the radius (benchmarks.real).

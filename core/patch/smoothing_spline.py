@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heights as a smoothing spline with the least third derivatives through contacts and across normals.
+"""Heights as a smoothing spline through contacts and across normals, as smooth as these show it to be.
 
 Beside the paper. It is a cubic B-spline on SIDE x SIDE knots. Its prior is that of a surface with random
-third derivatives (Wahba 1990, on knots as by Eilers and Marx 1996), so that quadrics are free. The size of
-these and the deviations of contacts and normals follow from the marginal likelihood; outliers weigh as under
-a Student t distribution. Equations are banded, however many contacts there are. All is in unit radius.
+derivatives of second or third order (Wahba 1990, on knots as by Eilers and Marx 1996): a weathered surface
+has the former, and a smooth one the latter, which leaves quadrics free. The order, the size of these
+derivatives, and the deviations of contacts and normals follow from the marginal likelihood; outlying contacts
+weigh as under a Student t distribution. Equations are banded, however many contacts there are. All is in unit
+radius.
 """
 
+from collections.abc import Iterable
 from functools import cache
 from math import comb
 from typing import Any, NamedTuple
@@ -15,20 +18,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from .lapack import on_one_thread
+from ..lapack import on_one_thread
+from .cubic_spline import CUBIC, SIDE, bases, between
+from .monge import exponents, monomials
 
 # python -m benchmarks.atlas chose these.
-SIDE = 21  # There are so many knots along each axis, evenly spaced over [-half, half].
-ROUGHNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # The grid of the size of third derivatives.
+# The orders of derivatives, each with the grid of their size.
+ROUGHNESS = {2: (0.01, 0.03, 0.1, 0.3, 1.0, 3.0), 3: (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)}
 NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # The grid of the noise, in units of the least noise.
 SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # The grid of the normals' deviation, which facets have.
-START = 3, 0, 2  # The search begins at these places of the three grids.
-SIZE_PASSES = 2  # So often sizes are found, each time with a solve for weights after it.
+SMOOTHEST, START, MIDDLE = 3, 3, 2  # The search begins at this order, and at these places of the grids.
+CURVATURE_STD = 1.0  # The prior deviation of curvatures, where the order of derivatives leaves them free.
 FAR_OFF, STUDENT = 3.0, 4.0  # Outliers are off by more deviations, and weigh as under t of this freedom.
 LEAST_COSINE = 0.2  # A normal tells nothing if the cosine of its angle to the axis is less.
-ORDER, CUBIC = 3, 3
 WIDTH = CUBIC * SIDE + CUBIC  # The width of the band.
-RANK = SIDE**2 - ORDER * (ORDER + 1) // 2
 SPLINE_ROUNDING = 1e-9
 
 
@@ -67,10 +70,20 @@ class _Columns(NamedTuple):
         return _Equations(band, self.rights @ weights, square, size)
 
 
+class _Sizes(NamedTuple):
+    """The order of the random derivatives, their size, and the deviations of contacts and normals."""
+
+    order: int
+    roughness: float
+    noise: float
+    slope_std: float
+
+
 class _Solution(NamedTuple):
-    """-2 log likelihood, the band of the Cholesky factor L, and the right side (SIDE^2,) divided by L."""
+    """-2 log likelihood of the sizes, the band of a Cholesky factor L, the right side (SIDE^2,) over L."""
 
     surprise: float
+    sizes: _Sizes
     factor: Array
     halfway: Array
 
@@ -92,46 +105,61 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
     heights, slopes = _columns(knots, basis[:1], asked[:1]), _columns(knots, basis[1:], asked[1:])
     # A slope s has 1 + s^2 times the deviation.
     certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)
-    sizes, sloping = [grid[i] for grid, i in zip(_grids(noise), START, strict=True)], weights * certainty
-    for _ in range(SIZE_PASSES):
-        data = [heights.weighted(weights), slopes.weighted(sloping)]
-        found = _likeliest(data, sizes, half, noise)
-        off = np.einsum("cnk,nk->cn", basis, found.coefficients()[knots]) - asked
-        turned = np.sqrt(certainty) * np.hypot(off[1], off[2])
-        weights = _student(np.abs(off[0]), sizes[1])
-        sloping = weights * certainty * _student(turned, sizes[2])
-    found = _solved([heights.weighted(weights), slopes.weighted(sloping)], sizes, half)
+    sizes = _Sizes(SMOOTHEST, ROUGHNESS[SMOOTHEST][START], NOISE_FACTORS[0] * noise, SLOPE_STDS[MIDDLE])
+    for orders in ((), ROUGHNESS):  # Other orders are tried once the other sizes are known.
+        data = [heights.weighted(weights), slopes.weighted(weights * certainty)]
+        found = _likeliest(data, sizes, orders, half, noise)
+        misses = np.abs(np.einsum("nk,nk->n", basis[0], found.coefficients()[knots]) - asked[0])
+        weights, sizes = _student(misses, found.sizes.noise), found.sizes
+    found = _solved([heights.weighted(weights), slopes.weighted(weights * certainty)], sizes, half)
     return Spline(found.coefficients().reshape(SIDE, SIDE), _stds(found.factor))
 
 
-def _grids(noise: float) -> tuple[Any, Any, Any]:
-    return ROUGHNESS, tuple(noise * np.array(NOISE_FACTORS)), SLOPE_STDS
-
-
-def _likeliest(data: list[_Equations], sizes: list[float], half: float, noise: float) -> _Solution:
-    """The likeliest solution, by steps of one size after the other up or down; changes `sizes` in place."""
+def _likeliest(
+    data: list[_Equations], sizes: _Sizes, orders: Iterable[int], half: float, noise: float
+) -> _Solution:
+    """The likeliest solution that is found by one size after the other, then with other `orders`."""
+    noises = tuple(noise * factor for factor in NOISE_FACTORS)
     best = _solved(data, sizes, half)
-    for i, grid in enumerate(_grids(noise)):
-        start = grid.index(sizes[i])
-        for way in (grid[start + 1 :], grid[:start][::-1]):
-            for size in way:
-                tried = _solved(data, [*sizes[:i], size, *sizes[i + 1 :]], half)
-                if tried.surprise >= best.surprise:
-                    break
-                best, sizes[i] = tried, size
-            if sizes[i] != grid[start]:
-                break
+    for name, grid in (("roughness", ROUGHNESS[sizes.order]), ("slope_std", SLOPE_STDS), ("noise", noises)):
+        best = _climbed(data, best, name, grid, half)
+    for order in orders:
+        if order != sizes.order:
+            first = _solved(data, best.sizes._replace(order=order, roughness=ROUGHNESS[order][START]), half)
+            tried = _climbed(data, first, "roughness", ROUGHNESS[order], half)
+            best = min(best, tried, key=lambda each: each.surprise)
     return best
 
 
-def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solution:
+def _climbed(
+    data: list[_Equations], best: _Solution, name: str, grid: tuple[float, ...], half: float
+) -> _Solution:
+    """The likeliest solution that is found by steps of one size up or down its grid."""
+    start = grid.index(getattr(best.sizes, name))
+    for way in (grid[start + 1 :], grid[:start][::-1]):
+        before = best
+        for size in way:
+            change: dict[str, Any] = {name: size}
+            tried = _solved(data, best.sizes._replace(**change), half)
+            if tried.surprise >= best.surprise:
+                break
+            best = tried
+        if best is not before:
+            break
+    return best
+
+
+def _solved(data: list[_Equations], sizes: _Sizes, half: float) -> _Solution:
     from scipy.linalg import cholesky_banded
 
-    roughness, *stds = sizes
-    pitch = 2.0 * half / (SIDE - 1)
-    matrix, right = _penalty() * (pitch ** (2 - 2 * ORDER) / roughness**2), np.zeros(SIDE**2)
-    surprise = 2.0 * RANK * np.log(roughness)
-    for some, std in zip(data, stds, strict=True):
+    prior, log_determinant, log_free = _penalty(sizes.order)
+    pitch, free = 2.0 * half / (SIDE - 1), sizes.order * (sizes.order + 1) // 2
+    precision = pitch ** (2 - 2 * sizes.order) / sizes.roughness**2
+    matrix, right = prior * precision, np.zeros(SIDE**2)
+    surprise = -log_determinant - (SIDE**2 - free) * np.log(precision)
+    # What an order leaves free has a flat prior: that of quadrics, as high as one with their deviation is.
+    surprise += 2.0 * (log_free + (free - 3) * np.log(0.5 * CURVATURE_STD * half**2))
+    for some, std in zip(data, (sizes.noise, sizes.slope_std), strict=True):
         matrix += some.band / std**2
         right += some.right / std**2
         surprise += some.square / std**2 + 2.0 * some.size * np.log(std)
@@ -139,7 +167,7 @@ def _solved(data: list[_Equations], sizes: list[float], half: float) -> _Solutio
     factor = cholesky_banded(matrix, overwrite_ab=True, lower=True, check_finite=False)
     halfway = _divided(factor, right, "N")
     surprise += 2.0 * np.log(factor[0]).sum() - halfway @ halfway
-    return _Solution(float(surprise), factor, halfway)
+    return _Solution(float(surprise), sizes, factor, halfway)
 
 
 def _divided(factor: Array, right: Array, trans: str) -> Array:
@@ -190,55 +218,24 @@ def _heights_at_coarse_knots() -> Array:
     return found
 
 
-def between(some: Array) -> Array:
-    """Values (SIDE, SIDE) at all knots, interpolated from those at every other knot."""
-    full, coarse = np.empty((SIDE, SIDE)), slice(None, None, 2)
-    full[coarse, coarse] = some
-    full[1::2, coarse] = 0.5 * (some[:-1] + some[1:])
-    full[:, 1::2] = 0.5 * (full[:, :-2:2] + full[:, 2::2])
-    return full
-
-
-def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
-    """The 16 knots (n, 16) that tell of n places, and their shares (3, n, 16) in height and slopes there."""
-    pitch = 2.0 * half / (SIDE - 1)
-    (column, *by_x), (row, *by_y) = (weights_at(along / pitch) for along in (x, y))
-    steps = np.arange(-1, 3)
-    knots = (column[:, None, None] + steps[:, None]) * SIDE + row[:, None, None] + steps
-    orders = ((0, 0), (1, 0), (0, 1))
-    found = [by_x[i][:, :, None] * by_y[j][:, None] / pitch ** (i + j) for i, j in orders]
-    return knots.reshape(-1, 16), np.array(found).reshape(3, -1, 16)
-
-
-def weights_at(at: Array) -> tuple[Any, Array, Array]:
-    """The knots before places (m,), in steps from the middle; weights (m, 4) of four knots, and slopes."""
-    at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - SPLINE_ROUNDING)
-    knot = at.astype(np.intp)
-    powers = np.vander(at - knot, 4, increasing=True)
-    values, slopes = _tables()
-    return knot, powers @ values, powers[:, :3] @ slopes
-
-
 @cache
-def _tables() -> tuple[Array, Array]:
-    values = (
-        np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]])
-        / 6.0
-    )
-    return values, values[1:] * np.array([[1.0], [2.0], [3.0]])
+def _penalty(order: int) -> tuple[Array, float, float]:
+    """The sum of squares of all derivatives of an order, by differences, for knots at distance 1.
 
-
-@cache
-def _penalty() -> Array:
-    """The band of the sum of squares of all third derivatives, by differences, for knots at distance 1."""
+    Returns its band, the log of the product of its eigenvalues above 0, and the log of the volume that
+    coefficients of quadrics on [-1, 1]^2 span, of those that it leaves free beside planes.
+    """
     from scipy.sparse import csr_matrix, kron
 
-    steps = [csr_matrix(np.diff(np.eye(SIDE), k, axis=0)) for k in range(ORDER + 1)]
-    parts = [
-        comb(ORDER, k) * kron(a.T @ a, b.T @ b)
+    steps = [csr_matrix(np.diff(np.eye(SIDE), k, axis=0)) for k in range(order + 1)]
+    matrix = sum(
+        comb(order, k) * kron(a.T @ a, b.T @ b)
         for k, (a, b) in enumerate(zip(steps[::-1], steps, strict=True))
-    ]
-    return _band(sum(parts))
+    )
+    x, y = (axis.ravel() for axis in np.meshgrid(*2 * [np.linspace(-1.0, 1.0, SIDE)], indexing="ij"))
+    basis, volumes = np.linalg.qr(monomials(x, y, exponents(0, order - 1)))
+    log_determinant = float(np.linalg.slogdet(matrix.toarray() + basis @ basis.T)[1])
+    return _band(matrix), log_determinant, float(np.log(np.abs(np.diag(volumes)[3:])).sum())
 
 
 def _band(matrix: Any) -> Array:

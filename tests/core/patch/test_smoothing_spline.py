@@ -5,7 +5,9 @@
 import numpy as np
 import pytest
 
-from core.patch.smoothing_spline import SIDE, bases, between, smoothing_spline
+from core.patch import smoothing_spline as splines
+from core.patch.cubic_spline import SIDE, bases, between
+from core.patch.smoothing_spline import smoothing_spline
 
 HALF = 1.3
 
@@ -82,13 +84,69 @@ def test_a_tenth_of_outlying_contacts_is_ignored():
 
 def test_normals_help_as_far_as_they_are_true():
     def error(turned):
-        rng = np.random.default_rng(4)
-        contacts, normals = touched(wavy, rng, 100, 3e-3, turned)
-        return np.abs(misses(fitted(contacts, normals, 3e-3), wavy, rng)[0]).mean()
+        found = []
+        for seed in range(4, 10):
+            rng = np.random.default_rng(seed)
+            spline = fitted(*touched(wavy, rng, 100, 3e-3, turned), 3e-3)
+            found.append(np.abs(misses(spline, wavy, rng)[0]).mean())
+        return np.mean(found)
 
     exact, worse, none = error(0.0), error(0.05), error(3.0)
     assert exact < 0.6 * none
     assert exact < worse < none
+
+
+def dense_surprise(contacts, order, roughness, noise):
+    """-2 log marginal likelihood of heights, less a constant, by dense matrices; planes are nearly free."""
+    knots, basis = bases(contacts[:, 0], contacts[:, 1], HALF)
+    rows = np.zeros((len(contacts), SIDE**2))
+    np.add.at(rows, (np.arange(len(contacts))[:, None], knots), basis[0])
+    band, pitch = splines._penalty(order)[0], 2.0 * HALF / (SIDE - 1)
+    penalty = np.zeros((SIDE**2, SIDE**2))
+    for i, diagonal in enumerate(band):
+        penalty += np.diag(diagonal[: SIDE**2 - i], -i)
+    penalty += np.tril(penalty, -1).T
+    values, vectors = np.linalg.eigh(penalty)
+    free = order * (order + 1) // 2
+    scales = roughness * pitch ** (order - 1) / np.sqrt(values[free:])
+    x, y = HALF * np.array(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, SIDE)], indexing="ij")).reshape(2, -1)
+    planes = 1e3 * np.array([np.ones(len(x)), x, y])
+    quadrics = 0.5 * splines.CURVATURE_STD * np.array([x**2, x * y, y**2][: free - 3]).reshape(-1, len(x))
+    roots = rows @ np.column_stack([scales * vectors[:, free:], planes.T, quadrics.T])
+    covariance = roots @ roots.T + noise**2 * np.eye(len(contacts))
+    return np.linalg.slogdet(covariance)[1] + contacts[:, 2] @ np.linalg.solve(covariance, contacts[:, 2])
+
+
+def test_the_likelihoods_of_both_orders_compare():
+    rng = np.random.default_rng(5)
+    contacts, _ = touched(lambda x, y: (0.02 * np.sin(5.0 * x) * y, 0.0 * x, 0.0 * x), rng, 60, 1e-3)
+    knots, basis = bases(contacts[:, 0], contacts[:, 1], HALF)
+    data = [splines._columns(knots, basis[:1], contacts[None, :, 2]).weighted(np.ones(60))]
+    data.append(splines._Equations(0.0 * data[0].band, 0.0 * data[0].right, 0.0, 0.0))
+    given = [(2, 0.1, 1e-3), (2, 0.3, 1e-3), (2, 0.1, 2e-3), (3, 0.3, 1e-3), (3, 1.0, 2e-3)]
+    ours = [splines._solved(data, splines._Sizes(*sizes, 0.1), HALF).surprise for sizes in given]
+    dense = [dense_surprise(contacts, *sizes) for sizes in given]
+    assert np.subtract(ours, ours[0]) == pytest.approx(np.subtract(dense, dense[0]), abs=0.05)
+
+
+def weathered(x, y):
+    """Heights and slopes of a surface whose second derivatives are random: it is folded along many lines."""
+    z, zx, zy = np.zeros((3, len(x)))
+    rng = np.random.default_rng(0)
+    for angle, at, size in zip(*rng.uniform(-1.0, 1.0, (3, 100)), strict=True):
+        cos, sin = np.cos(np.pi * angle), np.sin(np.pi * angle)
+        side = np.sign(cos * x + sin * y - at)
+        z += 0.02 * size * side * (cos * x + sin * y - at)
+        zx, zy = zx + 0.02 * size * side * cos, zy + 0.02 * size * side * sin
+    return z, zx, zy
+
+
+@pytest.mark.parametrize(("height", "order"), [(wavy, 3), (weathered, 2)])
+def test_the_order_is_the_surfaces(height, order, monkeypatch):
+    found, likeliest = [], splines._likeliest
+    monkeypatch.setattr(splines, "_likeliest", lambda *given: found.append(likeliest(*given)) or found[-1])
+    fitted(*touched(height, np.random.default_rng(6), 300, 5e-4, 0.02))
+    assert found[-1].sizes.order == order
 
 
 @pytest.mark.parametrize("given", [3e-3, 1e-3])

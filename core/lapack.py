@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from ..arguments import Array
+from .arguments import Array
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from core.patch import lapack
+from core import lapack
 
 MATRIX = np.cov(np.random.default_rng(1).normal(size=(12, 40)))
 RIGHT = np.arange(12.0)

@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cubic B-splines on a square of SIDE x SIDE knots."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ..arguments import Array
+
+# There are so many knots along each axis, evenly spaced over [-half, half]; benchmarks.atlas chose it.
+SIDE, CUBIC = 23, 3
+EDGE_ROUNDING = 1e-9  # Places at the edge of the square are so much inside, as a share of the pitch.
+
+
+def between(some: Array) -> Array:
+    """Values (SIDE, SIDE) at all knots, interpolated from those at every other knot."""
+    full, coarse = np.empty((SIDE, SIDE)), slice(None, None, 2)
+    full[coarse, coarse] = some
+    full[1::2, coarse] = 0.5 * (some[:-1] + some[1:])
+    full[:, 1::2] = 0.5 * (full[:, :-2:2] + full[:, 2::2])
+    return full
+
+
+def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
+    """The 16 knots (n, 16) that tell of n places, and their shares (3, n, 16) in height and slopes there."""
+    pitch = 2.0 * half / (SIDE - 1)
+    (column, *by_x), (row, *by_y) = (weights_at(along / pitch) for along in (x, y))
+    steps = np.arange(-1, 3)
+    knots = (column[:, None, None] + steps[:, None]) * SIDE + row[:, None, None] + steps
+    orders = ((0, 0), (1, 0), (0, 1))
+    found = [by_x[i][:, :, None] * by_y[j][:, None] / pitch ** (i + j) for i, j in orders]
+    return knots.reshape(-1, 16), np.array(found).reshape(3, -1, 16)
+
+
+def weights_at(at: Array) -> tuple[Any, Array, Array]:
+    """The knots before places (m,), in steps from the middle; weights (m, 4) of four knots, and slopes."""
+    at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - EDGE_ROUNDING)
+    knot = at.astype(np.intp)
+    powers = np.vander(at - knot, 4, increasing=True)
+    values, slopes = _tables()
+    return knot, powers @ values, powers[:, :3] @ slopes
+
+
+@cache
+def _tables() -> tuple[Array, Array]:
+    values = (
+        np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]])
+        / 6.0
+    )
+    return values, values[1:] * np.array([[1.0], [2.0], [3.0]])
