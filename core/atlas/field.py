@@ -28,7 +28,10 @@ LAYER, SLANT = 0.15, 0.5
 INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
 WALLS = 3  # At most so many walls are told apart at a place.
 WELL_INSIDE = 0.8  # What is within this share of a domain's radius is surely on the patch.
-FOOT_STEPS = 6  # The nearest point of the surface is found in so many steps.
+FOOT_STEPS = 6  # The nearest point of the surface is found in so many steps,
+NEGLIGIBLE = (
+    0.1  # or in fewer, if the next one would change the distance by less than this share of its deviation.
+)
 NEIGHBORS = 8  # Where no patch reaches, so many contacts tell of the surface.
 
 
@@ -99,16 +102,18 @@ def nearest_feet(charts: Charts, points: Array, feet: Array) -> tuple[Array, Ble
         off = points - feet
         across = off - np.einsum("ki,ki->k", off, field.normal)[:, None] * field.normal
         length = np.maximum(np.linalg.norm(across, axis=1), 1e-300)
-        room = LAYER * charts.radii[field.node] / length
-        tried = feet + np.minimum(share, room[:, None]) * across
+        # The distance is about length^2 / (2 away) too large.
+        some = np.flatnonzero(length**2 > 2.0 * NEGLIGIBLE * field.std * np.linalg.norm(off, axis=1))
+        room = LAYER * charts.radii[field.node[some]] / length[some]
+        tried = feet[some] + np.minimum(share[some], room[:, None]) * across[some]
         for _ in range(2):  # The first one may be beside the surface.
             there = blended(charts, tried)
             tried = tried - there.distance[:, None] * there.normal
         nearer = np.isfinite(there.std)
-        nearer &= ((points - tried) ** 2).sum(axis=1) < (off**2).sum(axis=1)
+        nearer &= ((points[some] - tried) ** 2).sum(axis=1) < (off[some] ** 2).sum(axis=1)
         for old, new in zip((feet, *field), (tried, *there), strict=True):
-            old[nearer] = new[nearer]
-        share[~nearer] *= 0.5
+            old[some[nearer]] = new[nearer]
+        share[some[~nearer]] *= 0.5
     return feet, field
 
 
