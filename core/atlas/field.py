@@ -29,9 +29,7 @@ INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
 WALLS = 3  # At most so many walls are told apart at a place.
 WELL_INSIDE = 0.8  # What is within this share of a domain's radius is surely on the patch.
 FOOT_STEPS = 6  # The nearest point of the surface is found in so many steps,
-NEGLIGIBLE = (
-    0.1  # or in fewer, if the next one would change the distance by less than this share of its deviation.
-)
+NEGLIGIBLE = 0.1  # or in fewer: the last ones would change the distance by this share of its deviation.
 NEIGHBORS = 8  # Where no patch reaches, so many contacts tell of the surface.
 
 
