@@ -24,23 +24,23 @@ from .real import Scan
 BATCH = 20  # The number of touches of each scan that are made at once.
 # Points of each scan, numbers of planes, the extent as a share of its size, and steps of a half curve.
 POINTS, PLANES, EXTENT, STEPS = 6, (3, 5), 1.0 / 16.0, 12
-# What is timed, with the number of rounds, of which the fastest counts.
-KINDS = {"batch": 1, "planes": 1, "touch": 2, "fit": 5, "spline": 5}
+# What is timed: the cases it is timed on, and the number of rounds, of which the fastest counts.
+TASKS = {"batch": ("batches", 1), "planes": ("touches", 1), "touch": ("touches", 2), "fit": ("fits", 5)}
 
 
 def compare(base, cases, tasks):
-    """Prints a Markdown table of the medians of `tasks`, some of KINDS, here and in the checkout `base`."""
+    """Prints a Markdown table of the medians of `tasks`, some of TASKS, here and in the checkout `base`."""
     cases, smooth = cases
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         path = Path(folder, "cases")
         path.write_bytes(pickle.dumps(cases))
         ours, theirs = (stack.enter_context(worker("speed_worker.py", root, path)) for root in (ROOT, base))
-        counts = {"batch": "batches", "planes": "touches", "touch": "touches", "fit": "fits"}
         rows = []
-        for task in (task for task in counts if task in tasks):
-            numbers = range(len(cases[counts[task]]))
+        for task, (kind, rounds) in TASKS.items():
+            if task not in tasks:
+                continue
             ask = [(ours, task), (theirs, task), *([(ours, "spline")] if task == "fit" else [])]
-            seconds = np.array([_asked(ask, i, KINDS[task]) for i in numbers])
+            seconds = np.array([_asked(ask, i, rounds) for i in range(len(cases[kind]))])
             groups = {task: np.full(len(seconds), True)}
             if task == "fit":
                 groups = {"fit, no residual": smooth, "fit, residual": ~smooth}

@@ -190,12 +190,12 @@ def parts(cases):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--base", type=Path, metavar="ROOT", help="a checkout to compare with")
-    parser.add_argument("tasks", nargs="*", choices=[*ratios.KINDS, []], help="what to compare (all)")
+    parser.add_argument("tasks", nargs="*", choices=[*ratios.TASKS, []], help="what to compare (all)")
     options = parser.parse_args()
     if options.base:
         with blender.quiet():
             cases = ratios.cases()
-        ratios.compare(options.base, cases, options.tasks or ratios.KINDS)
+        ratios.compare(options.base, cases, options.tasks or ratios.TASKS)
         print(f"{machine('bpy', 'numpy', 'scipy')}.")
         return
     cases = touches()
