@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fixtures: a real Blender with the built zip installed, an empty scene; and the fuzz tests' profiles."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -18,6 +19,11 @@ settings.register_profile("quick", max_examples=15, derandomize=True, database=N
 settings.register_profile("short", max_examples=60, derandomize=True, database=None, **COMMON)
 settings.register_profile("long", max_examples=2500, print_blob=True, **COMMON)
 settings.load_profile("short")
+
+
+def pytest_collection_finish():
+    """Spares the collected tests from each search for garbage, which took a twentieth of the time."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
