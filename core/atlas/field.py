@@ -28,8 +28,8 @@ LAYER, SLANT = 0.15, 0.5
 INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
 WALLS = 3  # At most so many walls are told apart at a place.
 WELL_INSIDE = 0.8  # What is within this share of a domain's radius is surely on the patch.
-FOOT_STEPS = 6  # The nearest point of the surface is found in so many steps,
-NEGLIGIBLE = 0.1  # or in fewer: the last ones would change the distance by this share of its deviation.
+FOOT_STEPS = 6  # The nearest point of the surface is found in so many steps at most.
+NEGLIGIBLE = 0.1  # No step is taken that would change the distance by less than this share of its deviation.
 NEIGHBORS = 8  # Where no patch reaches, so many contacts tell of the surface.
 
 
@@ -102,6 +102,8 @@ def nearest_feet(charts: Charts, points: Array, feet: Array) -> tuple[Array, Ble
         length = np.maximum(np.linalg.norm(across, axis=1), 1e-300)
         # The distance is about length^2 / (2 away) too large.
         some = np.flatnonzero(length**2 > 2.0 * NEGLIGIBLE * field.std * np.linalg.norm(off, axis=1))
+        if not len(some):
+            break
         room = LAYER * charts.radii[field.node[some]] / length[some]
         tried = feet[some] + np.minimum(share[some], room[:, None]) * across[some]
         for _ in range(2):  # The first one may be beside the surface.

@@ -164,7 +164,8 @@ def _agreed(charts: Charts) -> Joining:
         some = asked[start : start + PLACES_AT_ONCE]
         moves[some] = _move(charts, node[some], x[some], y[some])
         yield 1.0
-    each = moves.reshape(charts.heights.shape)
+    # The outermost knots are beyond the spline, which has no height there, and move like those beside them.
+    each = np.pad(moves.reshape(charts.heights.shape)[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
     change = np.array([spline_filter(move, order=3, mode="mirror") for move in each])
     return replace(charts, heights=charts.heights + change)
 
@@ -213,8 +214,7 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
     from scipy.ndimage import spline_filter
 
     rim, half = _square(r)
-    knots = np.linspace(-half, half, SIDE)
-    x, y = (axis.ravel() for axis in np.meshgrid(knots, knots, indexing="ij"))
+    x, y = (axis.ravel() for axis in np.meshgrid(*2 * [np.linspace(-half, half, SIDE)], indexing="ij"))
     at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
     share = np.hypot(x, y) / np.interp(at, np.arange(AZIMUTHS + 1), np.append(rim, rim[0]))
     # Farther out a sextic runs away, and the spline would carry that inward.
@@ -225,7 +225,7 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
 
 
 def _square(r: Reconstruction) -> tuple[Array, float]:
-    """The domain's radii, and half the side of the square of knots, one of which is beyond the patch."""
+    """The domain's radii, and half the side of the square of knots, whose outermost are beyond the patch."""
     rim = _rim(r)
     return rim, float(MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 3)
 

@@ -21,7 +21,7 @@ from .frontier import Place
 from .join import felt_by, told
 from .meshing import Mesh, meshed
 
-AHEAD = 0.5  # The normal at a foot tells the side if the cosine of its angle to the way there is more.
+AHEAD = 0.9  # The normal at a foot tells the side if the cosine of its angle to the way there is more.
 CLOSE = 0.02  # Farther than this share of a radius from a patch the distance is that of the nearest foot.
 OFF_SURFACE = 3.0  # A place of a patch that is off the field by more deviations is none of the surface.
 GRAPH_VERSION = 1  # The version of the graph as plain values.

@@ -15,7 +15,7 @@ EDGE_ROUNDING = 1e-9  # Places at the edge of the square are so much inside, as 
 
 
 def between(some: Array) -> Array:
-    """Values (SIDE, SIDE) at all knots, interpolated from those at every other knot."""
+    """Values (SIDE, SIDE) at all knots, interpolated linearly from those at every other knot."""
     full, coarse = np.empty((SIDE, SIDE)), slice(None, None, 2)
     full[coarse, coarse] = some
     full[1::2, coarse] = 0.5 * (some[:-1] + some[1:])
@@ -35,7 +35,10 @@ def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
 
 
 def weights_at(at: Array) -> tuple[Any, Array, Array]:
-    """The knots before places (m,), in steps from the middle; weights (m, 4) of four knots, and slopes."""
+    """The knots before places (m,), in steps from the middle; weights (m, 4) of four knots, and slopes.
+
+    The spline ends one step inside the square: what is beyond counts as on its edge.
+    """
     at = np.clip(at + 0.5 * (SIDE - 1), 1.0, SIDE - 2.0 - EDGE_ROUNDING)
     knot = at.astype(np.intp)
     powers = np.vander(at - knot, 4, increasing=True)

@@ -28,11 +28,11 @@ ROUGHNESS = {2: (0.01, 0.03, 0.1, 0.3, 1.0, 3.0), 3: (0.03, 0.1, 0.3, 1.0, 3.0, 
 NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # The grid of the noise, in units of the least noise.
 SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # The grid of the normals' deviation, which facets have.
 SMOOTHEST, START, MIDDLE = 3, 3, 2  # The search begins at this order, and at these places of the grids.
-CURVATURE_STD = 1.0  # The prior deviation of curvatures, where the order of derivatives leaves them free.
+CURVATURE_STD = 1.0  # The prior deviation of curvatures, twice that of coefficients of a quadric.
 FAR_OFF, STUDENT = 3.0, 4.0  # Outliers are off by more deviations, and weigh as under t of this freedom.
 LEAST_COSINE = 0.2  # A normal tells nothing if the cosine of its angle to the axis is less.
 WIDTH = CUBIC * SIDE + CUBIC  # The width of the band.
-SPLINE_ROUNDING = 1e-9
+SPLINE_ROUNDING = 1e-9  # This share of its largest element keeps the matrix invertible.
 
 
 class Spline(NamedTuple):
@@ -94,8 +94,9 @@ class _Solution(NamedTuple):
 
 @on_one_thread
 def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: float, noise: float) -> Spline:
-    """The spline of contacts and unit normals, (n, 3) each, which count by weights (n,).
+    """The spline of contacts and unit normals, (n, 3) each.
 
+    weights : (n,), by which these count at first; later by how far off the contacts are
     half : half the side of the square of knots
     noise : least standard deviation of a contact
     """
@@ -123,7 +124,7 @@ def _likeliest(
     best = _solved(data, sizes, half)
     for name, grid in (("roughness", ROUGHNESS[sizes.order]), ("slope_std", SLOPE_STDS), ("noise", noises)):
         best = _climbed(data, best, name, grid, half)
-    for order in orders:
+    for order in orders:  # They keep both deviations: intervals hold better than with smaller ones.
         if order != sizes.order:
             first = _solved(data, best.sizes._replace(order=order, roughness=ROUGHNESS[order][START]), half)
             tried = _climbed(data, first, "roughness", ROUGHNESS[order], half)
@@ -157,7 +158,8 @@ def _solved(data: list[_Equations], sizes: _Sizes, half: float) -> _Solution:
     precision = pitch ** (2 - 2 * sizes.order) / sizes.roughness**2
     matrix, right = prior * precision, np.zeros(SIDE**2)
     surprise = -log_determinant - (SIDE**2 - free) * np.log(precision)
-    # What an order leaves free has a flat prior: that of quadrics, as high as one with their deviation is.
+    # What an order leaves free has a flat prior: for quadrics it is as high as the Gaussian of their
+    # coefficients is at 0, so that both orders compare.
     surprise += 2.0 * (log_free + (free - 3) * np.log(0.5 * CURVATURE_STD * half**2))
     for some, std in zip(data, (sizes.noise, sizes.slope_std), strict=True):
         matrix += some.band / std**2
@@ -222,8 +224,8 @@ def _heights_at_coarse_knots() -> Array:
 def _penalty(order: int) -> tuple[Array, float, float]:
     """The sum of squares of all derivatives of an order, by differences, for knots at distance 1.
 
-    Returns its band, the log of the product of its eigenvalues above 0, and the log of the volume that
-    coefficients of quadrics on [-1, 1]^2 span, of those that it leaves free beside planes.
+    Returns its band; the log of the product of its eigenvalues above 0; and the log of the volume that the
+    terms x^2, xy and y^2 on [-1, 1]^2 span beside planes, or 0 if this order does not leave them free.
     """
     from scipy.sparse import csr_matrix, kron
 

@@ -117,7 +117,7 @@ def dense_surprise(contacts, order, roughness, noise):
     return np.linalg.slogdet(covariance)[1] + contacts[:, 2] @ np.linalg.solve(covariance, contacts[:, 2])
 
 
-def test_the_likelihoods_of_both_orders_compare():
+def test_likelihoods_of_both_orders_are_those_of_dense_matrices():
     rng = np.random.default_rng(5)
     contacts, _ = touched(lambda x, y: (0.02 * np.sin(5.0 * x) * y, 0.0 * x, 0.0 * x), rng, 60, 1e-3)
     knots, basis = bases(contacts[:, 0], contacts[:, 1], HALF)
@@ -142,7 +142,7 @@ def weathered(x, y):
 
 
 @pytest.mark.parametrize(("height", "order"), [(wavy, 3), (weathered, 2)])
-def test_the_order_is_the_surfaces(height, order, monkeypatch):
+def test_a_folded_surface_has_random_second_derivatives_and_a_smooth_one_third(height, order, monkeypatch):
     found, likeliest = [], splines._likeliest
     monkeypatch.setattr(splines, "_likeliest", lambda *given: found.append(likeliest(*given)) or found[-1])
     fitted(*touched(height, np.random.default_rng(6), 300, 5e-4, 0.02))
