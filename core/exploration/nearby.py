@@ -7,7 +7,7 @@ become shorter at once if the fit is in doubt, and longer in the next touch if t
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,14 +69,16 @@ def explore_nearby(
     Raises what `track` and `reconstruct` raise.
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
-    options, far = options_of(method, degree, None, weight, solver), number("farthest", farthest, above=0.0)
+    tracking: dict[str, Any] = {"noise": noise, "rng": rng, "tangent": tangent}
+    fitting: dict[str, Any] = {"method": method, "degree": degree, "weight": weight, "solver": solver}
+    options, far = options_of(noise=None, **fitting), number("farthest", farthest, above=0.0)
     least = SEEDS[-1] * far / FELT
     planes = planes_of(planes)
     lengths = np.clip(finite_array("reaches", reaches, (len(planes), 2)), least, far)
     # With noise, few contacts would not be enough for curves of this length.
     between = given("step", step) or spacing(lengths, CONTACT_COUNTS[1 if noise else 0])
     longest = max(float(lengths.max()), between)
-    follow = following(surface, p, up, planes, step=between, noise=noise, rng=rng, tangent=tangent)
+    follow = following(surface, p, up, planes, step=between, **tracking)
     felt = Felt(follow(longest), p, between, None, partial=longest < far)
 
     def tried(lengths: Array) -> Grown:
@@ -90,21 +92,7 @@ def explore_nearby(
         first = tried(lengths)
     except DegenerateCurvesError:
         # Beside a crease some half curves have too few contacts at this length; a shorter one has more.
-        anew = explore(
-            surface,
-            p,
-            up,
-            planes,
-            farthest=far,
-            step=step,
-            noise=noise,
-            rng=rng,
-            tangent=tangent,
-            method=method,
-            degree=degree,
-            weight=weight,
-            solver=solver,
-        )
+        anew = explore(surface, p, up, planes, farthest=far, step=step, **tracking, **fitting)
         return Nearby(anew, reaches_of(anew))
     grown = _shortened(first, tried, least)
     contours, r = felt.shortened(grown.counts), grown.result

@@ -16,7 +16,7 @@ from ..contours.contour import Contour
 from ..contours.curves import Curves
 from ..contours.local_geometry import DegenerateCurvesError, Frame
 from ..paper.by_method import coefficients
-from ..patch.domain import hull_domain
+from ..patch.domain import Domain, hull_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import DEGREE, MongePatch
 from ..patch.residual import Residual
@@ -189,15 +189,9 @@ def _result(
             "the contacts show a surface that faces away from the outward direction: give the direction to "
             "its outer side at the point, or move the point away from the edge"
         )
-    try:
-        domain = domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)
-    except ValueError:
-        return DegenerateCurvesError(
-            "the curves end in fewer than three separate places, so they bound no patch: "
-            "turn the sampling planes, or move the point away from the edge"
-            if contours
-            else "the point is outside the strokes or at their rim: give a point among them"
-        )
+    domain = _domain(touch, contours)
+    if isinstance(domain, DegenerateCurvesError):
+        return domain
     converged = True
     if touch.posterior is None:
         paper = options.method, options.weight, options.solver
@@ -219,3 +213,16 @@ def _result(
         joint_posterior=touch.posterior,
         known_curves=touch.known,
     )
+
+
+def _domain(touch: _Parts, contours: Sequence[Contour]) -> Domain | DegenerateCurvesError:
+    """The domain of the contours, or of strokes alone, in unit radius; or why there is none."""
+    try:
+        return domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)
+    except ValueError:
+        return DegenerateCurvesError(
+            "the curves end in fewer than three separate places, so they bound no patch: "
+            "turn the sampling planes, or move the point away from the edge"
+            if contours
+            else "the point is outside the strokes or at their rim: give a point among them"
+        )
