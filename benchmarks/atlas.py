@@ -28,7 +28,7 @@ from time import process_time
 import numpy as np
 
 import core
-from core.atlas.join import charts_of, joined, told
+from core.atlas.join import agreed, charts_of, joined, told
 from core.atlas.object_atlas import Atlas
 from core.exploration.side_by_side import result_of
 from tests import solids
@@ -314,7 +314,7 @@ def elsewhere(thing, which, where, tolerance):
     results = [e.result for e in found]
     charts = charts_of(results, deviations=False)
     joining = joined([e.contours for e in found], results, charts, NOISE, {})
-    atlas = Atlas(tuple(results), result_of(joining), tolerance)
+    atlas = Atlas(tuple(results), result_of(agreed(result_of(joining))), tolerance)
     mesh = atlas.mesh(EDGE)
     covered = np.isfinite(atlas.distance(thing.points)[1]).mean()
     off = off_mesh(mesh.vertices, mesh.triangles, thing.points)

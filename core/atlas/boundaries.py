@@ -15,8 +15,8 @@ from ..arguments import Array
 from ..patch.monge import TERMS, derived_monomials
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
-from .charts import MARGIN, Charts, Pairs
-from .field import AGREE, FACING, LAYER, node_weights
+from .charts import MARGIN, Charts
+from .field import AGREE, FACING, LAYER, least_of, node_weights
 
 # Boundaries are looked for on so many rays from each patch's middle, at so many places.
 RAYS, RAY_PLACES = 32, 16
@@ -119,7 +119,7 @@ def blended_curvatures(
     weights = node_weights(charts, pairs) * np.clip((facing - FACING) / (AGREE - FACING), 0.0, 1.0)
     radii = charts.radii[pairs.node]
     weights *= np.abs(pairs.distance) < LAYER * radii
-    x, y = charts.local(points, pairs.place, pairs.node)[:, :2].T * radii
+    x, y = charts.local(points, pairs.place, pairs.node)[:2] * radii
     curvatures, order = np.zeros((2, len(x))), np.argsort(pairs.node, kind="stable")
     for at in np.split(order, np.flatnonzero(np.diff(pairs.node[order])) + 1):
         if len(at):
@@ -154,7 +154,9 @@ def _crossings(charts: Charts, node: int) -> _Crossing:
     wall = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > FACING)
     own = pairs.node == node
     mine = np.bincount(pairs.place[own], weights[own], len(points))
-    best, which = _strongest(pairs, np.where(wall & ~own, weights, 0.0), len(points))
+    others = np.where(wall & ~own, weights, 0.0)
+    which = least_of(pairs.place, -others, len(points))
+    best = np.append(others, 0.0)[which]
     ratio = np.log(np.maximum(best, 1e-300) / np.maximum(mine, 1e-300)).reshape(RAYS, RAY_PLACES)
     lost = ratio > 0.0
     ray = np.flatnonzero(lost.any(axis=1))
@@ -167,15 +169,3 @@ def _crossings(charts: Charts, node: int) -> _Crossing:
     point, _ = charts.world(np.full(len(ray), node), *flat.T)
     angle = np.arccos(np.clip(cosine[which[place]], -1.0, 1.0))
     return _Crossing(np.full(len(ray), node), pairs.node[which[place]], ray, point, angle)
-
-
-def _strongest(pairs: Pairs, weights: Array, count: int) -> tuple[Array, NDArray[np.intp]]:
-    """The largest weight at each of `count` places, and the pair that has it."""
-    order = np.lexsort((-weights, pairs.place))
-    starts = np.flatnonzero(np.diff(pairs.place[order], prepend=-1))
-    best, which = np.zeros(count), np.zeros(count, dtype=np.intp)
-    best[pairs.place[order[starts]]], which[pairs.place[order[starts]]] = (
-        weights[order[starts]],
-        order[starts],
-    )
-    return best, which

@@ -6,7 +6,6 @@ The height of a patch with a residual is a sum over its contacts. In a table it 
 a cubic B-spline, which is C2 and off the patch by less than a tenth of its deviation.
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -17,15 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import Vector, cross, vector_of
-from ..patch.cubic_spline import SIDE, weights_at
+from ..patch.cubic_spline import CUBIC, SIDE, cubics, weights_at
 
 # python -m benchmarks.atlas judges these.
 MARGIN = 1.12  # A patch counts to this share of its domain's radius: beside a crease it ends a step early.
 AZIMUTHS = 96  # The radius of a domain is stored in so many directions.
 REACH = 0.5  # A patch is asked about places up to this share of its radius above or below it.
-DISK_PLACES = 36  # A disk around a contact is felt at so many places.
-CHUNK = 200_000  # So many pairs of a place and a patch fit into memory at once.
+# Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
+CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
+ASIDE = 0.3  # What is farther than this share of the radius beside the normal at its foot has no foot.
+CHUNK = 24_000  # So many pairs of a place and a patch fit into the processor's cache at once.
 
 
 class Pairs(NamedTuple):
@@ -95,64 +95,85 @@ class Charts:
             yield start + place[order], node[order]
 
     def local(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Array:
-        """Places in the frames of patches and in unit radius, (m, 3)."""
-        off = points[place] - self.origins[node]
-        found: Array = np.einsum("mi,mij->mj", off, self.axes[node]) / self.radii[node, None]
+        """Places in the frames of patches and in unit radius, (3, m)."""
+        origins, axes = self._frames
+        off = points.T.take(place, axis=1) - origins.take(node, axis=1)
+        found: Array = np.einsum("im,ijm->jm", off, axes.take(node, axis=2))
         return found
+
+    @cached_property
+    def _frames(self) -> tuple[Array, Array]:
+        """Origins (3, n), and axes over radii (3, 3, n): numpy is faster with patches along the last axis."""
+        axes = np.moveaxis(self.axes / self.radii[:, None, None], 0, -1)
+        return np.ascontiguousarray(self.origins.T), np.ascontiguousarray(axes)
 
     def shares(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
         """How far out local (x, y) are, as shares (m,) of the domain's radius; smooth in the azimuth."""
-        at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
+        at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) + 0.5 * AZIMUTHS
         first = at.astype(np.intp)
-        weights = _catmull_rom(at - first)
-        steps = (first[:, None] + np.arange(-1, 3)) % AZIMUTHS
-        radius = np.einsum("mk,mk->m", self.rims[node[:, None], steps], weights)
-        return np.hypot(x, y) / np.maximum(radius, 1e-6)
+        four = self._all_around.take(node * (AZIMUTHS + 4) + first + np.arange(4)[:, None])
+        radius = np.einsum("km,km->m", four, cubics(CATMULL_ROM, at - first))
+        return np.sqrt(x * x + y * y) / np.maximum(radius, 1e-6)
+
+    @cached_property
+    def _all_around(self) -> Array:
+        """The radii of domains from azimuth -pi to pi, and one before and two more after these."""
+        around = np.arange(-1, AZIMUTHS + 3) - AZIMUTHS // 2
+        return np.take(self.rims, around, axis=1, mode="wrap").ravel()
 
     def _pairs_at(self, points: Array, room: float, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
         """Those of these pairs that are within reach, measured from the tangent plane at each foot."""
-        x, y, z = self.local(points, place, node).T
-        reach = np.maximum(REACH, room / self.radii[node])
-        near = np.flatnonzero(x**2 + y**2 < ((MARGIN + reach) * self.rims.max(axis=1)[node]) ** 2)
-        near = near[np.abs(z[near]) < 1.5 + reach[near]]
-        near = near[self.shares(x[near], y[near], node[near]) < MARGIN + reach[near]]
-        place, node, x, y, z, reach = (values[near] for values in (place, node, x, y, z, reach))
-        h, hx, hy, _ = self._heights(x, y, node)
+        x, y, z = self.local(points, place, node)
+        reach = np.maximum(REACH, room / self.radii)
+        near = x * x + y * y < (((MARGIN + reach) * self.rims.max(axis=1)) ** 2)[node]
+        which = np.flatnonzero(near & (np.abs(z) < (1.5 + reach)[node]))
+        which = which[self.shares(x[which], y[which], node[which]) < (MARGIN + reach)[node[which]]]
+        place, node, (x, y, z) = place[which], node[which], np.array([x, y, z])[:, which]
+        h, hx, hy = self._heights(x, y, node)
         off = (z - h) / (1.0 + hx**2 + hy**2)
         foot_x, foot_y = x + off * hx, y + off * hy
         share = self.shares(foot_x, foot_y, node)
-        inside = (share < np.maximum(MARGIN, 1.0 + room / self.radii[node])) & (np.abs(off) < reach)
-        place, node, x, y, z, foot_x, foot_y, share = (
-            values[inside] for values in (place, node, x, y, z, foot_x, foot_y, share)
-        )
-        h, hx, hy, std = self._heights(foot_x, foot_y, node)
+        inside = (share < np.maximum(MARGIN, 1.0 + room / self.radii)[node]) & (np.abs(off) < reach[node])
+        which = np.flatnonzero(inside)
+        place, node, share = place[which], node[which], share[which]
+        x, y, z, foot_x, foot_y = np.array([x, y, z, foot_x, foot_y])[:, which]
+        h, hx, hy = self._heights(foot_x, foot_y, node)
         steep, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[node]
         distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * steep
-        normal = np.stack([-hx * steep, -hy * steep, steep], axis=1)
-        return Pairs(
-            place,
-            node,
-            share,
-            distance * radius,
-            np.einsum("mij,mj->mi", self.axes[node], normal),
-            std * steep * radius,
+        aside = (x - foot_x) ** 2 + (y - foot_y) ** 2 + (z - h) ** 2 - distance**2
+        std = self._stds_at(foot_x, foot_y, node) * steep
+        normal = self._turned(node, np.array([-hx * steep, -hy * steep, steep]))
+        pairs = Pairs(place, node, share, distance * radius, normal, std * radius)
+        return pairs.chosen(aside < ASIDE**2)
+
+    def _turned(self, node: NDArray[np.intp], local: Array) -> Array:
+        """Directions (3, m) in the frames of patches, as the caller sees them, (m, 3)."""
+        found: Array = np.einsum("mij,jm->mi", self.axes[node], local)
+        return found
+
+    def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
+        """Heights, and slopes in x and y, (3, m), at local (x, y)."""
+        pitch = (2.0 * self.halves / (SIDE - 1))[node]
+        (column, row), weights, slopes = weights_at(np.array([x, y]) / pitch)
+        start, steps = (node * SIDE + column - 1) * SIDE + row - 1, np.arange(CUBIC + 1)
+        knots = start + (steps[:, None] * SIDE + steps)[:, :, None]
+        taps = self.heights.ravel().take(knots)
+        across, across_slopes = (np.einsum("ijm,jm->im", taps, by[:, 1]) for by in (weights, slopes))
+        return np.array(
+            [
+                np.einsum("im,im->m", across, weights[:, 0]),
+                np.einsum("im,im->m", across, slopes[:, 0]) / pitch,
+                np.einsum("im,im->m", across_slopes, weights[:, 0]) / pitch,
+            ]
         )
 
-    def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
-        """Heights, slopes in x and y, and deviations (m,) at local (x, y)."""
-        pitch = 2.0 * self.halves[node] / (SIDE - 1)
-        (column, by_x, slopes_x), (row, by_y, slopes_y) = weights_at(x / pitch), weights_at(y / pitch)
-        start, flat = (node * SIDE + column - 1) * SIDE + row - 1, self.heights.reshape(-1)
-        h, hx, hy = np.zeros((3, len(x)))
-        for i in range(4):
-            taps = flat[start[:, None] + (i * SIDE + np.arange(4))]
-            across = np.einsum("mk,mk->m", taps, by_y)
-            h += by_x[:, i] * across
-            hx += slopes_x[:, i] * across
-            hy += by_x[:, i] * np.einsum("mk,mk->m", taps, slopes_y)
-        nearest = np.clip(np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp), 0, SIDE - 1)
-        std = self.stds.reshape(-1)[(node * SIDE + nearest[0]) * SIDE + nearest[1]]
-        return h, hx / pitch, hy / pitch, std
+    def _stds_at(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
+        """Deviations (m,) of the heights at local (x, y), which are those of the nearest knots."""
+        pitch = (2.0 * self.halves / (SIDE - 1))[node]
+        nearest = np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp)
+        column, row = np.minimum(np.maximum(nearest, 0), SIDE - 1)
+        found: Array = self.stds.ravel().take((node * SIDE + column) * SIDE + row)
+        return found
 
     @cached_property
     def mean_stds(self) -> Array:
@@ -211,40 +232,7 @@ class Charts:
 
     def world(self, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
         """Points and normals (m, 3) of patches above local (x, y), which are in unit radius."""
-        h, hx, hy, _ = self._heights(x, y, node)
+        h, hx, hy = self._heights(x, y, node)
         steep = 1.0 / np.sqrt(1.0 + hx**2 + hy**2)
-        normal = np.stack([-hx * steep, -hy * steep, steep], axis=1)
-        local = np.stack([x, y, h], axis=1) * self.radii[node, None]
-        axes = self.axes[node]
-        return self.origins[node] + np.einsum("mij,mj->mi", axes, local), np.einsum(
-            "mij,mj->mi", axes, normal
-        )
-
-
-def _catmull_rom(t: Array) -> Array:
-    """Weights (m, 4) of four neighbors at shares t (m,) of the way between the middle two."""
-    return (
-        np.stack(
-            [
-                ((2.0 - t) * t - 1.0) * t,
-                (3.0 * t - 5.0) * t**2 + 2.0,
-                ((4.0 - 3.0 * t) * t + 1.0) * t,
-                (t - 1.0) * t**2,
-            ],
-            axis=1,
-        )
-        / 2.0
-    )
-
-
-def disk_around(normal: Vector, ahead: Vector) -> Array:
-    """Places (DISK_PLACES, 3) spread evenly over the unit disk across a normal, as in a sunflower."""
-    i = np.arange(DISK_PLACES) + 0.5
-    turn, out = math.pi * (3.0 - math.sqrt(5.0)) * i, np.sqrt(i / DISK_PLACES)
-    e1 = np.array(cross(normal, ahead))
-    if not np.linalg.norm(e1) > 1e-3:
-        e1 = np.array(cross(normal, vector_of(np.eye(3)[np.argmin(np.abs(normal))])))
-    e1 /= np.linalg.norm(e1)
-    across = np.array([out * np.cos(turn), out * np.sin(turn)])
-    found: Array = across.T @ np.array([e1, cross(normal, vector_of(e1))])
-    return found
+        points = self.origins[node] + self._turned(node, np.array([x, y, h]) * self.radii[node])
+        return points, self._turned(node, np.array([-hx * steep, -hy * steep, steep]))

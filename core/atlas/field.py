@@ -159,7 +159,7 @@ def _wall(
     which = np.flatnonzero(active)
     place, node, out, distance, normal, std = pairs.chosen(which)
     radius = charts.radii[node]
-    nearest = _first(place, np.abs(distance) + 0.5 * LAYER * radius * out**2, len(points))
+    nearest = least_of(place, np.abs(distance) + 0.5 * LAYER * radius * out**2, len(points))
     r = nearest[place]
     cosine = np.einsum("mi,mi->m", normal, normal[r])
     agree = np.clip((cosine - FACING) / (AGREE - FACING), 0.0, 1.0)
@@ -181,12 +181,17 @@ def _wall(
     return (blend, feet), taken
 
 
-def _first(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
-    """The pair of the least key at each of `count` places; -1 where there is none."""
-    order = np.lexsort((key, place))
+def least_of(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
+    """The pair of the least key (m,) at each of `count` places, -1 where there is none.
+
+    place : (m,), sorted
+    """
     found = np.full(count, -1)
-    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
-    found[place[order[starts]]] = order[starts]
+    if len(place):
+        starts = np.flatnonzero(np.diff(place, prepend=-1))
+        least = np.minimum.reduceat(key, starts)
+        those = np.flatnonzero(key == np.repeat(least, np.diff(starts, append=len(place))))
+        found[place[those[::-1]]] = those[::-1]  # The first of equal ones stays.
     return found
 
 
@@ -212,7 +217,7 @@ def _mean(
     variance = scale * total(std**2 + (distance - mean[place]) ** 2)
     up = np.stack([total(normal[:, i]) for i in range(3)], axis=1)
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
-    best = _first(place, -w, count)
+    best = least_of(place, -w, count)
     return Blend(
         mean,
         np.where(there, np.sqrt(variance), np.inf),

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
-from ..contours.finger import Surface
+from ..contours.finger import DISK_PLACES, Surface, disk_around
 from ..reconstruction.result import Reconstruction
-from .charts import DISK_PLACES, Charts, disk_around
+from .charts import Charts
 from .field import FACING, INSIDE, covered
 from .join import charts_of
 
@@ -30,7 +30,7 @@ REACHES = (0.35, 0.12, 0.04)  # The finger goes on by these shares of the radius
 DISK_REACHES = 3.0  # What is new is measured on a disk of so many reaches, at most the patch's radius.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
 TRIES = 3  # Touches go on from a place at most so many times.
-LOOK = 7  # So many other places are looked at together with the first of the queue, which is faster.
+LOOK = 15  # So many other places are looked at together with the first of the queue, which is faster.
 TOUCHES_APART = 2.2  # Touches that are made side by side are so many radii apart.
 LOW = 0.1  # The finger comes down on a place from at most this share of the radius above it.
 ABOVE = 0.6  # The finger is this share of the disk's radius above a contact when it feels around it.
@@ -110,7 +110,8 @@ class Frontier:
         known: dict[Place, Next | None] = {}
         while self.queue and len(found) < count:
             _, _, place = entry = heapq.heappop(self.queue)
-            if any(_is_near(place, other) for other in found):
+            rooms = ((other, TOUCHES_APART * max(place.radius, other.place.radius)) for other in found)
+            if any(math.dist(place.point, other.point) < room for other, room in rooms):
                 aside.append(entry)
                 continue
             if len(place.tried) >= TRIES:
@@ -223,8 +224,9 @@ class Frontier:
         above = self.surface.ray_cast(along(point, normal, HAIR * radius), normal, ABOVE * radius)
         height = ABOVE * radius if above is None else 0.5 * math.dist(point, above[0])
         hits = [contact]
-        for start in (along(point, normal, height) + disk_around(normal, place.ahead) * radius).tolist():
-            felt = self.felt(self.surface.ray_cast(start, down, height + ABOVE * radius), down)
+        middle, far = along(point, normal, height), height + ABOVE * radius
+        for way in disk_around(normal):
+            felt = self.felt(self.surface.ray_cast(along(middle, way, radius), down, far), down)
             if felt is not None and dot(felt[1], normal) > FACING:
                 hits.append(felt)
         return np.array(hits)
@@ -236,10 +238,6 @@ def still_open(places: Sequence[Place], charts: Charts | None) -> list[Place]:
         return list(places)
     points, normals = (np.array([getattr(p, name) for p in places]) for name in ("point", "normal"))
     return [place for place, gone in zip(places, covered(charts, points, normals), strict=True) if not gone]
-
-
-def _is_near(place: Place, touch: Next) -> bool:
-    return math.dist(place.point, touch.point) < TOUCHES_APART * max(place.radius, touch.place.radius)
 
 
 def _between(points: Array, tried: Sequence[Vector]) -> int:

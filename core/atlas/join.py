@@ -17,7 +17,7 @@ from ..patch.cubic_spline import SIDE, between
 from ..patch.smoothing_spline import smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
-from .field import FACING, LAYER, Blend, Felt, blended
+from .field import FACING, LAYER, Blend, Felt, blended, least_of
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.
@@ -27,6 +27,7 @@ FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another wa
 LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
 PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes so many patches, or so many places.
 KNOTS_WITHIN = 1.3  # A patch is asked for heights at knots up to so many times its domain's radius.
+ROUNDS = 2  # Patches are moved so often.
 MOVED = 0.03  # A place of a patch is moved by less than this share of the radius.
 ASKEW = 0.3  # The field contradicts a contact if it is off its tangent plane by this share of the way to it.
 SURE = 0.7  # A place that is off a contact's plane by this share of the way to it is surely on that side.
@@ -42,7 +43,7 @@ def felt_by(results: Sequence[Reconstruction], charts: Charts) -> Felt:
 
     parts = [np.vstack([r.strokes, *(contour.points for contour in r.contours)]) for r in results]
     points, node = np.vstack(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-    x, y, _ = charts.local(points, np.arange(len(points)), node).T
+    x, y, _ = charts.local(points, np.arange(len(points)), node)
     return Felt(points, charts.world(node, x, y)[1], node, cKDTree(points))
 
 
@@ -84,21 +85,16 @@ def _take_walls(
     some = np.flatnonzero((off > ASKEW * away) & (field.node >= 0))
     pairs = charts.pairs(points[some])
     miss = np.abs(pairs.distance - plane[some[pairs.place]])
-    order = np.lexsort((miss, pairs.place))
-    pair = order[np.flatnonzero(np.diff(pairs.place[order], prepend=-1))]
+    pair = least_of(pairs.place, miss, len(some))
+    pair = pair[pair >= 0]
     other = pairs.chosen(pair[miss[pair] < NEARER * off[some[pairs.place[pair]]]])
     at = some[other.place]
-    inside = _inside(charts, field.node[at], felt.points[nearest[at]])
+    contacts, node = felt.points[nearest[at]], field.node[at]
+    feet, normals = charts.world(node, *charts.local(contacts, np.arange(len(at)), node)[:2])
+    inside = np.einsum("ki,ki->k", contacts - feet, normals) < 0.0
     takes = inside == (other.distance > field.distance[at])
     for values, better in zip(field, (other.distance, other.std, other.normal, other.node), strict=True):
         values[at[takes]] = better[takes]
-
-
-def _inside(charts: Charts, node: NDArray[np.intp], points: Array) -> NDArray[np.bool_]:
-    """Whether each of the points (k, 3) is below the patch `node` (k,)."""
-    x, y, _ = charts.local(points, np.arange(len(points)), node).T
-    feet, normals = charts.world(node, x, y)
-    return np.less(np.einsum("ki,ki->k", points - feet, normals), 0.0)
 
 
 def joined(
@@ -108,7 +104,7 @@ def joined(
     noise: float,
     known: dict[int, tuple[int, Table]],
 ) -> Joining:
-    """The tables of patches fitted to all contacts on them, moved to agree. Yields the share that is done.
+    """The tables of patches fitted to all contacts on them. Yields the share that is done.
 
     charts : the tables of the same patches, fitted to their own contacts alone
     known : number of contacts and table of each patch that was joined before; changed in place
@@ -131,7 +127,7 @@ def joined(
         tables.append(known[i][1])
         if len(tables) % PATCHES_AT_ONCE == 0:
             yield len(tables) / len(results)
-    return (yield from _agreed(stacked(results, tables)))
+    return stacked(results, tables)
 
 
 def _joined_table(
@@ -152,22 +148,24 @@ def _joined_table(
     return rim, half, *found
 
 
-def _agreed(charts: Charts) -> Joining:
-    """The patches moved onto the blend of all of them; yields 1 after each part."""
+def agreed(charts: Charts) -> Joining:
+    """The patches moved onto the blend of all of them, as often as ROUNDS; yields 1 after each part."""
     from scipy.ndimage import spline_filter
 
     x, y = charts.knots().reshape(2, -1)
     node = np.repeat(np.arange(len(charts.radii)), SIDE**2)
     asked = np.flatnonzero(charts.shares(x, y, node) < KNOTS_WITHIN)
-    moves = np.zeros(charts.heights.size)
-    for start in range(0, len(asked), PLACES_AT_ONCE):
-        some = asked[start : start + PLACES_AT_ONCE]
-        moves[some] = _move(charts, node[some], x[some], y[some])
-        yield 1.0
-    # The outermost knots are beyond the spline, which has no height there, and move like those beside them.
-    each = np.pad(moves.reshape(charts.heights.shape)[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
-    change = np.array([spline_filter(move, order=3, mode="mirror") for move in each])
-    return replace(charts, heights=charts.heights + change)
+    for _ in range(ROUNDS):
+        moves = np.zeros(charts.heights.shape)
+        for start in range(0, len(asked), PLACES_AT_ONCE):
+            some = asked[start : start + PLACES_AT_ONCE]
+            moves.ravel()[some] = _move(charts, node[some], x[some], y[some])
+            yield 1.0
+        # The outermost knots are beyond the spline, without a height: they move like those beside them.
+        every = (np.pad(move[1:-1, 1:-1], 1, mode="edge") for move in moves)
+        change = np.array([spline_filter(move, order=3, mode="mirror") for move in every])
+        charts = replace(charts, heights=charts.heights + change)
+    return charts
 
 
 def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
@@ -226,21 +224,8 @@ def table_of(r: Reconstruction, deviations: bool) -> Table:
 
 def _square(r: Reconstruction) -> tuple[Array, float]:
     """The domain's radii, and half the side of the square of knots, whose outermost are beyond the patch."""
-    rim = _rim(r)
+    rim = r.domain.radii(AZIMUTHS) / r.radius
     return rim, float(MARGIN * rim.max()) * (SIDE - 1) / (SIDE - 3)
-
-
-def _rim(r: Reconstruction) -> Array:
-    """The domain's radii (AZIMUTHS,), in unit radius, nowhere beyond what lies between the ends of curves.
-
-    Between ends at very different distances the domain's spline swings out to where nothing was felt.
-    """
-    ends = r.domain.ends / r.radius
-    turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
-    between = np.interp(turns, np.arctan2(ends[:, 1], ends[:, 0]), np.hypot(*ends.T), period=2.0 * np.pi)
-    spline = np.linalg.norm(r.domain.boundary(AZIMUTHS), axis=1) / r.radius
-    rim: Array = np.minimum(spline, between)
-    return rim
 
 
 def _stds(r: Reconstruction, x: Array, y: Array) -> Array:

@@ -82,14 +82,13 @@ def meshed(charts: Charts, felt: Felt, edge: float) -> Generator[float, None, Me
     share = field.distance[a] / (field.distance[a] - field.distance[b])
     share = np.clip(share, CLIP, 1.0 - CLIP)[:, None]
     vertices = (1.0 - share) * points[a] + share * points[b]
-    for done in range(SMOOTHINGS + 1):
-        so_far = 0.5 + 0.5 * done / (SMOOTHINGS + 1)
-        if done:
-            vertices = evened(vertices, field.normal, triangles)
-            yield so_far
-        field = yield from _asked(charts, felt, vertices, 0.0, so_far)
+    for done in (0.5, 0.75):
+        field = yield from _asked(charts, felt, vertices, 0.0, done)
         step = np.clip(field.distance, -0.5 * size, 0.5 * size)
         vertices = vertices - step[:, None] * field.normal
+        for _ in range(SMOOTHINGS if done == 0.5 else 0):
+            vertices = evened(vertices, field.normal, triangles)
+            yield done
     return _felt(vertices, triangles, field)
 
 

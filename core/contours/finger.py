@@ -7,12 +7,13 @@ from collections.abc import Callable, Generator, Sequence
 from typing import Protocol
 
 from ..arguments import LARGEST, shown
-from .contour import CREASE, NO_CONTACT, NOT_MONGE, Vector, cross, dot, scaled
+from .contour import CREASE, NO_CONTACT, NOT_MONGE, Vector, along, cross, dot, scaled, tangent_of
 
 # benchmarks.refusals counts what these refuse.
 MAX_TURN = math.cos(math.radians(45.0))  # A sharper turn between two contacts is a crease to a finger.
 # A normal tilted more against that at the point has slopes above 3.7.
 MAX_TILT = math.cos(math.radians(75.0))
+DISK_PLACES = 36  # A disk around a contact is felt at so many places.
 LEAST_IN_PLANE = 1e-3  # A surface normal has at least this share in the sampling plane.
 
 
@@ -136,3 +137,13 @@ def _next_contact(cast: _Cast, at: complex, ahead: complex, up: complex, step: f
             break
         forward *= step / chord
     return contact
+
+
+def disk_around(normal: Vector) -> list[Vector]:
+    """Places (DISK_PLACES, 3) spread evenly over the unit disk across a unit normal, as in a sunflower."""
+    e1, golden = tangent_of(normal, None), math.pi * (3.0 - math.sqrt(5.0))
+    e2, found = cross(normal, e1), []
+    for i in range(DISK_PLACES):
+        out = math.sqrt((i + 0.5) / DISK_PLACES)
+        found.append(along(scaled(e1, out * math.cos(i * golden)), e2, out * math.sin(i * golden)))
+    return found

@@ -22,6 +22,8 @@ INSIDE_HULL = 0.05  # The origin is inside such a hull by at least this share of
 QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])  # It turns rows counterclockwise.
 # Ends this near to each other, as a share of the radius, count once; near the origin, not at all.
 SAME_END = 1e-3
+WIDE = 0.5 * np.pi  # If ends are farther apart in azimuth than this, one between them was at the origin.
+SHORTEST = 1e-6  # No length is divided by less than this share of the radius.
 BRINK = 0.01  # Where the surface ends at the origin, the domain ends this share of the radius away.
 GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Means over the domain take so many Gauss points between ends, and outward.
 
@@ -149,6 +151,26 @@ class Domain:
     def points_at(self, places: Array) -> Array:
         """The points (n, 2) that have these `places`."""
         return places * self._radius(np.arctan2(places[:, 1], places[:, 0]))[:, None]
+
+    def radii(self, count: int) -> Array:
+        """Radii (count,) of the boundary, at azimuths from 0 on, but nowhere beyond what is between the ends.
+
+        Between ends at very different distances the spline swings out to where nothing was felt, and between
+        ends more than WIDE apart there is only what is inside the line from one to the other.
+        """
+        turns, whole = 2.0 * np.pi * np.arange(count) / count, 2.0 * np.pi
+        at, out = np.arctan2(self.ends[:, 1], self.ends[:, 0]) % whole, np.hypot(*self.ends.T)
+        order = np.argsort(at)
+        at, out = (
+            np.concatenate([values[order[-1:]], values[order], values[order[:1]]]) for values in (at, out)
+        )
+        at[0], at[-1] = at[0] - whole, at[-1] + whole
+        i = np.searchsorted(at, turns, side="right")
+        before, after, last, following = turns - at[i - 1], at[i] - turns, out[i - 1], out[i]
+        across = np.maximum(last * np.sin(before) + following * np.sin(after), SHORTEST * out.max())
+        line = np.maximum(last * following * np.sin(before + after) / across, BRINK * out.max())
+        line = np.where(before + after > WIDE, line, np.inf)
+        return np.minimum(np.minimum(self._radius(turns), np.interp(turns, at, out)), line)
 
     def boundary(self, n: int) -> Array:
         """n points on the boundary, (n, 2), counterclockwise from azimuth 0 in equal turns."""

@@ -20,7 +20,8 @@ RING = solids.ring(small=0.5)
 
 
 def explored(solid, **options):
-    return core.explore_object(solid, solid.start, solid.outward, rng=0, **{"tolerance": 4e-3} | options)
+    options = {"tolerance": 4e-3, "rng": 0} | options
+    return core.explore_object(solid, solid.start, solid.outward, **options)
 
 
 @pytest.fixture(scope="module")
@@ -155,9 +156,9 @@ def test_touches_bend_around_the_edges_of_a_block(block):
 
 def test_contacts_mend_holes_at_sharp_edges(block, monkeypatch):
     """Patches alone do not tell whether the edge between them is convex."""
-    mended = block.mesh(0.06)
+    mended = block.mesh(0.1)
     monkeypatch.setattr(meshing, "told", lambda charts, _, points, room=0.0: blended(charts, points, room))
-    alone = block.mesh(0.06)
+    alone = block.mesh(0.1)
     assert solids.topology(mended.triangles).open < solids.topology(alone.triangles).open
     off, before = (np.abs(solids.block().distances(mesh.vertices)) for mesh in (mended, alone))
     assert off.mean() < 0.5 * before.mean()
