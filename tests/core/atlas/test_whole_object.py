@@ -109,14 +109,16 @@ def test_neighbors_agree_on_normals_and_bends_where_they_meet(ring):
 
 def test_deviations_of_bends_are_true_where_patches_meet(ball, ring):
     """A torus of radii R and r has K = cos t / (r (R + r cos t))."""
-    for atlas in (ball, ring):
+    held = []
+    for atlas in (ball, *(explored(solids.ball(), noise=1e-3, rng=seed) for seed in (1, 2)), ring):
         curves = np.vstack([edge.curve for edge in atlas.edges])
         bends, stds = (np.hstack(parts) for parts in zip(*map(atlas.bends, atlas.edges), strict=True))
         out = np.hypot(curves[:, 0], curves[:, 1]) - 1.0
         cosine = out / np.hypot(out, curves[:, 2])
-        true = np.ones(len(curves)) if atlas is ball else cosine / (0.5 * (1.0 + 0.5 * cosine))
-        assert 0.83 < np.mean(np.abs(bends - true) <= 1.645 * stds) < 0.98
+        true = cosine / (0.5 * (1.0 + 0.5 * cosine)) if atlas is ring else np.ones(len(curves))
+        held += np.ravel(np.abs(bends - true) <= 1.645 * stds).tolist()
         assert np.mean(np.abs(bends[0] - bends[1]) <= 1.645 * np.hypot(*stds)) > 0.75
+    assert 0.83 < np.mean(held) < 0.98
 
 
 def test_at_the_point_the_deviation_of_the_bend_is_that_of_the_reconstruction(ring):
