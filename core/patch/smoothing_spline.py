@@ -10,7 +10,6 @@ weigh as under a Student t distribution. Equations are banded, however many cont
 radius.
 """
 
-from collections.abc import Iterable
 from functools import cache
 from math import comb
 from typing import Any, NamedTuple
@@ -28,6 +27,7 @@ ROUGHNESS = {2: (0.01, 0.03, 0.1, 0.3, 1.0, 3.0), 3: (0.03, 0.1, 0.3, 1.0, 3.0, 
 NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # The grid of the noise, in units of the least noise.
 SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # The grid of the normals' deviation, which facets have.
 SMOOTHEST, START, MIDDLE = 3, 3, 2  # The search begins at this order, and at these places of the grids.
+PASSES = 2  # If contacts are outlying, sizes are sought this often.
 CURVATURE_STD = 1.0  # The prior deviation of curvatures, twice that of coefficients of a quadric.
 FAR_OFF, STUDENT = 3.0, 4.0  # Outliers are off by more deviations, and weigh as under t of this freedom.
 LEAST_COSINE = 0.2  # A normal tells nothing if the cosine of its angle to the axis is less.
@@ -106,30 +106,31 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
     heights, slopes = _columns(knots, basis[:1], asked[:1]), _columns(knots, basis[1:], asked[1:])
     # A slope s has 1 + s^2 times the deviation.
     certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)
-    sizes = _Sizes(SMOOTHEST, ROUGHNESS[SMOOTHEST][START], NOISE_FACTORS[0] * noise, SLOPE_STDS[MIDDLE])
-    for orders in ((), ROUGHNESS):  # Other orders are tried once the other sizes are known.
-        data = [heights.weighted(weights), slopes.weighted(weights * certainty)]
-        found = _likeliest(data, sizes, orders, half, noise)
+    sizes = _Sizes(SMOOTHEST, ROUGHNESS[SMOOTHEST][START], noise, SLOPE_STDS[MIDDLE])
+    grids = {"roughness": ROUGHNESS[SMOOTHEST], "slope_std": SLOPE_STDS}
+    grids["noise"] = tuple(noise * factor for factor in NOISE_FACTORS)
+    data = [heights.weighted(weights), slopes.weighted(weights * certainty)]
+    for _ in range(PASSES):
+        found = _solved(data, sizes, half)
+        for name, grid in grids.items():
+            found = _climbed(data, found, name, grid, half)
         misses = np.abs(np.einsum("nk,nk->n", basis[0], found.coefficients()[knots]) - asked[0])
         weights, sizes = _student(misses, found.sizes.noise), found.sizes
-    found = _solved([heights.weighted(weights), slopes.weighted(weights * certainty)], sizes, half)
+        data = [heights.weighted(weights), slopes.weighted(weights * certainty)]
+        if sizes.noise == noise:
+            break  # Outlying contacts had no say in these sizes: they make the noise look larger.
+    # Both orders keep these deviations: intervals hold better than with smaller ones.
+    tried = [_roughened(data, sizes, order, half) for order in ROUGHNESS]
+    found = min(tried, key=lambda each: each.surprise)
     return Spline(found.coefficients().reshape(SIDE, SIDE), _stds(found.factor))
 
 
-def _likeliest(
-    data: list[_Equations], sizes: _Sizes, orders: Iterable[int], half: float, noise: float
-) -> _Solution:
-    """The likeliest solution that is found by one size after the other, then with other `orders`."""
-    noises = tuple(noise * factor for factor in NOISE_FACTORS)
-    best = _solved(data, sizes, half)
-    for name, grid in (("roughness", ROUGHNESS[sizes.order]), ("slope_std", SLOPE_STDS), ("noise", noises)):
-        best = _climbed(data, best, name, grid, half)
-    for order in orders:  # They keep both deviations: intervals hold better than with smaller ones.
-        if order != sizes.order:
-            first = _solved(data, best.sizes._replace(order=order, roughness=ROUGHNESS[order][START]), half)
-            tried = _climbed(data, first, "roughness", ROUGHNESS[order], half)
-            best = min(best, tried, key=lambda each: each.surprise)
-    return best
+def _roughened(data: list[_Equations], sizes: _Sizes, order: int, half: float) -> _Solution:
+    """The likeliest solution of an order with the deviations of `sizes`."""
+    grid = ROUGHNESS[order]
+    first = sizes.roughness if order == sizes.order else grid[START]
+    start = _solved(data, sizes._replace(order=order, roughness=first), half)
+    return _climbed(data, start, "roughness", grid, half)
 
 
 def _climbed(
