@@ -9,7 +9,6 @@ a cubic B-spline, which is C2 and off the patch by less than a tenth of its devi
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
-from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,18 +80,16 @@ class Charts:
 
     def _near(self, points: Array, room: float) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of places and patches that may be within reach, sorted by place, about CHUNK at once."""
-        from scipy.spatial import cKDTree
+        from scipy.spatial.distance import cdist
 
-        rows = max(1, CHUNK // 16)
+        rows, reaches = CHUNK // 16, self.reaches + room
         for start in range(0, max(len(points), 1), rows):
             some = points[start : start + rows]
-            reaches = self.reaches + room
-            lists = cKDTree(some).query_ball_point(self.origins, reaches) if len(some) else [[]]
-            counts = [len(near) for near in lists]
-            node = np.repeat(np.arange(len(lists)), counts)
-            place = np.fromiter(chain.from_iterable(lists), dtype=np.intp, count=sum(counts))
-            order = np.argsort(place, kind="stable")
-            yield start + place[order], node[order]
+            low, high = some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)
+            beside = self.origins - np.minimum(np.maximum(self.origins, low), high)
+            node = np.flatnonzero(np.einsum("ni,ni->n", beside, beside) < reaches**2)
+            place, which = np.nonzero(cdist(some, self.origins[node], "sqeuclidean") < reaches[node] ** 2)
+            yield start + place, node[which]
 
     def local(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Array:
         """Places in the frames of patches and in unit radius, (3, m)."""

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector, along, dot, scaled, vector_of
@@ -153,31 +152,48 @@ class Frontier:
     def beyond(self, places: Sequence[Place]) -> list[Next | None]:
         """The touch that goes on from each place, or None if it would bring nothing."""
         found: list[Next | None] = [None] * len(places)
+        middles = self._looked(places)
         for share in REACHES:
             left = [i for i, touch in enumerate(found) if touch is None]
-            if left:
-                self._feel([places[i] for i in left], share)
+            new = [places[i] for i in left if (places[i], share) in middles]
+            disks = self._uncovered([self.disk(place, share, middles[place, share]) for place in new])
+            for place, disk in zip(new, disks, strict=True):
+                place.felt[share] = disk
             for i in left:
                 found[i] = self._touch(places[i], share)
         return found
 
-    def _feel(self, places: Sequence[Place], share: float) -> None:
-        """Notes what is uncovered on the disk of each place; what patches cover stays covered."""
-        unfelt, none = [place for place in places if share not in place.felt], np.zeros((0, 2, 3))
-        ahead = [self.ahead(place, share * place.radius) for place in unfelt]
-        met = [contact for contact in ahead if contact is not None]
-        new = dict(zip(met, self._uncovered(np.array(met).reshape(-1, 2, 3)), strict=True))
-        for place, contact in zip(unfelt, ahead, strict=True):
-            place.felt[share] = self.disk(place, share, contact) if contact and new[contact] else none
-        disks = [place.felt[share] for place in places]
-        free = np.split(self._uncovered(np.concatenate(disks)), np.cumsum([len(disk) for disk in disks])[:-1])
-        for place, disk, which in zip(places, disks, free, strict=True):
-            place.felt[share] = disk[which & which[:1]]
+    def _looked(self, places: Sequence[Place]) -> dict[tuple[Place, float], Contact]:
+        """Notes what is still uncovered of the disks that were felt, and returns the middles of new ones.
 
-    def _uncovered(self, contacts: Array) -> NDArray[np.bool_]:
-        """Which of the contacts (k, 2, 3) no patch covers."""
+        These are uncovered contacts, by place and share.
+        """
+        asked, middles = {}, {}
+        for place in places:
+            for share in REACHES:
+                if share in place.felt:
+                    asked[place, share] = place.felt[share]
+                elif contact := self.ahead(place, share * place.radius):
+                    middles[place, share], asked[place, share] = contact, np.array([contact])
+                else:
+                    place.felt[share] = np.zeros((0, 2, 3))
+        for (place, share), disk in zip(asked, self._uncovered(list(asked.values())), strict=True):
+            if not len(disk) or (place, share) not in middles:
+                place.felt[share] = disk
+                middles.pop((place, share), None)
+        return middles
+
+    def _uncovered(self, disks: Sequence[Array]) -> list[Array]:
+        """What no patch covers of disks (k, 2, 3), each: nothing if one covers the first contact, the middle.
+
+        What patches cover stays covered.
+        """
         assert self.charts is not None
-        return ~covered(self.charts, contacts[:, 0], contacts[:, 1])
+        if not sum(map(len, disks)):
+            return list(disks)
+        points, normals = np.concatenate(disks).transpose(1, 0, 2)
+        free = np.split(~covered(self.charts, points, normals), np.cumsum([len(disk) for disk in disks])[:-1])
+        return [disk[which & which[:1]] for disk, which in zip(disks, free, strict=True)]
 
     def _touch(self, place: Place, share: float) -> Next | None:
         """The touch in the middle of what is uncovered on a disk that was felt, if it brings enough."""

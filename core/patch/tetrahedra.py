@@ -71,9 +71,9 @@ def crossed_twice(tetrahedra: Indices, points: Array, values: Array, normals: Ar
     ends = tetrahedra[:, list(combinations(range(4), 2))].reshape(-1, 2)
     a, b = ends.T
     some = np.flatnonzero((values[a] < 0.0) == (values[b] < 0.0))
+    some = some[np.einsum("ni,ni->n", normals[a[some]], normals[b[some]]) < TURN]
     lengths = np.linalg.norm(points[a[some]] - points[b[some]], axis=1)
     some = some[np.abs(values[a[some]]) + np.abs(values[b[some]]) < lengths]
-    some = some[np.einsum("ni,ni->n", normals[a[some]], normals[b[some]]) < TURN]
     return np.unique(np.sort(ends[some], axis=1), axis=0)
 
 
