@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..contours.finger import FACING
 from .charts import MARGIN, Charts, Pairs
 
 # python -m benchmarks.atlas judges these.
 OUTERMOST = 0.999  # Weights beyond this share of MARGIN are those there, so that none is 0.
 FLOOR = 1e-3  # No deviation below this share of the radius counts in a weight.
-# Cosines of 50 and 70 degrees: between these angles a patch fades out of a blend; beyond, it is another
-# wall's.
-AGREE, FACING = 0.64, 0.34
+# The cosine of 50 degrees: from there to FACING a patch fades out of a blend.
+AGREE = 0.64
 # Patches of one wall differ in distance by at most this share of the radius, and this share of the distance
 # more.
 LAYER, SLANT = 0.15, 0.5

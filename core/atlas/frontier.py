@@ -3,8 +3,7 @@
 """Where what was felt ends, and how a finger goes on from there.
 
 Patches cover an object when each place on their rims lies inside another patch, or a finger that goes on from
-there meets only what is covered, or nothing. The finger moves by rays alone: ahead, down, back and up, each
-from where the last one ended. So it bumps into walls and bends around edges.
+there meets only what is covered, or nothing.
 """
 
 import heapq
@@ -14,13 +13,14 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import Vector, along, dot, scaled, vector_of
-from ..contours.finger import DISK_PLACES, Surface, disk_around
+from ..contours.contour import Vector, vector_of
+from ..contours.finger import DISK_PLACES, Contact, Finger
 from ..reconstruction.result import Reconstruction
 from .charts import Charts
-from .field import FACING, INSIDE, covered
+from .field import INSIDE, covered
 from .join import charts_of
 
 # python -m benchmarks.atlas judges these.
@@ -31,12 +31,6 @@ SLIVER = 0.03  # The blend of patches bridges what is new if it is less than thi
 TRIES = 3  # Touches go on from a place at most so many times.
 LOOK = 15  # So many other places are looked at together with the first of the queue, which is faster.
 TOUCHES_APART = 2.2  # Touches that are made side by side are so many radii apart.
-LOW = 0.1  # The finger comes down on a place from at most this share of the radius above it.
-ABOVE = 0.6  # The finger is this share of the disk's radius above a contact when it feels around it.
-HAIR = 0.02  # The finger slides along the surface this share of the radius above it.
-
-Hit = tuple[Sequence[float], Sequence[float]]  # A point and a normal, as a surface answers.
-Contact = tuple[Vector, Vector]  # A point of the surface and its outward normal.
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +62,6 @@ class Next(NamedTuple):
 class Frontier:
     """The patches that were felt, and a queue of the places on their rims.
 
-    side : 1 if the surface's normals are on the side of the finger, -1 if they are on the other
     least : the least area that a touch has to bring
     left : places from which TRIES touches went on, so that no more do
 
@@ -76,8 +69,7 @@ class Frontier:
     measured again.
     """
 
-    surface: Surface
-    side: float
+    finger: Finger
     least: float = 0.0
     charts: Charts | None = None
     queue: list[tuple[float, int, Place]] = field(default_factory=list)
@@ -136,17 +128,20 @@ class Frontier:
         Patches that are not joined may be so far off at their rims that others seem not to cover these.
         """
         self.charts = charts
-        found = still_open([place for _, _, place in sorted(self.queue)], charts)
-        for place in still_open(self.left, charts):
-            yield
-            if self.beyond([replace(place, felt={})])[0] is not None:
-                found.append(place)
+        self._forget_covered()
+        found = [place for _, _, place in sorted(self.queue)]
+        for place in self.left:
+            if self._free(np.array([[place.point, place.normal]])):
+                yield
+                if self.beyond([replace(place, felt={})])[0] is not None:
+                    found.append(place)
         return found
 
     def _forget_covered(self) -> None:
         """Takes the places that patches now cover out of the queue."""
-        still = {id(place) for place in still_open([place for _, _, place in self.queue], self.charts)}
-        self.queue = [entry for entry in self.queue if id(entry[2]) in still]
+        places = np.array([(place.point, place.normal) for _, _, place in self.queue]).reshape(-1, 2, 3)
+        still = self._free(places)
+        self.queue = [entry for entry, free in zip(self.queue, still, strict=True) if free]
         heapq.heapify(self.queue)
 
     def beyond(self, places: Sequence[Place]) -> list[Next | None]:
@@ -156,8 +151,9 @@ class Frontier:
         for share in REACHES:
             left = [i for i, touch in enumerate(found) if touch is None]
             new = [places[i] for i in left if (places[i], share) in middles]
-            disks = self._uncovered([self.disk(place, share, middles[place, share]) for place in new])
-            for place, disk in zip(new, disks, strict=True):
+            wide = min(1.0, DISK_REACHES * share)
+            disks = [self.finger.disk(*middles[place, share], wide * place.radius) for place in new]
+            for place, disk in zip(new, self._uncovered(disks), strict=True):
                 place.felt[share] = disk
             for i in left:
                 found[i] = self._touch(places[i], share)
@@ -173,7 +169,9 @@ class Frontier:
             for share in REACHES:
                 if share in place.felt:
                     asked[place, share] = place.felt[share]
-                elif contact := self.ahead(place, share * place.radius):
+                elif contact := self.finger.ahead(
+                    place.point, place.normal, place.ahead, place.radius, share * place.radius
+                ):
                     middles[place, share], asked[place, share] = contact, np.array([contact])
                 else:
                     place.felt[share] = np.zeros((0, 2, 3))
@@ -188,12 +186,15 @@ class Frontier:
 
         What patches cover stays covered.
         """
-        assert self.charts is not None
-        if not sum(map(len, disks)):
-            return list(disks)
-        points, normals = np.concatenate(disks).transpose(1, 0, 2)
-        free = np.split(~covered(self.charts, points, normals), np.cumsum([len(disk) for disk in disks])[:-1])
+        if not disks:
+            return []
+        free = np.split(self._free(np.concatenate(disks)), np.cumsum([len(disk) for disk in disks])[:-1])
         return [disk[which & which[:1]] for disk, which in zip(disks, free, strict=True)]
+
+    def _free(self, contacts: Array) -> NDArray[np.bool_]:
+        """Which of the contacts (k, 2, 3) no patch covers."""
+        assert self.charts is not None
+        return ~covered(self.charts, contacts[:, 0], contacts[:, 1])
 
     def _touch(self, place: Place, share: float) -> Next | None:
         """The touch in the middle of what is uncovered on a disk that was felt, if it brings enough."""
@@ -203,57 +204,6 @@ class Frontier:
             return None
         point, outward = hits[_between(hits[:, 0], place.tried)]
         return Next(point, outward, area, place)
-
-    def felt(self, hit: Hit | None, way: Vector) -> Contact | None:
-        """The contact where a ray in this direction has hit, or None if it came from inside the object."""
-        if hit is None:
-            return None
-        normal = scaled(vector_of(hit[1]), self.side)
-        return (vector_of(hit[0]), normal) if dot(normal, way) < 0.0 else None
-
-    def ahead(self, place: Place, s: float) -> Contact | None:
-        """The first contact of a finger that goes s ahead from a place, then down, back and up."""
-        up, down, t = place.normal, scaled(place.normal, -1.0), place.ahead
-        height = min(s, LOW * place.radius)
-        for start in (0.0, -0.5 * s):  # The patch may end a little beyond its surface.
-            above = along(along(place.point, up, height), t, start)
-            found = self.felt(self.surface.ray_cast(above, down, 2.0 * height), down)
-            if found is not None:
-                break
-        else:
-            return None
-        at = along(found[0], up, HAIR * place.radius)
-        for way, length in ((t, s), (down, 1.5 * s), (scaled(t, -1.0), 2.5 * s), (up, 1.5 * s)):
-            hit = self.surface.ray_cast(at, way, length)
-            if hit is not None:
-                return self.felt(hit, way)
-            at = along(at, way, length)
-        return None
-
-    def disk(self, place: Place, share: float, contact: Contact) -> Array:
-        """The contact at a share of the radius ahead of a place, and those on a disk around it, (k, 2, 3).
-
-        Rays onto the disk measure how much surface there is.
-        """
-        point, normal = contact
-        radius, down = min(1.0, DISK_REACHES * share) * place.radius, scaled(normal, -1.0)
-        above = self.surface.ray_cast(along(point, normal, HAIR * radius), normal, ABOVE * radius)
-        height = ABOVE * radius if above is None else 0.5 * math.dist(point, above[0])
-        hits = [contact]
-        middle, far = along(point, normal, height), height + ABOVE * radius
-        for way in disk_around(normal):
-            felt = self.felt(self.surface.ray_cast(along(middle, way, radius), down, far), down)
-            if felt is not None and dot(felt[1], normal) > FACING:
-                hits.append(felt)
-        return np.array(hits)
-
-
-def still_open(places: Sequence[Place], charts: Charts | None) -> list[Place]:
-    """The places that no patch covers."""
-    if charts is None or not places:
-        return list(places)
-    points, normals = (np.array([getattr(p, name) for p in places]) for name in ("point", "normal"))
-    return [place for place, gone in zip(places, covered(charts, points, normals), strict=True) if not gone]
 
 
 def _between(points: Array, tried: Sequence[Vector]) -> int:

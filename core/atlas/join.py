@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Contour
+from ..contours.finger import FACING
 from ..patch.cubic_spline import SIDE, between
 from ..patch.smoothing_spline import smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
-from .field import FACING, LAYER, Blend, Felt, blended, least_of
+from .field import LAYER, Blend, Felt, blended, least_of
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.

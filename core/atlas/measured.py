@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from ..arguments import Array, list_of, number, unit_vector
 from ..contours.contour import Contour
+from ..contours.finger import FACING
 from ..exploration.side_by_side import result_of
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
-from .field import FACING
 from .join import charts_of
 from .object_atlas import Atlas
 

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number
+from ..contours.finger import FACING
 from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, blended_curvatures, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
-from .field import FACING, INSIDE, Felt, blended, nearest_feet
+from .field import INSIDE, Felt, blended, nearest_feet
 from .frontier import Place
 from .join import felt_by, told
 from .meshing import Mesh, meshed

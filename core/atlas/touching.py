@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import tangent_of, vector_of
-from ..contours.finger import Surface, first_contact
+from ..contours.finger import FACING, Finger, Surface, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.side_by_side import exploring
 from ..exploration.touches import explore
 from .charts import Charts
-from .field import FACING, covered
+from .field import covered
 from .frontier import Frontier
 from .join import Table, agreed, joined
 from .object_atlas import Atlas
@@ -120,7 +120,7 @@ class _Run:
         first = explore(self.surface, point, up, farthest=FIRST_EXTENT * self.tolerance, **self.wanted)
         p, n = vector_of(point), vector_of(up)
         side = first_contact(self.surface, p, n, tangent_of(n, None), first.step)[2]
-        self.frontier = Frontier(self.surface, side, np.pi * (NARROW * self.tolerance) ** 2)
+        self.frontier = Frontier(Finger(self.surface, side), np.pi * (NARROW * self.tolerance) ** 2)
         self.frontier.add(first.result)
         self.found, self.done = [first], 1
         return self.now(new=[first])

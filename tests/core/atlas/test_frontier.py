@@ -10,6 +10,7 @@ import pytest
 import core
 from core.atlas import touching
 from core.atlas.frontier import TRIES, Frontier
+from core.contours.finger import Finger
 from core.exploration.side_by_side import result_of
 from tests import solids
 
@@ -24,7 +25,7 @@ def first():
 
 @pytest.fixture
 def frontier(first):
-    found = Frontier(BALL, 1.0)
+    found = Frontier(Finger(BALL, 1.0))
     found.add(first)
     return found
 
@@ -53,7 +54,7 @@ def test_after_a_touch_in_vain_the_next_is_elsewhere(frontier):
 
 
 def test_nothing_goes_on_from_a_narrow_patch(first):
-    found = Frontier(BALL, 1.0)
+    found = Frontier(Finger(BALL, 1.0))
     found.add(first, goes_on=False)
     assert not found.queue
     assert len(found.charts.radii) == 1
@@ -72,7 +73,7 @@ def test_places_of_touches_in_vain_are_uncovered_where_the_object_goes_on(fronti
     frontier.queue = [(-1.0, 0, replace(place, tried=(place.point,) * TRIES))]
     assert result_of(frontier.taking(4)) == []
     assert len(result_of(frontier.uncovered(frontier.charts))) == 1
-    frontier.surface = Nothing()
+    frontier.finger = Finger(Nothing(), 1.0)
     assert result_of(frontier.uncovered(frontier.charts)) == []
 
 
