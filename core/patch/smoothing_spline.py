@@ -10,6 +10,7 @@ weigh as under a Student t distribution. Equations are banded, however many cont
 radius.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from math import comb
 from typing import Any, NamedTuple
@@ -26,7 +27,8 @@ from .monge import exponents, monomials
 ROUGHNESS = {2: (0.01, 0.03, 0.1, 0.3, 1.0, 3.0), 3: (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)}
 NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # The grid of the noise, in units of the least noise.
 SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # The grid of the normals' deviation, which facets have.
-SMOOTHEST, START, MIDDLE = 3, 3, 2  # The search begins at this order, and at these places of the grids.
+SMOOTHEST, ROUGHEST = 3, 2  # The search begins at the smoothest order.
+START, MIDDLE = 3, 2  # It begins at these places of the grids of roughness and of the normals' deviation.
 PASSES = 2  # If contacts are outlying, sizes are sought this often.
 CURVATURE_STD = 1.0  # The prior deviation of curvatures, twice that of coefficients of a quadric.
 FAR_OFF, STUDENT = 3.0, 4.0  # Outliers are off by more deviations, and weigh as under t of this freedom.
@@ -43,18 +45,22 @@ class Spline(NamedTuple):
 
 
 class _Equations(NamedTuple):
-    """Normal equations of data of unit deviation: the matrix's band, right side, sum of squares, number."""
+    """Normal equations of heights and slopes of unit deviation, and the prior's matrices.
 
-    band: Array
-    right: Array
-    square: float
-    size: float
+    bands : (4, SIDE^2 (WIDTH + 1)), those of matrices, column by column: of each order, heights, slopes
+    rights, squares, counts : (2, SIDE^2), (2,) and (2,), right sides, sums of squares and numbers of data
+    """
+
+    bands: Array
+    rights: Array
+    squares: Array
+    counts: Array
 
 
 class _Columns(NamedTuple):
     """Columns of n values each, of which normal equations are sums with the weights of n contacts.
 
-    bands, rights : sparse, ((WIDTH + 1) SIDE^2, n) and (SIDE^2, n), what each contact brings
+    bands, rights : sparse, (SIDE^2 (WIDTH + 1), n) and (SIDE^2, n), what each contact brings
     squares : (n,), sums over the columns; columns : their number
     """
 
@@ -62,12 +68,6 @@ class _Columns(NamedTuple):
     rights: Any
     squares: Array
     columns: int
-
-    def weighted(self, weights: Array) -> _Equations:
-        """The normal equations of contacts that count by weights (n,)."""
-        band = (self.bands @ weights).reshape(WIDTH + 1, SIDE**2)
-        square, size = float(weights @ self.squares), float(self.columns * np.count_nonzero(weights))
-        return _Equations(band, self.rights @ weights, square, size)
 
 
 class _Sizes(NamedTuple):
@@ -107,35 +107,36 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
     # A slope s has 1 + s^2 times the deviation.
     certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)
     sizes = _Sizes(SMOOTHEST, ROUGHNESS[SMOOTHEST][START], noise, SLOPE_STDS[MIDDLE])
-    grids = {"roughness": ROUGHNESS[SMOOTHEST], "slope_std": SLOPE_STDS}
+    grids = {"slope_std": SLOPE_STDS, "roughness": ROUGHNESS[SMOOTHEST]}
     grids["noise"] = tuple(noise * factor for factor in NOISE_FACTORS)
-    data = [heights.weighted(weights), slopes.weighted(weights * certainty)]
+    data = _equations([heights, slopes], [weights, weights * certainty])
     for _ in range(PASSES):
         found = _solved(data, sizes, half)
         for name, grid in grids.items():
             found = _climbed(data, found, name, grid, half)
         misses = np.abs(np.einsum("nk,nk->n", basis[0], found.coefficients()[knots]) - asked[0])
         weights, sizes = _student(misses, found.sizes.noise), found.sizes
-        data = [heights.weighted(weights), slopes.weighted(weights * certainty)]
+        data = _equations([heights, slopes], [weights, weights * certainty])
         if sizes.noise == noise:
             break  # Outlying contacts had no say in these sizes: they make the noise look larger.
-    # Both orders keep these deviations: intervals hold better than with smaller ones.
-    tried = [_roughened(data, sizes, order, half) for order in ROUGHNESS]
-    found = min(tried, key=lambda each: each.surprise)
+    # The other order keeps these deviations: intervals hold better than with smaller ones.
+    other = sizes._replace(order=ROUGHEST, roughness=ROUGHNESS[ROUGHEST][START])
+    rough = _climbed(data, _solved(data, other, half), "roughness", ROUGHNESS[ROUGHEST], half)
+    found = min(_solved(data, sizes, half), rough, key=lambda each: each.surprise)
     return Spline(found.coefficients().reshape(SIDE, SIDE), _stds(found.factor))
 
 
-def _roughened(data: list[_Equations], sizes: _Sizes, order: int, half: float) -> _Solution:
-    """The likeliest solution of an order with the deviations of `sizes`."""
-    grid = ROUGHNESS[order]
-    first = sizes.roughness if order == sizes.order else grid[START]
-    start = _solved(data, sizes._replace(order=order, roughness=first), half)
-    return _climbed(data, start, "roughness", grid, half)
+def _equations(columns: Sequence[_Columns], weights: Sequence[Array]) -> _Equations:
+    """The equations of heights and slopes that count by their weights (n,)."""
+    sums = [
+        (some.bands @ w, some.rights @ w, some.squares @ w, some.columns * np.count_nonzero(w))
+        for some, w in zip(columns, weights, strict=True)
+    ]
+    bands, *others = (np.array(values) for values in zip(*sums, strict=True))
+    return _Equations(np.vstack([*(_penalty(order)[0] for order in ROUGHNESS), bands]), *others)
 
 
-def _climbed(
-    data: list[_Equations], best: _Solution, name: str, grid: tuple[float, ...], half: float
-) -> _Solution:
+def _climbed(data: _Equations, best: _Solution, name: str, grid: tuple[float, ...], half: float) -> _Solution:
     """The likeliest solution that is found by steps of one size up or down its grid."""
     start = grid.index(getattr(best.sizes, name))
     for way in (grid[start + 1 :], grid[:start][::-1]):
@@ -151,24 +152,23 @@ def _climbed(
     return best
 
 
-def _solved(data: list[_Equations], sizes: _Sizes, half: float) -> _Solution:
+def _solved(data: _Equations, sizes: _Sizes, half: float) -> _Solution:
     from scipy.linalg import cholesky_banded
 
-    prior, log_determinant, log_free = _penalty(sizes.order)
+    _, log_determinant, log_free = _penalty(sizes.order)
     pitch, free = 2.0 * half / (SIDE - 1), sizes.order * (sizes.order + 1) // 2
     precision = pitch ** (2 - 2 * sizes.order) / sizes.roughness**2
-    matrix, right = prior * precision, np.zeros(SIDE**2)
     surprise = -log_determinant - (SIDE**2 - free) * np.log(precision)
     # What an order leaves free has a flat prior: for quadrics it is as high as the Gaussian of their
     # coefficients is at 0, so that both orders compare.
     surprise += 2.0 * (log_free + (free - 3) * np.log(0.5 * CURVATURE_STD * half**2))
-    for some, std in zip(data, (sizes.noise, sizes.slope_std), strict=True):
-        matrix += some.band / std**2
-        right += some.right / std**2
-        surprise += some.square / std**2 + 2.0 * some.size * np.log(std)
+    stds = np.array([sizes.noise, sizes.slope_std])
+    surprise += data.squares @ stds**-2.0 + 2.0 * data.counts @ np.log(stds)
+    priors = [precision if order == sizes.order else 0.0 for order in ROUGHNESS]
+    matrix = (np.array([*priors, *stds**-2.0]) @ data.bands).reshape(SIDE**2, WIDTH + 1).T
     matrix[0] += SPLINE_ROUNDING * matrix[0].max()
     factor = cholesky_banded(matrix, overwrite_ab=True, lower=True, check_finite=False)
-    halfway = _divided(factor, right, "N")
+    halfway = _divided(factor, stds**-2.0 @ data.rights, "N")
     surprise += 2.0 * np.log(factor[0]).sum() - halfway @ halfway
     return _Solution(float(surprise), sizes, factor, halfway)
 
@@ -187,14 +187,14 @@ def _columns(knots: Any, basis: Array, values: Array) -> _Columns:
 
     # A contact has 16 coefficients, so 136 pairs of them are in the band of the matrix's lower half.
     one, other = np.tril_indices(16)
-    diagonal = (knots[:, one] - knots[:, other]) * SIDE**2
+    rows = knots[:, other] * (WIDTH + 1) + knots[:, one] - knots[:, other]
     pairs = np.einsum("cnp,cnp->np", basis[:, :, one], basis[:, :, other])
     rights = np.einsum("cnk,cn->nk", basis, values)
     parts = []
-    for each, rows, size in ((pairs, diagonal + knots[:, other], WIDTH + 1), (rights, knots, 1)):
+    for each, at, size in ((pairs, rows, WIDTH + 1), (rights, knots, 1)):
         starts = np.arange(0, each.size + 1, each.shape[1])
         shape = size * SIDE**2, len(knots)
-        parts.append(csc_matrix((each.ravel(), rows.ravel(), starts), shape=shape))
+        parts.append(csc_matrix((each.ravel(), at.ravel(), starts), shape=shape))
     return _Columns(parts[0], parts[1], (values**2).sum(axis=0), len(basis))
 
 
@@ -242,9 +242,9 @@ def _penalty(order: int) -> tuple[Array, float, float]:
 
 
 def _band(matrix: Any) -> Array:
-    """The lower band of a sparse symmetric matrix, as LAPACK has it."""
+    """The lower band of a sparse symmetric matrix, column by column, (SIDE^2 (WIDTH + 1),)."""
     entries = matrix.tocoo()
     low = entries.row >= entries.col
-    band = np.zeros((WIDTH + 1, SIDE**2))
-    band[(entries.row - entries.col)[low], entries.col[low]] = entries.data[low]
-    return band
+    band = np.zeros((SIDE**2, WIDTH + 1))
+    band[entries.col[low], (entries.row - entries.col)[low]] = entries.data[low]
+    return band.ravel()
