@@ -32,6 +32,10 @@ ROUNDS = 2  # Patches are moved so often.
 MOVED = 0.03  # A place of a patch is moved by less than this share of the radius.
 ASKEW = 0.3  # The field contradicts a contact if it is off its tangent plane by this share of the way to it.
 SURE = 0.7  # A place that is off a contact's plane by this share of the way to it is surely on that side.
+UNEQUAL = (
+    0.25  # Where one end is nearer than this share of the next, only contacts tell how far a patch goes.
+)
+NEAR = 4  # Contacts tell so many azimuths to both sides of them.
 NEARER = 0.5  # A patch of the contact's wall is off that plane by at most this share of what the field is.
 
 Table = tuple[Array, float, Array, Array]  # Radii of the domain, half the side, coefficients, deviations.
@@ -146,7 +150,17 @@ def _joined_table(
     local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
     weights = 1.0 / np.maximum(off[on], 1.0) ** 2
     found = smoothing_spline(local, normals[place] @ r.frame.axes, weights, half, least)
-    return rim, half, *found
+    sure = r.domain.radii(AZIMUTHS, UNEQUAL) / r.radius  # The domain may bulge beyond a crease.
+    return np.maximum(sure, np.minimum(rim, _felt_to(local))), half, *found
+
+
+def _felt_to(local: Array) -> Array:
+    """How far out contacts (n, 3), in the frame of a patch and in unit radius, are near each azimuth."""
+    at = np.rint(np.arctan2(local[:, 1], local[:, 0]) * (AZIMUTHS / (2.0 * np.pi))).astype(np.intp)
+    out = np.zeros(AZIMUTHS)
+    np.maximum.at(out, at % AZIMUTHS, np.hypot(local[:, 0], local[:, 1]))
+    found: Array = np.max([np.roll(out, step) for step in range(-NEAR, NEAR + 1)], axis=0)
+    return found
 
 
 def agreed(charts: Charts) -> Joining:

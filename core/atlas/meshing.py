@@ -28,6 +28,7 @@ SHARES = np.array([0.2, 0.35, 0.5, 0.65, 0.8])  # A thin wall is looked for at t
 THIN, UNCERTAIN = 0.1, 2.0
 SPECK = 40  # Pieces of the mesh with fewer triangles are left out, except the largest.
 SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
+FAR, STEPS = 0.05, 3  # Vertices that were off by more edges are moved onto the surface again, so often.
 FIELD_AT_ONCE = 3000  # A step asks the field at so many places.
 MOST_CELLS = 20_000_000  # More sample points of one patch would not fit into memory.
 LEAST_DIVISOR = 1e-300  # No vector is divided by less.
@@ -82,14 +83,26 @@ def meshed(charts: Charts, felt: Felt, edge: float) -> Generator[float, None, Me
     share = field.distance[a] / (field.distance[a] - field.distance[b])
     share = np.clip(share, CLIP, 1.0 - CLIP)[:, None]
     vertices = (1.0 - share) * points[a] + share * points[b]
-    for done in (0.5, 0.75):
-        field = yield from _asked(charts, felt, vertices, 0.0, done)
-        step = np.clip(field.distance, -0.5 * size, 0.5 * size)
-        vertices = vertices - step[:, None] * field.normal
-        for _ in range(SMOOTHINGS if done == 0.5 else 0):
-            vertices = evened(vertices, field.normal, triangles)
-            yield done
+    field = yield from _onto(charts, felt, vertices, 0.5 * size)
+    for _ in range(SMOOTHINGS):
+        vertices = evened(vertices, field.normal, triangles)
+        yield 0.75
+    field = yield from _onto(charts, felt, vertices, 0.5 * size)
+    far = np.flatnonzero(np.abs(field.distance) > FAR * edge)
+    for _ in range(STEPS):
+        moved = vertices[far]
+        again = yield from _onto(charts, felt, moved, 0.5 * size)
+        for old, new in zip((vertices, *field), (moved, *again), strict=True):
+            old[far] = new
+        far = far[np.abs(again.distance) > FAR * edge]
     return _felt(vertices, triangles, field)
+
+
+def _onto(charts: Charts, felt: Felt, vertices: Array, most: float) -> Generator[float, None, Blend]:
+    """Moves vertices (k, 3) onto the surface, in place and by a length at most; returns the field before."""
+    field = yield from _asked(charts, felt, vertices, 0.0, 0.75)
+    vertices -= np.clip(field.distance, -most, most)[:, None] * field.normal
+    return field
 
 
 def _asked(

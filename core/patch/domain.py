@@ -152,11 +152,12 @@ class Domain:
         """The points (n, 2) that have these `places`."""
         return places * self._radius(np.arctan2(places[:, 1], places[:, 0]))[:, None]
 
-    def radii(self, count: int) -> Array:
+    def radii(self, count: int, unequal: float = 0.0) -> Array:
         """Radii (count,) of the boundary, at azimuths from 0 on, but nowhere beyond what is between the ends.
 
         Between ends at very different distances the spline swings out to where nothing was felt, and between
-        ends more than WIDE apart there is only what is inside the line from one to the other.
+        ends more than WIDE apart there is only what is inside the line from one to the other. This also holds
+        where one of them is nearer than the share `unequal` of the other's distance.
         """
         turns, whole = 2.0 * np.pi * np.arange(count) / count, 2.0 * np.pi
         at, out = np.arctan2(self.ends[:, 1], self.ends[:, 0]) % whole, np.hypot(*self.ends.T)
@@ -169,7 +170,10 @@ class Domain:
         before, after, last, following = turns - at[i - 1], at[i] - turns, out[i - 1], out[i]
         across = np.maximum(last * np.sin(before) + following * np.sin(after), SHORTEST * out.max())
         line = np.maximum(last * following * np.sin(before + after) / across, BRINK * out.max())
-        line = np.where(before + after > WIDE, line, np.inf)
+        apart = (before + after > WIDE) | (
+            np.minimum(last, following) < unequal * np.maximum(last, following)
+        )
+        line = np.where(apart, line, np.inf)
         return np.minimum(np.minimum(self._radius(turns), np.interp(turns, at, out)), line)
 
     def boundary(self, n: int) -> Array:

@@ -12,8 +12,10 @@ from scipy.spatial import cKDTree
 import core
 from core.atlas import join, meshing
 from core.atlas.boundaries import gaussian_curvature_of
-from core.atlas.charts import Charts
+from core.atlas.charts import AZIMUTHS, Charts
 from core.atlas.field import LAYER, Blend, Felt, blended
+from core.exploration.side_by_side import result_of
+from core.patch.domain import Domain
 from tests import solids
 
 RING = solids.ring(small=0.5)
@@ -105,6 +107,28 @@ def test_neighbors_agree_on_normals_and_bends_where_they_meet(ring):
     assert np.degrees(np.mean(np.concatenate([edge.angle for edge in ring.edges]))) < 0.5
     bends = np.hstack([ring.bends(edge)[0] for edge in ring.edges])
     assert np.abs(bends[0] - bends[1]).mean() < 0.2 * np.ptp(bends[0])
+
+
+def test_beside_a_short_end_only_contacts_tell_how_far_a_joined_patch_goes():
+    """A curve may end at a crease near the point; between it and the next one the domain bulges beyond."""
+    ball, degrees = solids.ball(), np.arange(-180, 180, 60)
+    touch = core.explore(ball, ball.start, ball.outward, farthest=0.3, rng=0)
+    origin, axes = touch.result.frame.origin, touch.result.frame.axes
+    out = touch.result.radius * np.where(degrees == 0, 0.05, 1.0)[:, None]
+    ends = out * np.column_stack([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    result = replace(touch.result, geometry=replace(touch.result.geometry, domain=Domain(ends)))
+    x, y = 0.45 * touch.result.radius * np.array([np.cos(np.radians(30)), np.sin(np.radians(30))])
+    felt = origin * np.sqrt(1.0 - x**2 - y**2) + axes[:, 0] * x + axes[:, 1] * y
+    more = core.Contour(felt[None], normals=felt[None])
+    charts, at, rims = join.charts_of([result]), AZIMUTHS * 30 // 360, []
+    for contours in (touch.contours, [*touch.contours, more]):
+        rims.append(result_of(join.joined([contours], [result], charts, 0.0, {})).rims[0])
+    assert charts.rims[0, at] > 0.4
+    assert rims[0][at] == pytest.approx(0.05 * np.sin(np.radians(60)) / (1.05 * 0.5))
+    assert rims[1][at] == pytest.approx(0.45)
+    assert (
+        rims[0][AZIMUTHS // 4 :][: AZIMUTHS // 2] == charts.rims[0, AZIMUTHS // 4 :][: AZIMUTHS // 2]
+    ).all()
 
 
 def test_deviations_of_bends_are_true_where_patches_meet(ball, ring):

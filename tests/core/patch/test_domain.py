@@ -174,3 +174,31 @@ def test_beside_no_brink_the_boundary_is_round():
     everywhere = closed_spline_domain(ends, 1.0, np.zeros(6, dtype=bool))
     assert everywhere.brinks is None
     assert (everywhere.boundary(99) == round_one.boundary(99)).all()
+
+
+def test_radii_are_nowhere_beyond_what_lies_between_the_ends():
+    turns = np.radians(np.arange(360))
+    for ends in (circle(SIXTH), UNEVEN, STUBBY):
+        domain = closed_spline_domain(ends, 1.0)
+        out, radii = np.hypot(*ends.T), domain.radii(360)
+        between = np.interp(turns, np.arctan2(ends[:, 1], ends[:, 0]), out, period=2.0 * np.pi)
+        assert (radii <= between + 1e-9).all()
+        assert (radii <= np.linalg.norm(domain.boundary(360), axis=1) + 1e-9).all()
+        at = np.round(np.degrees(np.arctan2(ends[:, 1], ends[:, 0]))).astype(int)
+        assert radii[at] == pytest.approx(out, rel=1e-3)
+
+
+def test_between_ends_far_apart_in_azimuth_radii_end_at_the_line():
+    radii = closed_spline_domain(circle([30, 150, 270]), 1.0).radii(360)
+    assert radii[[90, 210, 330]] == pytest.approx(0.5)
+    assert radii[[60, 120]] == pytest.approx(0.5 / np.cos(np.radians(30)))
+
+
+def test_between_unequal_ends_radii_end_at_the_line_if_asked():
+    ends = circle(SIXTH) * np.array([0.1, 1, 1, 1, 1, 1])[:, None]
+    domain = closed_spline_domain(ends, 1.0)
+    line = 0.1 * np.sin(np.radians(60)) / (1.1 * np.sin(np.radians(30)))
+    assert domain.radii(360, 0.2)[[30, 330]] == pytest.approx(line)
+    for unequal in (0.0, 0.05):
+        assert domain.radii(360, unequal)[30] == pytest.approx(np.linalg.norm(domain.boundary(360)[30]))
+    assert (domain.radii(360, 0.2)[61:300] == domain.radii(360)[61:300]).all()
