@@ -79,7 +79,7 @@ class Blend(NamedTuple):
 
 
 def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
-    """The field at places (k, 3); `room` is a length to which patches reach at least.
+    """The field at places (k, 3); `room` is a length to which patches reach at least from their feet.
 
     Beyond its rim a patch tells on which side of it a place is, if no other patch does. The deviation is inf
     there.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import Vector, vector_of
+from ..contours.contour import Vector, cross, dot, vector_of
 from ..contours.finger import DISK_PLACES, Contact, Finger
 from ..reconstruction.result import Reconstruction
 from .charts import Charts
@@ -30,6 +30,7 @@ DISK_REACHES = 3.0  # What is new is measured on a disk of so many reaches, at m
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
 TRIES = 3  # Touches go on from a place at most so many times.
 LOOK = 15  # So many other places are looked at together with the first of the queue, which is faster.
+ALONG = 0.9  # A direction is along another if the cosine of the angle between them is more.
 TOUCHES_APART = 2.2  # Touches that are made side by side are so many radii apart.
 
 
@@ -152,12 +153,17 @@ class Frontier:
             left = [i for i, touch in enumerate(found) if touch is None]
             new = [places[i] for i in left if (places[i], share) in middles]
             wide = min(1.0, DISK_REACHES * share)
-            disks = [self.finger.disk(*middles[place, share], wide * place.radius) for place in new]
+            disks = [self._disk(place, middles[place, share], wide * place.radius) for place in new]
             for place, disk in zip(new, self._uncovered(disks), strict=True):
                 place.felt[share] = disk
             for i in left:
                 found[i] = self._touch(places[i], share)
         return found
+
+    def _disk(self, place: Place, contact: Contact, radius: float) -> Array:
+        """What the finger feels around a contact beyond a place, (k, 2, 3)."""
+        rim = cross(place.normal, place.ahead)  # An edge along the rim leaves this across the normal.
+        return self.finger.disk(*contact, place.ahead if abs(dot(contact[1], rim)) > ALONG else rim, radius)
 
     def _looked(self, places: Sequence[Place]) -> dict[tuple[Place, float], Contact]:
         """Notes what is still uncovered of the disks that were felt, and returns the middles of new ones.

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..arguments import LARGEST, Array, shown
-from .contour import CREASE, NO_CONTACT, NOT_MONGE, Vector, along, cross, dot, scaled, tangent_of, vector_of
+from .contour import CREASE, NO_CONTACT, NOT_MONGE, Vector, along, cross, dot, scaled, tangent_of
 
 # benchmarks.refusals counts what these refuse.
 MAX_TURN = math.cos(math.radians(45.0))  # A sharper turn between two contacts is a crease to a finger.
@@ -81,21 +81,26 @@ def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float)
         )
         if hit is None:
             return None
-        try:
-            (x, y, z), (nx, ny, nz) = hit
-            # NaN fails every comparison, so it is refused, too.
-            sound = abs(x) + abs(y) + abs(z) <= LARGEST and abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-2
-        except (TypeError, ValueError, OverflowError):
-            sound = False
-        if not sound:
-            raise ValueError(f"surface: expected a point and its unit normal of ray_cast, got {shown(hit)}")
-        nx, ny, nz = side * nx, side * ny, side * nz
+        (x, y, z), (nx, ny, nz) = _contact(hit, side)
         dx, dy, dz = x - x0, y - y0, z - z0
         at = complex(dx * tx + dy * ty + dz * tz, dx * ux + dy * uy + dz * uz)
         up = complex(nx * tx + ny * ty + nz * tz, nx * ux + ny * uy + nz * uz)
         return at, up, (x, y, z), (nx, ny, nz)
 
     return cast
+
+
+def _contact(hit: _Hit, side: float) -> Contact:
+    """The point and `side` times the normal that a surface answered. Raises ValueError if these are none."""
+    try:
+        (x, y, z), (nx, ny, nz) = hit
+        # NaN fails every comparison, so it is refused, too.
+        sound = abs(x) + abs(y) + abs(z) <= LARGEST and abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-2
+    except (TypeError, ValueError, OverflowError):
+        sound = False
+    if not sound:
+        raise ValueError(f"surface: expected a point and its unit normal of ray_cast, got {shown(hit)}")
+    return (x, y, z), (side * nx, side * ny, side * nz)
 
 
 def contacts(
@@ -162,7 +167,10 @@ class Finger(NamedTuple):
     side: float
 
     def ahead(self, point: Vector, normal: Vector, t: Vector, radius: float, s: float) -> Contact | None:
-        """The first contact s ahead, along t, of a point on the rim of a patch, or around what is there."""
+        """The first contact of a finger that goes s ahead, along t, from a point, then down, back and up.
+
+        radius : that of the patch on whose rim the point lies
+        """
         down, height = scaled(normal, -1.0), min(s, LOW * radius)
         for start in (0.0, -0.5 * s):  # The patch may end a little beyond its surface.
             above = along(along(point, normal, height), t, start)
@@ -179,13 +187,16 @@ class Finger(NamedTuple):
             at = along(at, way, length)
         return None
 
-    def disk(self, point: Vector, normal: Vector, radius: float) -> Array:
-        """A contact and those on a disk around it, (k, 2, 3), which measure how much surface there is."""
+    def disk(self, point: Vector, normal: Vector, tangent: Vector, radius: float) -> Array:
+        """A contact and those on a disk around it, (k, 2, 3), which measure how much surface there is.
+
+        tangent : not along the normal; the disk's places are turned from it
+        """
         down, above = scaled(normal, -1.0), along(point, normal, HAIR * radius)
         roof = self.surface.ray_cast(above, normal, ABOVE * radius)
         height = ABOVE * radius if roof is None else 0.5 * math.dist(point, roof[0])
         hits, middle, far = [(point, normal)], along(point, normal, height), height + ABOVE * radius
-        for way in _disk_around(normal):
+        for way in _disk_around(normal, tangent):
             felt = self._felt(self.surface.ray_cast(along(middle, way, radius), down, far), down)
             if felt is not None and dot(felt[1], normal) > FACING:
                 hits.append(felt)
@@ -193,15 +204,13 @@ class Finger(NamedTuple):
 
     def _felt(self, hit: _Hit | None, way: Vector) -> Contact | None:
         """The contact where a ray in this direction has hit, or None if it came from inside the object."""
-        if hit is None:
-            return None
-        normal = scaled(vector_of(hit[1]), self.side)
-        return (vector_of(hit[0]), normal) if dot(normal, way) < 0.0 else None
+        found = None if hit is None else _contact(hit, self.side)
+        return None if found is None or dot(found[1], way) >= 0.0 else found
 
 
-def _disk_around(normal: Vector) -> list[Vector]:
+def _disk_around(normal: Vector, tangent: Vector) -> list[Vector]:
     """Places (DISK_PLACES, 3) spread evenly over the unit disk across a unit normal, as in a sunflower."""
-    e1, golden = tangent_of(normal, None), math.pi * (3.0 - math.sqrt(5.0))
+    e1, golden = tangent_of(normal, tangent), math.pi * (3.0 - math.sqrt(5.0))
     e2, found = cross(normal, e1), []
     for i in range(DISK_PLACES):
         out = math.sqrt((i + 0.5) / DISK_PLACES)

@@ -22,8 +22,9 @@ INSIDE_HULL = 0.05  # The origin is inside such a hull by at least this share of
 QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])  # It turns rows counterclockwise.
 # Ends this near to each other, as a share of the radius, count once; near the origin, not at all.
 SAME_END = 1e-3
-WIDE = 0.5 * np.pi  # If ends are farther apart in azimuth than this, one between them was at the origin.
-SHORTEST = 1e-6  # No length is divided by less than this share of the radius.
+# Ends of two or three curves are at most 90 degrees apart: if these are more, one between was at the origin.
+WIDE = np.radians(100.0)
+SHORTEST = 1e-6  # No length is divided by less than this share of the farthest end's distance.
 BRINK = 0.01  # Where the surface ends at the origin, the domain ends this share of the radius away.
 GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Means over the domain take so many Gauss points between ends, and outward.
 
