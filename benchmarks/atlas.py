@@ -13,9 +13,11 @@ Markdown tables:
     alone around which the object turns by less than 20 degrees, with their share; by how much the joined
     surface and the object turn from .001 on one side of an edge to .001 on the other; the share of points
     where K is alike within 90 %; and the topology of the mesh;
-(b) peers on the contacts of tolerance .001 with the same normals, each at the best of its settings, and the
+(b) at tolerance .001 the CPU seconds of 100 touches with join and mesh, beside those of 100 automatic touches
+    (explore_many with its defaults) at the same places in one batch;
+(c) peers on the contacts of tolerance .001 with the same normals, each at the best of its settings, and the
     atlas and Poisson where normals are off by ten degrees;
-(c) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of touching.
+(d) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of touching.
 
 `--memory` touches the lemon up to 1000 times and prints how much memory that took at most.
 """
@@ -30,6 +32,7 @@ import numpy as np
 import core
 from core.atlas.join import agreed, charts_of, joined, told
 from core.atlas.object_atlas import Atlas
+from core.atlas.touching import SIZE
 from core.exploration.side_by_side import result_of
 from tests import solids
 from tools import blender
@@ -259,7 +262,7 @@ def implicit_process(points, normals, at, length, offset=0.01, most=700):
 
 
 def peers(thing, found, some=""):
-    """Rows of the second table, of the peers with `some` in their names."""
+    """Rows of the third table, of the peers with `some` in their names."""
     points = np.vstack([c.points for e in found for c in e.contours])
     normals = np.vstack([c.normals for e in found for c in e.contours])
     points, first = np.unique(points, axis=0, return_index=True)
@@ -295,6 +298,15 @@ def peers(thing, found, some=""):
             yield [thing.name, name, ", ".join(map(str, best[2])), three(best[0]), f"{best[1]:.1f}"]
 
 
+def by_hundred(thing, found, seconds):
+    """A row of the second table; `seconds` are those of all touches that were found, with join and mesh."""
+    points, outward = zip(*((e.result.frame.origin, e.result.frame.axes[:, 2]) for e in found), strict=True)
+    start = process_time()
+    core.explore_many(thing, points, outward, noise=NOISE, rng=0)
+    each = 100.0 / len(found)
+    return [thing.name, f"{each * seconds:.2f}", f"{each * (process_time() - start):.2f}"]
+
+
 def spread(points, count):
     """Indices of `count` of the points, each the farthest from those before it."""
     found, nearest = [0], np.linalg.norm(points - points[0], axis=1)
@@ -305,9 +317,9 @@ def spread(points, count):
 
 
 def elsewhere(thing, which, where, tolerance):
-    """A row of the third table: touches at the random places with indices `which`; `where` names them."""
+    """A row of the fourth table: touches at the random places with indices `which`; `where` names them."""
     points, outward = thing.random[which, 0], thing.random[which, 1]
-    wanted = {"farthest": 0.3, "largest_std": 1.5 * tolerance, "noise": NOISE, "rng": 0}
+    wanted = {"farthest": 0.3, "largest_std": SIZE * tolerance, "noise": NOISE, "rng": 0}
     start = process_time()
     found = [e for e in core.explore_many(thing, points, outward, **wanted) if not isinstance(e, ValueError)]
     seconds = process_time() - start
@@ -322,7 +334,7 @@ def elsewhere(thing, which, where, tolerance):
 
 
 def compared(thing, found, cells, tolerance, some):
-    """Rows of the second and of the third table.
+    """Rows of the third and of the fourth table.
 
     If `some` names peers, there are only their rows, and only with the normals of the object as it is.
     """
@@ -392,14 +404,14 @@ def main():
     parser.add_argument("--only", default="", help="only objects with this in their names")
     parser.add_argument("--finest", type=float, default=min(TOLERANCES), help="tolerance (%(default)s)")
     parser.add_argument("--coarsest", type=float, default=max(TOLERANCES), help="tolerance (%(default)s)")
-    parser.add_argument("--peers", default="", help="only peers with this in their names, and not (c)")
+    parser.add_argument("--peers", default="", help="only peers with this in their names, and not (d)")
     parser.add_argument("--memory", action="store_true", help="print only the memory that 1000 touches take")
     options = parser.parse_args()
     if options.memory:
         print_memory()
         return
     names = [name for name in (*SCANS, "ring", "egg") if options.only in name]
-    rows, others, random, numbers = [], [], [], []
+    rows, hundreds, others, random, numbers = [], [], [], [], []
     for name in names:
         with blender.quiet():
             thing = Scanned(name) if name in SCANS else Exact(name)
@@ -408,6 +420,7 @@ def main():
             rows.append(cells)
             numbers.append(number)
             if tolerance == COMPARED:
+                hundreds.append(by_hundred(thing, found, number[3]))
                 lines = compared(thing, found, cells, tolerance, options.peers)
                 others += lines[0]
                 random += lines[1]
@@ -416,6 +429,7 @@ def main():
         [*head.split("|"), "angle at edges", "off creases", "turn", "K alike", "open edges / Euler / pieces"],
         rows,
     )
+    table(["object", "s for 100 touches, join, mesh", "s for 100 automatic touches"], hundreds)
     table(["object", "method", "setting", "mean / median / 95 %", "s"], others, left=3)
     if random:
         table(["object", "places", "touches", "% covered", "mean / median / 95 %", "s touch"], random, left=2)

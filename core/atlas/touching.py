@@ -24,7 +24,7 @@ from .object_atlas import Atlas
 # python -m benchmarks.atlas judges these.
 MOST = 1000  # There are at most so many touches, unless the caller says otherwise.
 FIRST_EXTENT = 300.0  # A half curve of the first touch is at most so many tolerances long.
-SIZE = 1.5  # A patch may have a mean deviation of so many tolerances before its neighbors are known.
+SIZE = 1.4  # A patch may have a mean deviation of so many tolerances before its neighbors are known.
 SMALL = 5.0  # Touches do not go on from a patch whose radius is below so many tolerances.
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only so many tolerances.
 SIDE_BY_SIDE = 8  # So many touches at once are faster, and still done in a tenth of a second.
