@@ -32,9 +32,7 @@ ROUNDS = 2  # Patches are moved so often.
 MOVED = 0.03  # A place of a patch is moved by less than this share of the radius.
 ASKEW = 0.3  # The field contradicts a contact if it is off its tangent plane by this share of the way to it.
 SURE = 0.7  # A place that is off a contact's plane by this share of the way to it is surely on that side.
-UNEQUAL = (
-    0.25  # Where one end is nearer than this share of the next, only contacts tell how far a patch goes.
-)
+UNEQUAL = 0.25  # Between ends whose distances differ by more, only contacts tell how far out a patch goes.
 NEAR = 4  # Contacts tell so many azimuths to both sides of them.
 NEARER = 0.5  # A patch of the contact's wall is off that plane by at most this share of what the field is.
 

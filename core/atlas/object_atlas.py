@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number
 from ..contours.finger import FACING
@@ -136,11 +136,11 @@ class Atlas:
         distance, std, near = field.distance.copy(), field.std.copy(), np.isfinite(field.std)
         far = np.flatnonzero(~near | (np.abs(distance) > CLOSE * self.charts.radii[field.node]))
         if len(far):
-            distance[far], std[far] = self._far(p[far], distance[far])
+            distance[far], std[far] = self._far(p[far], distance[far], near[far])
         return distance, std
 
-    def _far(self, points: Array, guess: Array) -> tuple[Array, Array]:
-        """Distances and deviations (n,) from the nearest feet, given a guess of the distances (n,)."""
+    def _far(self, points: Array, guess: Array, near: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Distances and deviations (n,) from the nearest feet; the field says `guess`, and whether it is near."""
         samples = self._samples
         nearest = samples.tree.query(points)[1]
         feet, field = nearest_feet(self.charts, points, samples.points[nearest])
@@ -149,8 +149,8 @@ class Atlas:
         # If the way to the foot is not along its normal, the foot is at an edge, or another is nearer.
         missed = np.minimum(away - np.abs(ahead), apart**2 / np.maximum(2.0 * away, 1e-300))
         std = np.where(np.isfinite(samples.stds[nearest]), np.hypot(field.std, missed), np.inf)
-        # At an edge the normal of one wall does not tell the side.
-        side = np.where(np.abs(ahead) > AHEAD * away, ahead, guess)
+        # At an edge the normal of one wall does not tell the side, and beyond it a patch may go on.
+        side = np.where(~near & (np.abs(ahead) > AHEAD * away), ahead, guess)
         return np.copysign(away, side), std
 
     @cached_property

@@ -142,3 +142,46 @@ def test_a_surface_finer_than_the_tolerance_ends():
     distance, std = atlas.distance(np.zeros((1, 3)))
     assert np.isfinite(distance).all()
     assert not np.isnan(std).any()
+
+
+class Inward:
+    """A solid whose normals point inward."""
+
+    def __init__(self, solid):
+        self.solid = solid
+
+    def ray_cast(self, origin, direction, distance):
+        hit = self.solid.ray_cast(origin, direction, distance)
+        return hit and (hit[0], tuple(-n for n in hit[1]))
+
+
+def test_inward_normals_tell_as_much_as_outward_ones():
+    solid = solids.ball()
+    found = [
+        core.explore_object(each, solid.start, solid.outward, tolerance=8e-3, noise=1e-3, rng=0)
+        for each in (solid, Inward(solid))
+    ]
+    one, other = (np.array([r.frame.origin for r in atlas.patches]) for atlas in found)
+    assert (one == other).all()
+    assert found[1].status == "ok"
+
+
+@pytest.mark.parametrize("most", [8, 15])
+def test_touches_again_of_uncertain_patches_count_toward_the_most(most):
+    """A tolerance of little more than the noise leaves patches uncertain."""
+    ring = solids.ring(small=0.5)
+    options = {"tolerance": 3.2e-3, "noise": 3e-3, "most": most, "rng": 0}
+    assert max(state.done for state in core.touch_all_over(ring, ring.start, ring.outward, **options)) == most
+
+
+def test_vertices_lie_on_a_thin_wall():
+    wall = solids.block(0.6, 0.5, 0.05)
+    atlas = core.explore_object(wall, wall.start, wall.outward, tolerance=1e-2, noise=2e-4, rng=0, most=300)
+    mesh = atlas.mesh(0.07)
+    off = np.abs(wall.distances(mesh.vertices))
+    assert off.mean() < 1e-4
+    assert np.percentile(off, 99) < 1e-3
+    a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
+    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    sides = sum(((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a)))
+    assert np.mean(4.0 * np.sqrt(3.0) * areas / sides) > 0.85  # An equilateral triangle has 1.

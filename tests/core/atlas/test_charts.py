@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What tables of patches say of places near them, against their patches and all pairs of both."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import core
+from core.atlas.charts import MARGIN
+from core.atlas.join import charts_of
+from core.patch.cubic_spline import SIDE
+from tests import solids
+
+BALL = solids.ball()
+
+
+@pytest.fixture(scope="module")
+def results():
+    ways = np.random.default_rng(0).normal(size=(12, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    return core.explore_many(BALL, ways, ways, farthest=0.5, rng=0)
+
+
+@pytest.fixture(scope="module")
+def charts(results):
+    return charts_of([e.result for e in results])
+
+
+def places(count, seed):
+    """Places around the unit ball, from half its radius inside to half outside."""
+    rng = np.random.default_rng(seed)
+    ways = rng.normal(size=(count, 3))
+    return ways / np.linalg.norm(ways, axis=1, keepdims=True) * rng.uniform(0.5, 1.5, (count, 1))
+
+
+@pytest.mark.parametrize("room", [0.0, 0.4])
+def test_pairs_are_those_of_each_place_and_each_patch_alone(charts, room):
+    points = places(4000, 1)  # They are more than one chunk.
+    found = charts.pairs(points, room)
+    one_by_one = []
+    for node in range(len(charts.radii)):
+        for start in range(0, len(points), 500):
+            pairs = charts.chosen([node]).pairs(points[start : start + 500], room)
+            one_by_one += [(start + at, node, d) for at, d in zip(pairs.place, pairs.distance, strict=True)]
+    together = list(zip(found.place.tolist(), found.node.tolist(), strict=True))
+    assert sorted(together) == sorted((at, node) for at, node, _ in one_by_one)
+    assert (np.diff(found.place) >= 0).all()
+    alone = {(at, node): d for at, node, d in one_by_one}
+    assert found.distance == pytest.approx([alone[pair] for pair in together], abs=1e-12)
+
+
+@pytest.mark.parametrize(("unit", "shift"), [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)])
+def test_pairs_are_the_same_in_other_units_and_far_away(charts, unit, shift):
+    points = places(500, 2)
+    moved = replace(charts, origins=unit * charts.origins + shift, radii=unit * charts.radii)
+    here, there = charts.pairs(points), moved.pairs(unit * points + shift)
+    assert (here.place == there.place).all() and (here.node == there.node).all()
+    assert there.distance == pytest.approx(unit * here.distance, abs=1e-8 * unit * max(1.0, shift))
+
+
+def test_no_places_have_no_pairs(charts):
+    assert len(charts.pairs(np.zeros((0, 3))).place) == 0
+
+
+def test_a_place_far_beside_the_normal_at_its_foot_has_no_foot():
+    """On a steep patch one step toward the foot may end far from it, where patches are wrong."""
+    result = core.explore(BALL, BALL.start, BALL.outward, farthest=1.2, rng=0).result
+    points = result.frame.origin + np.random.default_rng(3).uniform(-1.2, 1.2, (20_000, 3))
+    pairs = charts_of([result]).pairs(points)
+    assert len(pairs.place) > 5000
+    assert np.abs(pairs.distance - BALL.distances(points[pairs.place])).max() < 0.1 * result.radius
+    assert (pairs.share < MARGIN).all()
+
+
+def test_deviations_are_those_of_the_nearest_knots(charts):
+    rng, halves = np.random.default_rng(4), charts.halves[3]
+    stds = np.arange(12.0 * SIDE**2).reshape(-1, SIDE, SIDE)
+    x, y = rng.uniform(-0.9 * halves, 0.9 * halves, (2, 50))
+    found = replace(charts, stds=stds)._stds_at(x, y, np.full(50, 3))
+    line = np.linspace(-halves, halves, SIDE)
+    expected = [
+        stds[3, np.abs(line - a).argmin(), np.abs(line - b).argmin()] for a, b in zip(x, y, strict=True)
+    ]
+    assert found == pytest.approx(expected)
