@@ -140,7 +140,7 @@ class Atlas:
         return distance, std
 
     def _far(self, points: Array, guess: Array, near: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Distances and deviations (n,) from the nearest feet; the field says `guess`, and whether it is near."""
+        """Distances and deviations (n,) from the nearest feet; the field says a guess, and if it is near."""
         samples = self._samples
         nearest = samples.tree.query(points)[1]
         feet, field = nearest_feet(self.charts, points, samples.points[nearest])
