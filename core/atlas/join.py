@@ -157,7 +157,7 @@ def _felt_to(local: Array) -> Array:
     at = np.rint(np.arctan2(local[:, 1], local[:, 0]) * (AZIMUTHS / (2.0 * np.pi))).astype(np.intp)
     out = np.zeros(AZIMUTHS)
     np.maximum.at(out, at % AZIMUTHS, np.hypot(local[:, 0], local[:, 1]))
-    found: Array = np.max([np.roll(out, step) for step in range(-NEAR, NEAR + 1)], axis=0)
+    found: Array = np.maximum.reduce([np.roll(out, step) for step in range(-NEAR, NEAR + 1)])
     return found
 
 
