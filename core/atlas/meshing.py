@@ -30,6 +30,7 @@ SPECK = 40  # Pieces of the mesh with fewer triangles are left out, except the l
 SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
 FAR, STEPS = 0.05, 3  # Vertices that were off by more edges are moved onto the surface again, so often.
 FIELD_AT_ONCE = 3000  # A step asks the field at so many places.
+CELLS_AT_ONCE = 60_000  # A step looks for thin walls in so many tetrahedra.
 MOST_CELLS = 20_000_000  # More sample points of one patch would not fit into memory.
 LEAST_DIVISOR = 1e-300  # No vector is divided by less.
 
@@ -125,8 +126,12 @@ def _thin_walls(
     tetrahedra with points from number `new` on are looked at. Yields the share of the mesh that is done.
     """
     some = tetrahedra[(tetrahedra >= new).any(axis=1)]
-    edges = crossed_twice(some, points, field.distance, field.normal)
-    yield 0.5
+    parts = []
+    for start in range(0, max(len(some), 1), CELLS_AT_ONCE):
+        few = some[start : start + CELLS_AT_ONCE]
+        parts.append(crossed_twice(few, points, field.distance, field.normal))
+        yield 0.5
+    edges = np.unique(np.vstack(parts), axis=0)
     a, b = points[edges].transpose(1, 0, 2)[:, :, None]
     between = (a + SHARES[:, None] * (b - a)).reshape(-1, 3)
     found = yield from _asked(charts, felt, between, ROOM * CELL * edge, 0.5)

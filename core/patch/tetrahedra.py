@@ -62,8 +62,18 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
     flat = np.concatenate(corners).reshape(-1, 3)
     keys = _keys(flat)
     yield 0.0
-    _, first, index = np.unique(keys, return_index=True, return_inverse=True)
-    return flat[first], index.reshape(-1, 4)
+    few, different, index = np.array_split(keys, len(corners)), [], []
+    for some in few:
+        different.append(np.unique(some))
+        yield 0.0
+    known = np.unique(np.concatenate(different))
+    for some in few:
+        index.append(np.searchsorted(known, some))
+        yield 0.0
+    place = np.concatenate(index)
+    points = np.empty((len(known), 3), dtype=flat.dtype)
+    points[place] = flat
+    return points, place.reshape(-1, 4)
 
 
 def crossed_twice(tetrahedra: Indices, points: Array, values: Array, normals: Array) -> Indices:
