@@ -44,13 +44,13 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
     Yields 0 between its parts.
     """
     corners = []
-    keys = _keys(np.vstack([cells, cells.min(axis=0) - 1, cells.max(axis=0) + 1]))[:-2]
+    numbers = _keys(np.vstack([cells, cells.min(axis=0) - 1, cells.max(axis=0) + 1]))[:-2]
     across = cells.max(axis=0) - cells.min(axis=0) + 3
-    order = np.argsort(keys)
+    order = np.argsort(numbers)
     steps = (across[1] * across[2], across[2], 1)
     for axis in range(3):
-        at = np.searchsorted(keys[order], keys + steps[axis])
-        both = keys[order][np.minimum(at, len(keys) - 1)] == keys + steps[axis]
+        at = np.searchsorted(numbers[order], numbers + steps[axis])
+        both = numbers[order][np.minimum(at, len(numbers) - 1)] == numbers + steps[axis]
         center = 2 * cells[both] + 1
         ahead = np.eye(3, dtype=np.intp)[axis]
         e1, e2 = np.eye(3, dtype=np.intp)[[(axis + 1) % 3, (axis + 2) % 3]]
@@ -59,21 +59,18 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
             np.stack([center, center + 2 * ahead, face[k], face[(k + 1) % 4]], axis=1) for k in range(4)
         ]
     yield 0.0
-    flat = np.concatenate(corners).reshape(-1, 3)
-    keys = _keys(flat)
-    yield 0.0
-    few, different, index = np.array_split(keys, len(corners)), [], []
-    for some in few:
-        different.append(np.unique(some))
+    low = 2 * cells.min(axis=0)
+    shape, keys, different = tuple(2 * cells.max(axis=0) + 4 - low), [], []
+    for some in corners:
+        keys.append(np.ravel_multi_index(tuple((some - low).reshape(-1, 3).T), shape))
+        different.append(np.unique(keys[-1]))
         yield 0.0
-    known = np.unique(np.concatenate(different))
-    for some in few:
-        index.append(np.searchsorted(known, some))
+    known, index = np.unique(np.concatenate(different)), []
+    for each in keys:
+        index.append(np.searchsorted(known, each))
         yield 0.0
-    place = np.concatenate(index)
-    points = np.empty((len(known), 3), dtype=flat.dtype)
-    points[place] = flat
-    return points, place.reshape(-1, 4)
+    points: Indices = np.stack(np.unravel_index(known, shape), axis=1) + low
+    return points, np.concatenate(index).reshape(-1, 4)
 
 
 def crossed_twice(tetrahedra: Indices, points: Array, values: Array, normals: Array) -> Indices:
