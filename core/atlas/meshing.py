@@ -84,19 +84,28 @@ def meshed(charts: Charts, felt: Felt, edge: float) -> Generator[float, None, Me
     share = field.distance[a] / (field.distance[a] - field.distance[b])
     share = np.clip(share, CLIP, 1.0 - CLIP)[:, None]
     vertices = (1.0 - share) * points[a] + share * points[b]
-    field = yield from _onto(charts, felt, vertices, 0.5 * size)
+    vertices, field = yield from _settled(charts, felt, vertices, triangles, edge)
+    return _felt(vertices, triangles, field)
+
+
+def _settled(
+    charts: Charts, felt: Felt, vertices: Array, triangles: Indices, edge: float
+) -> Generator[float, None, tuple[Array, Blend]]:
+    """Vertices (k, 3) evened out on the surface, and the field there; yields the share that is done."""
+    most = 0.5 * CELL * edge
+    field = yield from _onto(charts, felt, vertices, most)
     for _ in range(SMOOTHINGS):
         vertices = evened(vertices, field.normal, triangles)
         yield 0.75
-    field = yield from _onto(charts, felt, vertices, 0.5 * size)
+    field = yield from _onto(charts, felt, vertices, most)
     far = np.flatnonzero(np.abs(field.distance) > FAR * edge)
     for _ in range(STEPS):
         moved = vertices[far]
-        again = yield from _onto(charts, felt, moved, 0.5 * size)
+        again = yield from _onto(charts, felt, moved, most)
         for old, new in zip((vertices, *field), (moved, *again), strict=True):
             old[far] = new
         far = far[np.abs(again.distance) > FAR * edge]
-    return _felt(vertices, triangles, field)
+    return vertices, field
 
 
 def _onto(charts: Charts, felt: Felt, vertices: Array, most: float) -> Generator[float, None, Blend]:

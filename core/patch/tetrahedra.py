@@ -32,10 +32,7 @@ def unique(rows: Indices) -> Indices:
 def _keys(rows: Indices) -> Indices:
     """A number (n,) for each of the rows (n, 3) of whole numbers, equal only for equal rows."""
     low = rows.min(axis=0)
-    across = rows.max(axis=0) - low + 1
-    off = rows - low
-    keys: Indices = (off[:, 0] * across[1] + off[:, 1]) * across[2] + off[:, 2]
-    return keys
+    return np.ravel_multi_index(tuple((rows - low).T), tuple(rows.max(axis=0) - low + 1))
 
 
 def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indices]]:
