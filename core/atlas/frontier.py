@@ -33,6 +33,10 @@ LOOK = 15  # So many other places are looked at together with the first of the q
 ALONG = 0.9  # A direction is along another if the cosine of the angle between them is more.
 TOUCHES_APART = 2.2  # Touches that are made side by side are so many radii apart.
 
+# Kernels of linear algebra round differently, which may not choose between what is equal but for rounding.
+TIE = 1e-6  # Distances within this share of the largest count as equal.
+GAIN_DIGITS = 9  # Gains are areas in the caller's unit, and equal if so many significant digits are.
+
 
 @dataclass(frozen=True, eq=False)
 class Place:
@@ -87,7 +91,7 @@ class Frontier:
     def push(self, place: Place, gain: float) -> None:
         """Queues a place by the area that a touch there may bring."""
         self.pushed += 1
-        heapq.heappush(self.queue, (-gain, self.pushed, place))
+        heapq.heappush(self.queue, (-_rounded(gain), self.pushed, place))
 
     def tried(self, touch: Next) -> None:
         """Queues the place of a touch again after the touch was made: something may be left beyond it."""
@@ -209,12 +213,27 @@ class Frontier:
         if area <= max(SLIVER * disk, self.least):
             return None
         point, outward = hits[_between(hits[:, 0], place.tried)]
-        return Next(point, outward, area, place)
+        return Next(point, outward, _rounded(area), place)
+
+
+def _rounded(gain: float) -> float:
+    """A gain without the digits that differ by rounding, both where it is compared and where it is queued."""
+    return float(f"{gain:.{GAIN_DIGITS - 1}e}")
 
 
 def _between(points: Array, tried: Sequence[Vector]) -> int:
     """The index of the point (n, 3) in the middle of all, or farthest from where touches were in vain."""
     if not tried:
-        return int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))
+        return middle_of(points)
     apart = points[:, None] - np.array(tried)
-    return int(np.argmax((apart**2).sum(axis=2).min(axis=1)))
+    return _first_least(-(apart**2).sum(axis=2).min(axis=1))
+
+
+def middle_of(points: Array) -> int:
+    """The index of the point (n, 3) that is nearest to the mean of all; two alone are equally near."""
+    return _first_least(((points - points.mean(axis=0)) ** 2).sum(axis=1))
+
+
+def _first_least(squares: Array) -> int:
+    """The first index of squared distances (n,), or of their negatives, that are least up to a tie."""
+    return int(np.argmax(squares <= squares.min() + TIE * np.abs(squares).max()))

@@ -17,7 +17,7 @@ from ..exploration.side_by_side import exploring
 from ..exploration.touches import explore
 from .charts import Charts
 from .field import covered
-from .frontier import Frontier
+from .frontier import Frontier, middle_of
 from .join import Table, agreed, joined
 from .object_atlas import Atlas
 
@@ -165,8 +165,8 @@ class _Run:
             points = np.vstack([contour.points for contour in self.found[i].contours])
             normals = np.vstack([contour.normals for contour in self.found[i].contours])  # type: ignore[misc]
             new = np.flatnonzero(~covered(others, points, normals))
-            off = ((points[new] - points[new].mean(axis=0)) ** 2).sum(axis=1) if len(new) else new
-            found.append((points[new[np.argmin(off)]], normals[new[np.argmin(off)]]) if len(new) else None)
+            middle = new[middle_of(points[new])] if len(new) else None
+            found.append(None if middle is None else (points[middle], normals[middle]))
         return found
 
 

@@ -15,6 +15,16 @@ def explored(solid, **options):
     return core.explore_object(solid, solid.start, solid.outward, rng=0, **{"tolerance": 8e-3} | options)
 
 
+@pytest.mark.parametrize("rounding", [1e-13, -3e-13])
+def test_rounding_chooses_no_touch(rounding):
+    """Beyond an edge two contacts are equally far from their mean, and many places bring as much."""
+    solid = solids.block(0.6, 0.5, 0.4)
+    starts = [np.add(solid.start, (tiny, 0.7 * tiny, 0.0)) for tiny in (0.0, rounding)]
+    found = [core.explore_object(solid, p, solid.outward, tolerance=0.02, most=20, rng=0) for p in starts]
+    one, other = (np.array([r.frame.origin for r in atlas.patches]) for atlas in found)
+    assert one == pytest.approx(other, abs=1e-9)
+
+
 class Outlying:
     """A solid that every tenth ray meets beside its surface."""
 

@@ -9,7 +9,7 @@ import pytest
 
 import core
 from core.atlas import touching
-from core.atlas.frontier import TRIES, Frontier
+from core.atlas.frontier import TRIES, Frontier, _between
 from core.contours.finger import Finger
 from core.exploration.side_by_side import result_of
 from tests import solids
@@ -51,6 +51,26 @@ def test_after_a_touch_in_vain_the_next_is_elsewhere(frontier):
     (other,) = frontier.beyond([again])
     assert other.gain == touch.gain
     assert np.linalg.norm(other.point - touch.point) > 0.2 * place.radius
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("rounding", [1e-12, -1e-12])
+def test_of_contacts_that_are_equally_far_but_for_rounding_the_first_is_next(unit, rounding):
+    """Here these are two with any mean, and two on either side of a touch in vain."""
+    two = unit * np.array([[-1.0, 0.0, 0.0], [1.0 + rounding, 0.0, 0.0]])
+    nearer = unit * np.array([[0.0, 0.5, 0.0]])
+    assert _between(two, ()) == 0
+    assert _between(np.vstack([nearer, two]), [(0.0, 0.0, 0.0)]) == 1
+    assert _between(np.vstack([two, nearer]), ()) == 2
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_of_places_that_bring_as_much_but_for_rounding_the_first_is_next(frontier, unit):
+    places = [place for _, _, place in frontier.queue[:3]]
+    frontier.queue = []
+    for place, times in zip(places, (1.0, 1.0 + 1e-12, 1.0 + 1e-6), strict=True):
+        frontier.push(place, unit * times * np.pi / 3.0)
+    assert [place for _, _, place in sorted(frontier.queue)] == [places[2], *places[:2]]
 
 
 def test_nothing_goes_on_from_a_narrow_patch(first):
