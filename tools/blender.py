@@ -6,6 +6,7 @@ Import this module before bpy, because bpy reads once, on import, where the fold
 this module replaces that by a folder of the project's.
 """
 
+import atexit
 import importlib
 import os
 import sys
@@ -16,6 +17,15 @@ BUILD = Path(__file__).resolve().parents[1] / "build"
 # Tests that run beside each other each have their own Blender.
 RESOURCES = BUILD / ("blender-{}.{}".format(*sys.version_info) + os.environ.get("PYTEST_XDIST_WORKER", ""))
 os.environ["BLENDER_USER_RESOURCES"] = str(RESOURCES)
+
+
+@atexit.register
+def _end_silently():
+    """Drops what Blender's libraries print of their memory when a process is over, after all its results."""
+    if "bpy" in sys.modules:
+        sys.stderr.flush()
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
 
 
 @contextmanager

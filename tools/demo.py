@@ -25,14 +25,20 @@ def main():
     parser.add_argument("--zip", required=True, type=Path, help="the built extension")
     parser.add_argument("--mesh", default="", help="a mesh file (Suzanne)")
     options = parser.parse_args()
+    print("starting Blender with the extension ...", flush=True)
     extension = blender.start(options.zip)
     import bpy
 
     try:
+        print(f"touching {options.mesh or 'Suzanne'} ...", flush=True)
         with blender.quiet():
             patch = touch(extension, options.mesh)
+        print("saving the scene ...", flush=True)
+        with blender.quiet():
             compose(extension, patch, "unit" if options.mesh else "m")
             bpy.ops.wm.save_as_mainfile(filepath=str(blender.BUILD / "demo.blend"))
+        print(f"rendering a picture of {WIDTH} x {HEIGHT} pixels on the processor ...", flush=True)
+        with blender.quiet():
             render(patch, blender.BUILD / "demo.png")
     except (RuntimeError, OSError) as error:
         sys.exit(f"demo: {str(error).strip()}")
