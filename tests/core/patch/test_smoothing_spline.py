@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from core.patch import smoothing_spline as splines
 from core.patch.cubic_spline import SIDE, bases, between
@@ -97,7 +98,11 @@ def test_normals_help_as_far_as_they_are_true():
 
 
 def dense_surprise(contacts, order, roughness, noise):
-    """-2 log marginal likelihood of heights, less a constant, by dense matrices; planes are nearly free."""
+    """-2 log marginal likelihood of heights, less a constant, by dense matrices; planes are nearly free.
+
+    Sums over all knots go without numpy's BLAS: OpenBLAS 0.3.34 overflows its stack there where a kernel
+    without AVX-512 is asked for on a processor of AMD that has it (OpenMathLib/OpenBLAS#6021).
+    """
     knots, basis = bases(contacts[:, 0], contacts[:, 1], HALF)
     rows = np.zeros((len(contacts), SIDE**2))
     np.add.at(rows, (np.arange(len(contacts))[:, None], knots), basis[0])
@@ -106,14 +111,15 @@ def dense_surprise(contacts, order, roughness, noise):
     for i, diagonal in enumerate(band.T):
         penalty += np.diag(diagonal[: SIDE**2 - i], -i)
     penalty += np.tril(penalty, -1).T
-    values, vectors = np.linalg.eigh(penalty)
+    values, vectors = eigh(penalty)
     free = order * (order + 1) // 2
     scales = roughness * pitch ** (order - 1) / np.sqrt(values[free:])
     x, y = HALF * np.array(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, SIDE)], indexing="ij")).reshape(2, -1)
     planes = 1e3 * np.array([np.ones(len(x)), x, y])
     quadrics = 0.5 * splines.CURVATURE_STD * np.array([x**2, x * y, y**2][: free - 3]).reshape(-1, len(x))
-    roots = rows @ np.column_stack([scales * vectors[:, free:], planes.T, quadrics.T])
-    covariance = roots @ roots.T + noise**2 * np.eye(len(contacts))
+    modes = np.column_stack([scales * vectors[:, free:], planes.T, quadrics.T])
+    roots = np.einsum("ik,kj->ij", rows, modes)
+    covariance = np.einsum("ik,jk->ij", roots, roots) + noise**2 * np.eye(len(contacts))
     return np.linalg.slogdet(covariance)[1] + contacts[:, 2] @ np.linalg.solve(covariance, contacts[:, 2])
 
 
