@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-HAIR = 1e-12
+HAIR = 1e-12  # Distances below this share of the coordinates are rounding.
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,13 @@ class Solid:
     def ray_cast(self, origin, direction, distance):
         (x, y, z), (a, b, c), f = origin, direction, self.distance
         gone, side = 0.0, math.copysign(1.0, f(x, y, z))
+        hair = HAIR * max(1.0, abs(x) + abs(y) + abs(z))
         while gone <= distance:
             step = side * f(x + gone * a, y + gone * b, z + gone * c)
-            if step < HAIR and gone > 0.0:
+            if step < hair and gone > 0.0:
                 point = x + gone * a, y + gone * b, z + gone * c
                 return point, self.normal(*point)
-            gone += max(step, HAIR)
+            gone += max(step, hair)
         return None
 
     def normal(self, x, y, z, h=1e-6):

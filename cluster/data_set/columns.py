@@ -75,10 +75,20 @@ INTEGERS = pa.list_(pa.int32())
 FOUND = (
     ("tolerance", NUMBER, LENGTH, "standard deviation to reach for the height of each patch"),
     ("uncovered", pa.int64(), "", "number of places on rims beyond which the object goes on unfelt"),
-    ("is_closed", pa.bool_(), "", "whether the surface is closed all round"),
+    ("is_closed", pa.bool_(), "", "whether the surface is closed all round, with no rim left"),
     ("height_std", NUMBER, LENGTH, "standard deviation of the surface, mean over its vertices"),
-    ("deviation_mean", NUMBER, LENGTH, "mean distance from the surface's vertices to the mesh"),
-    ("deviation_max", NUMBER, LENGTH, "largest distance from the surface's vertices to the mesh"),
+    (
+        "deviation_mean",
+        NUMBER,
+        LENGTH,
+        "mean distance of the surface from the mesh and of the mesh from the surface",
+    ),
+    (
+        "deviation_max",
+        NUMBER,
+        LENGTH,
+        "largest distance of the surface from the mesh or of the mesh from the surface",
+    ),
 )
 SURFACES = (
     *TOUCHES[:2],

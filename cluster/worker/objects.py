@@ -30,9 +30,9 @@ class Touchable:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
         self.obj = obj
-        evaluated, linear, self.offset = evaluated_mesh.evaluated_object(obj, depsgraph)
+        _, _, self.offset = evaluated_mesh.evaluated_object(obj, depsgraph)
         self.surface = detached_mesh.DetachedMesh(obj, depsgraph)
-        self.points, self.triangles = self.surface.points, _triangles(evaluated.data, linear)
+        self.points, self.triangles = self.surface.points, self.surface.triangles
         shape = (self.points, self.triangles, self.offset)
         units = bpy.context.scene.unit_settings
         self.facts = {
@@ -82,11 +82,3 @@ def _facts(obj: Any, path: str) -> dict[str, Any]:
 
 def _name_of(obj: Any, path: str) -> str:
     return obj.name if Path(path).suffix.lower() in SCENES else Path(path).stem
-
-
-def _triangles(mesh: Any, linear: Any) -> Any:
-    """The triangles (m, 3) of a mesh, counterclockwise from outside after the transform `linear`."""
-    mesh.calc_loop_triangles()
-    found = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", found.ravel())
-    return found[:, ::-1] if np.linalg.det(linear) < 0.0 else found

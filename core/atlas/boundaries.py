@@ -158,7 +158,8 @@ def _crossings(charts: Charts, node: int) -> _Crossing:
     others = np.where(wall & ~own, weights, 0.0)
     which = least_of(pairs.place, -others, len(points))
     best = np.append(others, 0.0)[which]
-    ratio = np.log(np.maximum(best, 1e-300) / np.maximum(mine, 1e-300)).reshape(RAYS, RAY_PLACES)
+    ratio = np.log(np.maximum(best, 1e-300)) - np.log(np.maximum(mine, 1e-300))
+    ratio = ratio.reshape(RAYS, RAY_PLACES)
     lost = ratio > 0.0
     ray = np.flatnonzero(lost.any(axis=1))
     at = lost[ray].argmax(axis=1)

@@ -67,22 +67,23 @@ class Charts:
     stds: Array
     rims: Array
 
-    @cached_property
-    def reaches(self) -> Array:
-        """The largest distance (n,) from its origin at which each patch is asked."""
-        flat: Array = MARGIN * self.rims.max(axis=1)
-        return self.radii * np.hypot(flat, np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5) + REACH)
+    def pairs(self, points: Array, near: float = np.inf, margin: float = MARGIN) -> Pairs:
+        """What patches say of places (k, 3) within the length `near`, and within REACH, of them.
 
-    def pairs(self, points: Array, room: float = 0.0) -> Pairs:
-        """What patches say of places (k, 3) that are within REACH, or within the length `room`, of them."""
-        found = [self._pairs_at(points, room, *some) for some in self._near(points, room)]
+        margin : how far out a patch counts, as a share of its domain's radius
+        """
+        reach = np.minimum(REACH, near / self.radii)
+        found = [self._pairs_at(points, reach, margin, *some) for some in self._near(points, reach, margin)]
         return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
-    def _near(self, points: Array, room: float) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    def _near(
+        self, points: Array, reach: Array, margin: float
+    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of places and patches that may be within reach, sorted by place, about CHUNK at once."""
         from scipy.spatial.distance import cdist
 
-        rows, reaches = CHUNK // 16, self.reaches + room
+        across, along = self._extents
+        rows, reaches = CHUNK // 16, self.radii * np.hypot(margin * across, along + reach)
         for start in range(0, max(len(points), 1), rows):
             some = points[start : start + rows]
             low, high = some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)
@@ -90,6 +91,11 @@ class Charts:
             node = np.flatnonzero(np.einsum("ni,ni->n", beside, beside) < reaches**2)
             place, which = np.nonzero(cdist(some, self.origins[node], "sqeuclidean") < reaches[node] ** 2)
             yield start + place, node[which]
+
+    @cached_property
+    def _extents(self) -> Array:
+        """How far patches go across and along their normals, (2, n), in unit radius."""
+        return np.array([self.rims.max(axis=1), np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5)])
 
     def local(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Array:
         """Places in the frames of patches and in unit radius, (3, m)."""
@@ -118,19 +124,27 @@ class Charts:
         around = np.arange(-1, AZIMUTHS + 3) - AZIMUTHS // 2
         return np.take(self.rims, around, axis=1, mode="wrap").ravel()
 
-    def _pairs_at(self, points: Array, room: float, place: NDArray[np.intp], node: NDArray[np.intp]) -> Pairs:
-        """Those of these pairs that are within reach, measured from the tangent plane at each foot."""
+    def _pairs_at(
+        self,
+        points: Array,
+        reach: Array,
+        margin: float,
+        place: NDArray[np.intp],
+        node: NDArray[np.intp],
+    ) -> Pairs:
+        """Those of these pairs that are within reach (n,), measured from the tangent plane at each foot."""
         x, y, z = self.local(points, place, node)
-        reach = np.maximum(REACH, room / self.radii)
-        near = x * x + y * y < (((MARGIN + reach) * self.rims.max(axis=1)) ** 2)[node]
-        which = np.flatnonzero(near & (np.abs(z) < (1.5 + reach)[node]))
-        which = which[self.shares(x[which], y[which], node[which]) < (MARGIN + reach)[node[which]]]
+        across, along = self._extents
+        across, along = margin * across + reach, along + reach
+        which = np.flatnonzero((x * x + y * y < across[node] ** 2) & (np.abs(z) < along[node]))
+        which = which[self.shares(x[which], y[which], node[which]) < (margin + reach)[node[which]]]
         place, node, (x, y, z) = place[which], node[which], np.array([x, y, z])[:, which]
         h, hx, hy = self._heights(x, y, node)
         off = (z - h) / (1.0 + hx**2 + hy**2)
         foot_x, foot_y = x + off * hx, y + off * hy
         share = self.shares(foot_x, foot_y, node)
-        inside = (share < np.maximum(MARGIN, 1.0 + room / self.radii)[node]) & (np.abs(off) < reach[node])
+        # The foot of a place on a slope is nearer than the surface below it.
+        inside = (share < margin) & (np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[node])
         which = np.flatnonzero(inside)
         place, node, share = place[which], node[which], share[which]
         x, y, z, foot_x, foot_y = np.array([x, y, z, foot_x, foot_y])[:, which]
@@ -138,10 +152,10 @@ class Charts:
         steep, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[node]
         distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * steep
         aside = (x - foot_x) ** 2 + (y - foot_y) ** 2 + (z - h) ** 2 - distance**2
-        std = self._stds_at(foot_x, foot_y, node) * steep
+        std = self.stds_at(foot_x, foot_y, node) * steep
         normal = self._turned(node, np.array([-hx * steep, -hy * steep, steep]))
         pairs = Pairs(place, node, share, distance * radius, normal, std * radius)
-        return pairs.chosen(aside < ASIDE**2)
+        return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[node]))
 
     def _turned(self, node: NDArray[np.intp], local: Array) -> Array:
         """Directions (3, m) in the frames of patches, as the caller sees them, (m, 3)."""
@@ -164,7 +178,7 @@ class Charts:
             ]
         )
 
-    def _stds_at(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
+    def stds_at(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
         """Deviations (m,) of the heights at local (x, y), which are those of the nearest knots."""
         pitch = (2.0 * self.halves / (SIDE - 1))[node]
         nearest = np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp)
@@ -214,13 +228,18 @@ class Charts:
             *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
         )
 
+    def rim_at(self, azimuths: NDArray[np.intp]) -> Array:
+        """Local x and y (2, k) of the first patch's rim, at some of its AZIMUTHS."""
+        turns = 2.0 * np.pi * azimuths / AZIMUTHS
+        found: Array = self.rims[0, azimuths] * np.stack([np.cos(turns), np.sin(turns)])
+        return found
+
     def rim(self, count: int, out: float) -> tuple[Array, Array, Array]:
         """Points around the first patch at the share `out` of its domain's radius, (count, 3).
 
         Also the normals there, and the tangents that point outward, (count, 3) each.
         """
-        turns = 2.0 * np.pi * np.arange(count) / count
-        xy = out * self.rims[0, :: AZIMUTHS // count, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        xy = out * self.rim_at(np.arange(0, AZIMUTHS, AZIMUTHS // count)).T
         points, normals = self.world(np.zeros(count, dtype=np.intp), *xy.T)
         ahead = (xy / np.linalg.norm(xy, axis=1, keepdims=True)) @ self.axes[0, :, :2].T
         ahead -= np.einsum("ki,ki->k", ahead, normals)[:, None] * normals

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One surface of many patches: a partition of unity of their signed distances, and its deviation.
+"""The surface of many patches near a place: walls, and the creases where these meet.
 
-Beside the paper. At each place only patches that face one way are blended. Others belong to another wall: if
-two walls face away from each other, the inside is where both say so (a crease, a thin wall); if they face
-each other, where either does (a valley, a gap). Weights are those of Ohtake et al. 2003 over each patch's
-variance.
+Beside the paper. Which way the surface faces follows from the indicator of the whole object. Patches that
+face much alike are one wall: a partition of unity with the weights of Ohtake et al. 2003 over each patch's
+variance. Where walls meet, the inside is in both (a convex crease) or in either (a concave one), as the
+indicator has it on both sides of the crease.
 """
 
 from typing import Any, NamedTuple
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..contours.finger import FACING
 from .charts import MARGIN, Charts, Pairs
+from .indicator import Indicator
 
 # python -m benchmarks.atlas judges these.
 OUTERMOST = 0.999  # Weights beyond this share of MARGIN are those there, so that none is 0.
@@ -26,46 +27,15 @@ AGREE = 0.64
 # more.
 LAYER, SLANT = 0.15, 0.5
 INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
-WALLS = 3  # At most so many walls are told apart at a place.
-WELL_INSIDE = 0.8  # What is within this share of a domain's radius is surely on the patch.
-FOOT_STEPS = 6  # The nearest point of the surface is found in so many steps at most.
-NEGLIGIBLE = 0.1  # No step is taken that would change the distance by less than this share of its deviation.
-NEIGHBORS = 8  # Where no patch reaches, so many contacts tell of the surface.
-
-
-class Felt(NamedTuple):
-    """n contacts, the normals of their patches there, the indices of these patches, and a KD-tree of points.
-
-    points, normals : (n, 3); node : (n,)
-    """
-
-    points: Array
-    normals: Array
-    node: NDArray[np.intp]
-    tree: Any
-
-    def told_alone(self, points: Array) -> tuple[Array, Array]:
-        """Signed distances (k,) of places (k, 3) and gradients (k, 3), by the contacts nearest to them alone.
-
-        It is that of the nearest one's tangent plane, and where the surface turns of others': the inside is
-        in both where their normals part (a crease), in either where they meet (a valley).
-        """
-        nearest = self.tree.query(points, NEIGHBORS)[1]
-        feet, normals = self.points[nearest], self.normals[nearest]
-        planes = np.einsum("kci,kci->kc", points[:, None] - feet, normals)
-        distance, normal = planes[:, 0].copy(), normals[:, 0].copy()
-        turned = np.einsum("kci,ki->kc", normals, normal) < AGREE
-        parts = np.einsum("kci,kci->kc", normals - normal[:, None], feet - feet[:, :1]) > 0.0
-        for plane, up, turns, convex in zip(
-            planes.T, normals.transpose(1, 0, 2), turned.T, parts.T, strict=True
-        ):
-            takes = turns & ((plane > distance) == convex)
-            distance[takes], normal[takes] = plane[takes], up[takes]
-        return distance, normal
+SIDEWAYS = 0.15  # A patch faces as the indicator does if the cosine between their normals is more.
+CONTINUED = 1.6  # Where no patch is, those count that can be continued by this factor of their radius.
+FARTHEST = 5.0  # A crease is looked for within so many cells along the normals of its walls.
+LEAST_SINE = 0.1  # Walls of a crease count as turned by this much at least.
+WALLS = 3  # At most so many walls meet at a place.
 
 
 class Blend(NamedTuple):
-    """The field at k places.
+    """A wall, or the surface, near k places.
 
     distance, std : (k,), signed, and its deviation; 0 and inf where no patch reaches
     normal : (k, 3), the gradient
@@ -77,108 +47,167 @@ class Blend(NamedTuple):
     normal: Array
     node: NDArray[np.intp]
 
+    def chosen(self, which: NDArray[np.intp]) -> "Blend":
+        """The wall near some of the places."""
+        return Blend(self.distance[which], self.std[which], self.normal[which], self.node[which])
 
-def blended(charts: Charts, points: Array, room: float = 0.0) -> Blend:
-    """The field at places (k, 3); `room` is a length to which patches reach at least from their feet.
+    def where(self, which: NDArray[np.bool_], other: "Blend") -> "Blend":
+        """These at places (k,) where `which` holds, and those of another elsewhere."""
+        return Blend(
+            np.where(which, self.distance, other.distance),
+            np.where(which, self.std, other.std),
+            np.where(which[:, None], self.normal, other.normal),
+            np.where(which, self.node, other.node),
+        )
 
-    Beyond its rim a patch tells on which side of it a place is, if no other patch does. The deviation is inf
-    there.
+
+class Surface(NamedTuple):
+    """The surface near k places.
+
+    distance, std, normal, node : as in a Blend
+    share : (k,), how far out the places are on the patch where they are least so; inf where no patch reaches
+    creases : (k,), the number of other walls there
     """
-    pairs = charts.pairs(points, room)
-    if not room:
-        return blend_of(charts, pairs, points)
-    sure = (pairs.share <= 1.0) & (np.abs(pairs.distance) < room)
-    known = np.bincount(pairs.place[sure], minlength=len(points)) > 0
-    found = blend_of(charts, pairs.chosen((pairs.share < MARGIN) | ~known[pairs.place]), points)
-    return found._replace(std=np.where(known, found.std, np.inf))
+
+    distance: Array
+    std: Array
+    normal: Array
+    node: NDArray[np.intp]
+    share: Array
+    creases: NDArray[np.intp]
+
+    def chosen(self, which: NDArray[np.intp]) -> "Surface":
+        """The surface near some of the places."""
+        distance, std, normal, node, share, creases = self
+        return Surface(distance[which], std[which], normal[which], node[which], share[which], creases[which])
 
 
-def nearest_feet(charts: Charts, points: Array, feet: Array) -> tuple[Array, Blend]:
-    """The feet (k, 3) of places (k, 3) on the surface, found from places near them, and the field there."""
-    field, share, feet = blended(charts, feet), np.ones((len(points), 1)), feet.copy()
-    for _ in range(FOOT_STEPS):
-        off = points - feet
-        across = off - np.einsum("ki,ki->k", off, field.normal)[:, None] * field.normal
-        length = np.maximum(np.linalg.norm(across, axis=1), 1e-300)
-        # The distance is about length^2 / (2 away) too large.
-        some = np.flatnonzero(length**2 > 2.0 * NEGLIGIBLE * field.std * np.linalg.norm(off, axis=1))
-        if not len(some):
-            break
-        room = LAYER * charts.radii[field.node[some]] / length[some]
-        tried = feet[some] + np.minimum(share[some], room[:, None]) * across[some]
-        for _ in range(2):  # The first one may be beside the surface.
-            there = blended(charts, tried)
-            tried = tried - there.distance[:, None] * there.normal
-        nearer = np.isfinite(there.std)
-        nearer &= ((points[some] - tried) ** 2).sum(axis=1) < (off[some] ** 2).sum(axis=1)
-        for old, new in zip((feet, *field), (tried, *there), strict=True):
-            old[some[nearer]] = new[nearer]
-        share[some[~nearer]] *= 0.5
-    return feet, field
+def node_weights(charts: Charts, pairs: Pairs) -> Array:
+    """The weights (m,) of patches in a blend."""
+    return weights_of(pairs.share, pairs.std, charts.radii[pairs.node])
 
 
-def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
-    """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3)."""
+def weights_of(share: Array, std: Array, radius: Array) -> Array:
+    """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), where u is how far out a foot is, 1 at MARGIN."""
+    u = np.minimum(share / MARGIN, OUTERMOST)
+    weights: Array = (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (std**2 + (FLOOR * radius) ** 2)
+    return weights
+
+
+def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius: Array) -> Array:
+    """From 1 to 0, (m,), how much patches belong to the wall with normals `up` (m, 3) at distances `offset`.
+
+    radius : (m,), that of a patch of the wall
+    """
+    room = LAYER * np.maximum(charts.radii[pairs.node], radius) + SLANT * np.abs(offset)
+    return _facing(pairs, up) * _within(pairs.distance - offset, room)
+
+
+def _facing(pairs: Pairs, up: Array) -> Array:
+    """From 1 to 0, (m,), how much patches face the way of normals (m, 3)."""
+    cosine: Array = np.einsum("mi,mi->m", pairs.normal, up)
+    agree: Array = np.clip((cosine - FACING) / (AGREE - FACING), 0.0, 1.0)
+    agree *= agree * (3.0 - 2.0 * agree)
+    return agree
+
+
+def _within(off: Array, room: Array) -> Array:
+    """From 1 to 0, (m,), as lengths come near the room for them."""
+    inside: Array = np.clip(1.0 - (off / room) ** 2, 0.0, 1.0)
+    return inside * inside
+
+
+def walls_at(charts: Charts, pairs: Pairs, count: int, most: int = WALLS) -> list[Blend]:
+    """At most so many walls at each of `count` places, the nearest first, of pairs of places and patches."""
+    weights, walls = node_weights(charts, pairs), []
+    for _ in range(most):
+        key = np.abs(pairs.distance) + 0.5 * LAYER * charts.radii[pairs.node] * pairs.share**2
+        nearest = least_of(pairs.place, key, count)[pairs.place]
+        up, offset, radius = pairs.normal[nearest], pairs.distance[nearest], charts.radii[pairs.node[nearest]]
+        alike = facing_alike(charts, pairs, up, offset, radius)
+        walls.append(_mean(pairs, weights * alike, count))
+        left = np.flatnonzero(alike <= 0.0)
+        pairs, weights = pairs.chosen(left), weights[left]
+    return walls
+
+
+def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, room: float) -> Surface:
+    """The surface within a length of places (k, 3) that faces about as `up` (k, 3)."""
+    found = _surface(charts, indicator, points, up, room, MARGIN)
+    lost = np.flatnonzero(found.node < 0)
+    if len(lost):
+        farther = _surface(charts, indicator, points[lost], up[lost], room, CONTINUED)
+        for old, new in zip(found, farther, strict=True):
+            old[lost] = new
+    return found
+
+
+def _surface(
+    charts: Charts, indicator: Indicator, points: Array, up: Array, room: float, margin: float
+) -> Surface:
+    """The surface of `surface_at`, of patches that count as far out as a margin."""
+    pairs, count = charts.pairs(points, room, margin), len(points)
+    pairs = pairs.chosen(np.einsum("mi,mi->m", pairs.normal, up[pairs.place]) > SIDEWAYS)
+    share = np.full(count, np.inf)
+    np.minimum.at(share, pairs.place, pairs.share)
+    walls = walls_at(charts, pairs, count)
+    found, several = walls[0], np.flatnonzero(walls[1].node >= 0)
+    if len(several):
+        some = [wall.chosen(several) for wall in walls]
+        for old, new in zip(found, _met(indicator, points[several], some), strict=True):
+            old[several] = new
+    return Surface(*found, share, (walls[1].node >= 0).astype(np.intp) + (walls[2].node >= 0))
+
+
+def _met(indicator: Indicator, points: Array, walls: list[Blend]) -> Blend:
+    """The surface of two or three walls at places (k, 3)."""
+    one, two, three = walls
+    convex = [_is_convex(indicator, points, a, b) for a, b in ((one, two), (one, three), (two, three))]
+    third = three.node >= 0
+    # Of three creases at a corner two are alike: the walls of the other one meet first.
+    last = third & (convex[0] == convex[1]) & (convex[0] != convex[2])
+    middle = third & (convex[0] == convex[2]) & (convex[0] != convex[1])
+    a, b, c = two.where(last, one), three.where(last | middle, two), one.where(last, two.where(middle, three))
+    first = np.where(last, convex[2], np.where(middle, convex[1], convex[0]))
+    found = _both(a, b, first)
+    return _both(found, c, np.where(last | middle, convex[0], convex[1])).where(third, found)
+
+
+def _both(a: Blend, b: Blend, convex: NDArray[np.bool_]) -> Blend:
+    """The surface of two walls, inside both where their crease is convex, and inside either elsewhere."""
+    return b.where((b.distance > a.distance) == convex, a)
+
+
+def _is_convex(indicator: Indicator, points: Array, a: Blend, b: Blend) -> NDArray[np.bool_]:
+    """Whether the crease of two walls near places (k, 3) is convex: on both sides of it is the outside."""
+    cosine = np.einsum("ki,ki->k", a.normal, b.normal)
+    sine = np.maximum(1.0 - cosine**2, LEAST_SINE**2)
+    most = FARTHEST * indicator.cell
+    p, q = (np.clip((u.distance - cosine * v.distance) / sine, -most, most) for u, v in ((a, b), (b, a)))
+    crease = points - p[:, None] * a.normal - q[:, None] * b.normal
+    across = a.normal - b.normal
+    across *= indicator.cell / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), LEAST_SINE)
+    return indicator.at(crease + across) + indicator.at(crease - across) < 0.0
+
+
+def wall_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
+    """The wall with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
+    pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
+    alike = _facing(pairs, up[pairs.place]) * _within(pairs.distance, near[pairs.place])
+    return _mean(pairs, node_weights(charts, pairs) * alike, len(points))
+
+
+def covered(charts: Charts, points: Array, normals: Array, reach: float = INSIDE) -> NDArray[np.bool_]:
+    """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3).
+
+    reach : how far out a patch counts, as a share of its domain's radius
+    """
     pairs = charts.pairs(points)
-    on = pairs.share < INSIDE
+    on = pairs.share < reach
     on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
     on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
     found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
     return found
-
-
-def blend_of(charts: Charts, pairs: Pairs, points: Array) -> Blend:
-    """The field at places (k, 3), given what patches say there."""
-    weights = node_weights(charts, pairs)
-    first, taken = _wall(charts, pairs, weights, points, np.ones(len(weights), dtype=bool))
-    found, left = first, ~taken
-    for _ in range(WALLS - 1):
-        if not left.any():
-            break
-        other, taken = _wall(charts, pairs, weights, points, left)
-        found, left = _combined(found, first, other), left & ~taken
-    return found[0]
-
-
-# The field of a wall, and for each place a point (k, 3) that is surely on the wall.
-_Wall = tuple[Blend, Array]
-
-
-def node_weights(charts: Charts, pairs: Pairs) -> Array:
-    """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), where u is how far out a foot is, 1 at MARGIN."""
-    u = np.minimum(pairs.share / MARGIN, OUTERMOST)
-    floor = FLOOR * charts.radii[pairs.node]
-    weights: Array = (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (pairs.std**2 + floor**2)
-    return weights
-
-
-def _wall(
-    charts: Charts, pairs: Pairs, weights: Array, points: Array, active: NDArray[np.bool_]
-) -> tuple[_Wall, NDArray[np.bool_]]:
-    """The blend of those active pairs that face like the nearest one at each place, and a mask of them."""
-    which = np.flatnonzero(active)
-    place, node, out, distance, normal, std = pairs.chosen(which)
-    radius = charts.radii[node]
-    nearest = least_of(place, np.abs(distance) + 0.5 * LAYER * radius * out**2, len(points))
-    r = nearest[place]
-    cosine = np.einsum("mi,mi->m", normal, normal[r])
-    agree = np.clip((cosine - FACING) / (AGREE - FACING), 0.0, 1.0)
-    agree *= agree * (3.0 - 2.0 * agree)
-    room = LAYER * np.maximum(radius, radius[r]) + SLANT * np.abs(distance[r])
-    agree *= np.clip(1.0 - ((distance - distance[r]) / room) ** 2, 0.0, 1.0) ** 2
-    w = weights[which] * agree
-    blend = _mean(place, node, distance, normal, std, w, len(points))
-    feet = points.copy()
-    if len(node):
-        origins, pull = (
-            charts.origins[node[nearest]],
-            np.minimum(1.0, WELL_INSIDE / np.maximum(out[nearest], 1e-9)),
-        )
-        feet -= distance[nearest, None] * normal[nearest]
-        feet += (1.0 - pull)[:, None] * (origins - feet)
-    taken = active.copy()
-    taken[which] = agree > 0.0
-    return (blend, feet), taken
 
 
 def least_of(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
@@ -195,48 +224,25 @@ def least_of(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[
     return found
 
 
-def _mean(
-    place: NDArray[np.intp],
-    node: NDArray[np.intp],
-    distance: Array,
-    normal: Array,
-    std: Array,
-    w: Array,
-    count: int,
-) -> Blend:
+def _mean(pairs: Pairs, w: Array, count: int) -> Blend:
     """Weighted means. Deviations do not average out, because patches that share contacts err alike."""
+    place = pairs.place
 
     def total(values: Array) -> Array:
-        """Weighted sums (count,) of what the pairs at each place say."""
+        """Weighted sums (count,) over the pairs at each place."""
         return np.bincount(place, w * values, count).astype(np.float64)  # It counts no pairs in integers.
 
     some = total(np.ones(len(w)))
     there = some > 0.0
     scale = 1.0 / np.where(there, some, 1.0)
-    mean = scale * total(distance)
-    variance = scale * total(std**2 + (distance - mean[place]) ** 2)
-    up = np.stack([total(normal[:, i]) for i in range(3)], axis=1)
+    mean = scale * total(pairs.distance)
+    variance = scale * total(pairs.std**2 + (pairs.distance - mean[place]) ** 2)
+    up = np.stack([total(pairs.normal[:, i]) for i in range(3)], axis=1)
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
     best = least_of(place, -w, count)
     return Blend(
         mean,
         np.where(there, np.sqrt(variance), np.inf),
         up,
-        np.where(there, np.append(node, -1)[best], -1),
+        np.where(there, np.append(pairs.node, -1)[best], -1),
     )
-
-
-def _combined(found: _Wall, first: _Wall, other: _Wall) -> _Wall:
-    """What is inside both walls where these face away from each other, and inside either elsewhere."""
-    (a, feet), (b, others) = found, other
-    across = others - first[1]
-    away = np.einsum("ki,ki->k", first[0].normal - b.normal, across) < 0.0
-    takes = (b.node >= 0) & np.where(away, b.distance > a.distance, b.distance < a.distance)
-    wide = takes[:, None]
-    blend = Blend(
-        np.where(takes, b.distance, a.distance),
-        np.where(takes, b.std, a.std),
-        np.where(wide, b.normal, a.normal),
-        np.where(takes, b.node, a.node),
-    )
-    return blend, np.where(wide, others, feet)

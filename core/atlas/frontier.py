@@ -16,17 +16,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import Vector, cross, dot, vector_of
+from ..contours.contour import Contour, Vector, cross, dot, vector_of
 from ..contours.finger import DISK_PLACES, Contact, Finger
 from ..reconstruction.result import Reconstruction
-from .charts import Charts
+from .charts import AZIMUTHS, Charts
 from .field import INSIDE, covered
-from .join import charts_of
+from .join import FARTHEST_RIM, charts_of
+from .meshing import LEAST_DIVISOR, Mesh
 
 # python -m benchmarks.atlas judges these.
 RIM = 24  # Each rim has so many places.
+TAPS = 48  # Around a patch the finger feels in so many directions where it ends;
+NARROWEST = 5.0  # A patch reaches at most so many times as far as it is wide.
+BETWEEN = (
+    (0.97, 1),
+    (0.6, 2),
+)  # It also feels at these shares of the rim, on every first or second ray to RIM places.
+HALVINGS = 5  # So many halvings find where a patch ends at a crease,
+LEAST_RIM = 0.02  # which is at least this share of the radius away.
 REACHES = (0.35, 0.12, 0.04)  # The finger goes on by these shares of the radius, until something is new.
 DISK_REACHES = 3.0  # What is new is measured on a disk of so many reaches, at most the patch's radius.
+BORDER_RADIUS, BORDER_APART = (
+    5.0,
+    0.5,
+)  # Places on the border of a mesh have a radius of so many edges, and are so many radii apart.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
 TRIES = 3  # Touches go on from a place at most so many times.
 LOOK = 15  # So many other places are looked at together with the first of the queue, which is faster.
@@ -67,26 +80,93 @@ class Next(NamedTuple):
 class Frontier:
     """The patches that were felt, and a queue of the places on their rims.
 
+    near : the finger feels a patch where the surface is within this length of it
     least : the least area that a touch has to bring
-    left : places from which TRIES touches went on, so that no more do
+    noise : standard deviation of the contacts between curves, drawn from `rng`
+    taps : these contacts, for each patch
 
     The first place is the one that can bring most. That only shrinks as patches come, so only there it is
     measured again.
     """
 
     finger: Finger
+    near: float
     least: float = 0.0
+    noise: float = 0.0
+    rng: np.random.Generator = field(default_factory=np.random.default_rng)
+    taps: list[Contour] = field(default_factory=list)
     charts: Charts | None = None
     queue: list[tuple[float, int, Place]] = field(default_factory=list)
     pushed: int = 0
-    left: list[Place] = field(default_factory=list)
 
-    def add(self, r: Reconstruction, goes_on: bool = True) -> None:
-        """Takes in a patch that was felt and, if touches may go on from there, the places of its rim."""
-        chart = charts_of([r], deviations=False)
+    def add(self, r: Reconstruction, least: float = 0.0, goes_on: float = 0.0) -> bool:
+        """Takes in a patch that was felt, and the places of its rim. Returns whether it did.
+
+        least, goes_on : lengths; patches that the finger feels to be smaller are left out, or have no places
+        """
+        chart = self._to_creases(charts_of([r], deviations=False))
+        radius = r.radius * math.sqrt(np.mean(chart.rims**2))
+        if radius <= least:
+            return False
+        self.taps.append(self._felt_between(chart))
         self.charts = chart if self.charts is None else self.charts.joined(chart)
-        for p, n, t in zip(*chart.rim(RIM, 1.01 * INSIDE), strict=True) if goes_on else ():
+        for p, n, t in zip(*chart.rim(RIM, 1.01 * INSIDE), strict=True) if radius >= goes_on else ():
             self.push(Place(vector_of(p), vector_of(n), vector_of(t), r.radius), np.pi * r.radius**2)
+        return True
+
+    def _to_creases(self, chart: Charts) -> Charts:
+        """The table of a patch whose rim is where the finger feels that the surface turns away from it.
+
+        Between the ends of curves a domain may bulge beyond a crease, and at a crease they end a step early.
+        """
+        azimuths = np.arange(TAPS) * (AZIMUTHS // TAPS)
+        turns, radii = 2.0 * np.pi * azimuths / AZIMUTHS, chart.rims[0, azimuths]
+        rays = np.stack([np.cos(turns), np.sin(turns)])
+
+        def felt(out: Array, which: NDArray[np.intp]) -> NDArray[np.bool_]:
+            """Whether the surface is there at these shares (k,) of the radii of some azimuths (k,)."""
+            met = self._taps(chart, out * radii[which] * rays[:, which])
+            return np.array([contact is not None for contact in met], dtype=bool)
+
+        every = np.arange(TAPS)
+        there = felt(np.ones(TAPS), every)
+        ends = np.flatnonzero(~(there & felt(np.full(TAPS, FARTHEST_RIM), every)))
+        if not len(ends):
+            return chart
+        low, high = np.where(there[ends], 1.0, 0.0), np.where(there[ends], FARTHEST_RIM, 1.0)
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            met = felt(middle, ends)
+            low, high = np.where(met, middle, low), np.where(met, high, middle)
+        radii[ends] *= low
+        # A straight crease is a line between azimuths whose inverse radius is nearly linear.
+        if not radii.any():
+            return replace(chart, rims=0.0 * chart.rims)
+        inverse = 1.0 / np.maximum(radii, LEAST_RIM * radii.max())
+        straight = 1.0 / np.interp(
+            np.arange(AZIMUTHS), np.append(azimuths, AZIMUTHS), np.append(inverse, inverse[0])
+        )
+        ended = np.isin(every, ends)
+        beside = np.repeat(ended | np.roll(ended, -1), AZIMUTHS // TAPS)
+        rim = np.where(beside, straight, chart.rims[0])
+        # Rays from its middle do not resolve the ends of a narrow patch.
+        across = np.roll(rim, AZIMUTHS // 4) + np.roll(rim, -AZIMUTHS // 4)
+        return replace(chart, rims=np.minimum(rim, NARROWEST * across)[None])
+
+    def _taps(self, chart: Charts, xy: Array) -> list[Contact | None]:
+        """What the finger feels of a patch at local places (2, k)."""
+        points, normals = chart.world(np.zeros(xy.shape[1], dtype=np.intp), *xy)
+        each = zip(points.tolist(), normals.tolist(), strict=True)
+        return [self.finger.near(tuple(p), tuple(n), self.near) for p, n in each]
+
+    def _felt_between(self, chart: Charts) -> Contour:
+        """Contacts between the curves of a patch, where the finger taps it."""
+        around = np.arange(0, AZIMUTHS, AZIMUTHS // RIM)
+        xy = np.hstack([share * chart.rim_at(around[::step]) for share, step in BETWEEN])
+        contacts = np.array([contact for contact in self._taps(chart, xy) if contact is not None])
+        points, normals = contacts.reshape(-1, 2, 3).transpose(1, 0, 2)
+        offsets = self.rng.normal(0.0, self.noise, len(points))
+        return Contour(points + offsets[:, None] * normals, normals=normals)
 
     def push(self, place: Place, gain: float) -> None:
         """Queues a place by the area that a touch there may bring."""
@@ -111,7 +191,6 @@ class Frontier:
                 aside.append(entry)
                 continue
             if len(place.tried) >= TRIES:
-                self.left.append(place)
                 continue
             if place not in known:
                 yield
@@ -127,19 +206,17 @@ class Frontier:
             heapq.heappush(self.queue, entry)
         return found
 
-    def uncovered(self, charts: Charts) -> Generator[None, None, list[Place]]:
-        """Places where a touch would still bring something. Yields before those where some were in vain.
-
-        Patches that are not joined may be so far off at their rims that others seem not to cover these.
-        """
-        self.charts = charts
-        self._forget_covered()
-        found = [place for _, _, place in sorted(self.queue)]
-        for place in self.left:
-            if self._free(np.array([[place.point, place.normal]])):
-                yield
-                if self.beyond([replace(place, felt={})])[0] is not None:
-                    found.append(place)
+    def uncovered(self, mesh: Mesh) -> list[tuple[Place, Contact]]:
+        """Places on the border of a mesh beyond which the object goes on, each with a contact there."""
+        found = []
+        for place in border_places(mesh):
+            contacts = [
+                self.finger.ahead(place.point, place.normal, place.ahead, place.radius, share * place.radius)
+                for share in REACHES
+            ]
+            # The mesh may end an edge or so before a real border.
+            if contacts[0] is not None:
+                found.append((place, next(contact for contact in contacts[::-1] if contact is not None)))
         return found
 
     def _forget_covered(self) -> None:
@@ -224,16 +301,32 @@ def _rounded(gain: float) -> float:
 def _between(points: Array, tried: Sequence[Vector]) -> int:
     """The index of the point (n, 3) in the middle of all, or farthest from where touches were in vain."""
     if not tried:
-        return middle_of(points)
+        return _first_least(((points - points.mean(axis=0)) ** 2).sum(axis=1))
     apart = points[:, None] - np.array(tried)
     return _first_least(-(apart**2).sum(axis=2).min(axis=1))
-
-
-def middle_of(points: Array) -> int:
-    """The index of the point (n, 3) that is nearest to the mean of all; two alone are equally near."""
-    return _first_least(((points - points.mean(axis=0)) ** 2).sum(axis=1))
 
 
 def _first_least(squares: Array) -> int:
     """The first index of squared distances (n,), or of their negatives, that are least up to a tie."""
     return int(np.argmax(squares <= squares.min() + TIE * np.abs(squares).max()))
+
+
+def border_places(mesh: Mesh) -> list[Place]:
+    """Places on the border of a mesh, some edges apart, with the way beyond it."""
+    ends, corners = mesh.border, mesh.vertices
+    if not len(ends):
+        return []
+    radius = BORDER_RADIUS * mesh.edge
+    normals, found, taken = mesh.normals, [], np.zeros(len(ends), dtype=bool)
+    middles = corners[ends].mean(axis=1)
+    for i in range(len(ends)):
+        a, b = ends[i]
+        if taken[i]:
+            continue
+        taken |= ((middles - middles[i]) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2
+        up = normals[a] + normals[b]
+        up /= max(float(np.linalg.norm(up)), LEAST_DIVISOR)
+        beyond = np.cross(corners[b] - corners[a], up)
+        beyond /= max(float(np.linalg.norm(beyond)), LEAST_DIVISOR)
+        found.append(Place(vector_of(middles[i]), vector_of(up), vector_of(beyond), radius))
+    return found

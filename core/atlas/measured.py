@@ -15,7 +15,7 @@ from ..exploration.side_by_side import result_of
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from .join import charts_of
-from .object_atlas import Atlas
+from .object_atlas import Atlas, surfaced
 
 # python -m benchmarks.robot judges these.
 FEWEST = 40  # The smallest patch has so many contacts.
@@ -66,7 +66,14 @@ def cover_contacts(
     noise = own if noise is None else number("noise", noise, least=0.0)
     yield 0.0
     found = yield from _patches(_Cloud(points, normals, cKDTree(points), noise, largest))
-    return Atlas(tuple(found), charts_of(found), largest)
+    charts = charts_of(found)
+    steps = surfaced(found, charts, largest)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return Atlas(tuple(found), charts, end.value, largest)
+        yield 1.0
 
 
 def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -> tuple[Array, Array, float]:

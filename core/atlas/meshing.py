@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface of a field as triangles: tetrahedra near the patches are cut, as its signs at corners say.
+"""The surface of a whole object as triangles: the indicator has its topology, and the patches its place.
 
-Where a wall or a gap is thinner than a tetrahedron, this is split first, so that no hole is left. What comes
-out is a manifold, closed but for where nothing was felt. Vertices then move along the surface to even out,
-and onto it.
+Tetrahedra on the indicator's surface are cut, which is closed by construction. Vertices then move onto the
+patches that face as the indicator does. Triangles where no patch is are left out.
 """
 
 from collections.abc import Generator
@@ -13,25 +12,23 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..patch.tetrahedra import Indices, crossed_twice, cut, evened, split, tetrahedra_of, unique
+from ..patch.tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
 from .charts import MARGIN, Charts
-from .field import Blend, Felt
-from .join import told
+from .creases import creased
+from .field import INSIDE, Surface, surface_at
+from .indicator import Indicator
 
 # python -m benchmarks.atlas judges these.
 CELL = 2.1  # A cube of the lattice is as long as so many edges of the mesh.
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
-ROOM = 1.2  # Patches are asked within at least so many cubes of their surface.
-SPLITS = 3  # So many times tetrahedra are split where a wall is thinner than they are.
-SHARES = np.array([0.2, 0.35, 0.5, 0.65, 0.8])  # A thin wall is looked for at these shares of a lattice edge.
-# A thin wall is deeper than so many edges of the mesh and so many deviations together: less is an error.
-THIN, UNCERTAIN = 0.1, 2.0
-SPECK = 40  # Pieces of the mesh with fewer triangles are left out, except the largest.
 SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
-FAR, STEPS = 0.05, 3  # Vertices that were off by more edges are moved onto the surface again, so often.
-FIELD_AT_ONCE = 3000  # A step asks the field at so many places.
-CELLS_AT_ONCE = 60_000  # A step looks for thin walls in so many tetrahedra.
-MOST_CELLS = 20_000_000  # More sample points of one patch would not fit into memory.
+BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator are bridged.
+FAR, STEPS = 0.05, 4  # Vertices that were off by more cells are moved onto the surface again, so often.
+WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none is lost between them.
+ROOM = 5.0  # The surface is within so many cells of the level of the indicator.
+HALVINGS = 5  # So many halvings of an edge of the lattice find the level.
+LATTICE_AT_ONCE = 100_000  # A step takes so many points of the lattice,
+PLACES_AT_ONCE = 3000  # or the surface near so many places.
 LEAST_DIVISOR = 1e-300  # No vector is divided by less.
 
 
@@ -56,136 +53,162 @@ class Mesh(NamedTuple):
         return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), LEAST_DIVISOR)
 
     @property
+    def edge(self) -> float:
+        """The median length of the edges."""
+        a, b = self.vertices[self.triangles[:, :2]].transpose(1, 0, 2)
+        return float(np.median(np.linalg.norm(b - a, axis=1)))
+
+    @property
+    def border(self) -> Indices:
+        """The edges (k, 2) of one triangle only, each as this triangle has it."""
+        ends, first, counts = self._edges
+        return ends[first[counts == 1]]
+
+    @property
+    def _edges(self) -> tuple[Indices, Indices, Indices]:
+        """The edges (3 m, 2) of all triangles; the first of each that are the same, and their number."""
+        ends = self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        keys = ends.min(axis=1) * len(self.vertices) + ends.max(axis=1)
+        return ends, *np.unique(keys, return_index=True, return_counts=True)[1:]
+
+    @property
     def is_closed(self) -> bool:
-        """Whether each edge belongs to exactly two triangles."""
-        edges = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        keys = edges[:, 0] * len(self.vertices) + edges[:, 1]
-        counts = np.unique(keys, return_counts=True)[1]
-        return bool((counts == 2).all())
+        """Whether there are triangles, and each edge belongs to exactly two."""
+        return len(self.triangles) > 0 and bool((self._edges[2] == 2).all())
 
 
-def meshed(charts: Charts, felt: Felt, edge: float) -> Generator[float, None, Mesh]:
-    """The mesh of the patches' field, its edges about as long as `edge`; yields the share that is done."""
-    size = CELL * edge
-    cells = yield from _cells(charts, felt, size)
-    yield 0.0
+def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float, None, Mesh]:
+    """The mesh of the surface; yields the share that is done.
+
+    edge : about the length of its edges, which are shorter than a quarter of the thinnest wall
+    """
+    edge, halvings = min(edge, WALL * indicator.thinnest), 0
+    while CELL * edge * 2**halvings < 0.5 * indicator.cell:
+        halvings += 1
+    size = CELL * edge * 2**halvings
+    vertices, up, triangles = yield from _level(indicator, size)
+    room = max(ROOM * indicator.cell, CLIP * size)
+    vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
+    for _ in range(halvings):
+        vertices, triangles = halved(vertices, triangles)
+        up = indicator.outward(vertices)
+        yield 0.7
+        vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
+    found = yield from creased(charts, vertices, triangles, surface.normal, edge)
+    at = np.append(np.arange(len(vertices)), found.parents)
+    return _felt(found.vertices, found.triangles, surface.chosen(at), indicator.cell)
+
+
+def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
+    """Vertices (n, 3) beside the level of the indicator, the way outward (n, 3) and triangles (m, 3).
+
+    size : the length of a cube of the lattice
+    """
+    cells = yield from _cells(indicator, size)
     lattice, tetrahedra = yield from tetrahedra_of(cells)
+    points, parts = 0.5 * size * lattice.astype(np.float64), []
+    for some in np.array_split(points, len(points) // LATTICE_AT_ONCE + 1):
+        parts.append(-indicator.at(some))
+        yield 0.1
+    ends, triangles = cut(tetrahedra, np.concatenate(parts))
+    yield 0.2
+    found = []
+    for few in np.array_split(ends, len(ends) // PLACES_AT_ONCE + 1):
+        a, b = points[few].transpose(1, 0, 2)
+        low, high = np.zeros(len(few)), np.ones(len(few))
+        is_inside = indicator.at(a) > 0.0
+        for _ in range(HALVINGS):  # The indicator is a step, so its values do not tell how far the level is.
+            middle = 0.5 * (low + high)
+            same = (indicator.at(a + middle[:, None] * (b - a)) > 0.0) == is_inside
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        level, clipped = 0.5 * (low + high)[:, None], np.clip(low, CLIP, 1.0 - CLIP)[:, None]
+        found.append((a + clipped * (b - a), indicator.outward(a + level * (b - a))))
+        yield 0.2
+    vertices, up = (np.concatenate(values) for values in zip(*found, strict=True))
+    return vertices, up, triangles
+
+
+def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]:
+    """The cubes around the grid's cells where the indicator changes its sign, and those beside, (n, 3)."""
+    found, length = [], len(indicator.values)
+    rows = max(1, 500_000 * length // indicator.values.size)
+    for start in range(0, length - 1, rows):
+        every = some = indicator.values[start : start + rows + 1] > 0.0
+        for axis in range(3):
+            before, after = ((slice(None),) * axis + (part,) for part in (slice(None, -1), slice(1, None)))
+            every, some = every[before] & every[after], some[before] | some[after]
+        found.append(np.argwhere(some & ~every) + np.array([start, 0, 0]))
+        yield 0.0
+    low = indicator.low + indicator.cell * np.vstack(found)
+    # A cell of the grid is in at most two cubes along an axis, or three.
+    ways = (0.0, 1.0) if size >= indicator.cell else (0.0, 0.5, 1.0)
+    ends = [np.floor((low + way * indicator.cell) / size).astype(np.intp) for way in ways]
+    parts = []
+    for which in np.ndindex(3 * (len(ways),)):
+        parts.append(unique(np.stack([ends[i][:, axis] for axis, i in enumerate(which)], axis=1)))
+        yield 0.0
+    cells = unique(np.vstack(parts))
     yield 0.0
-    points = 0.5 * size * lattice.astype(np.float64)
-    field = yield from _asked(charts, felt, points, ROOM * size, 0.0)
-    new = 0
-    for _ in range(SPLITS):
-        known = len(points)
-        tetrahedra, points, field = yield from _thin_walls(charts, felt, tetrahedra, points, field, edge, new)
-        new = known
-    ends, triangles = cut(tetrahedra, field.distance, size)
-    yield 0.5
-    a, b = ends.T
-    share = field.distance[a] / (field.distance[a] - field.distance[b])
-    share = np.clip(share, CLIP, 1.0 - CLIP)[:, None]
-    vertices = (1.0 - share) * points[a] + share * points[b]
-    vertices, field = yield from _settled(charts, felt, vertices, triangles, edge)
-    return _felt(vertices, triangles, field)
+    beside = np.vstack([np.zeros((1, 3), dtype=np.intp), np.eye(3, dtype=np.intp), -np.eye(3, dtype=np.intp)])
+    return unique((cells[:, None] + beside).reshape(-1, 3))
 
 
 def _settled(
-    charts: Charts, felt: Felt, vertices: Array, triangles: Indices, edge: float
-) -> Generator[float, None, tuple[Array, Blend]]:
-    """Vertices (k, 3) evened out on the surface, and the field there; yields the share that is done."""
-    most = 0.5 * CELL * edge
-    field = yield from _onto(charts, felt, vertices, most)
-    for _ in range(SMOOTHINGS):
-        vertices = evened(vertices, field.normal, triangles)
-        yield 0.75
-    field = yield from _onto(charts, felt, vertices, most)
-    far = np.flatnonzero(np.abs(field.distance) > FAR * edge)
-    for _ in range(STEPS):
-        moved = vertices[far]
-        again = yield from _onto(charts, felt, moved, most)
-        for old, new in zip((vertices, *field), (moved, *again), strict=True):
-            old[far] = new
-        far = far[np.abs(again.distance) > FAR * edge]
-    return vertices, field
+    charts: Charts, indicator: Indicator, vertices: Array, up: Array, triangles: Indices, room: float
+) -> Generator[float, None, tuple[Array, Surface]]:
+    """Vertices (k, 3) evened out on the surface, and the surface there; yields the share that is done.
 
-
-def _onto(charts: Charts, felt: Felt, vertices: Array, most: float) -> Generator[float, None, Blend]:
-    """Moves vertices (k, 3) onto the surface, in place and by a length at most; returns the field before."""
-    field = yield from _asked(charts, felt, vertices, 0.0, 0.75)
-    vertices -= np.clip(field.distance, -most, most)[:, None] * field.normal
-    return field
-
-
-def _asked(
-    charts: Charts, felt: Felt, points: Array, room: float, so_far: float
-) -> Generator[float, None, Blend]:
-    """The field at many points (k, 3); yields the share of the mesh that is done."""
-    parts = []
-    for start in range(0, max(len(points), 1), FIELD_AT_ONCE):
-        parts.append(told(charts, felt, points[start : start + FIELD_AT_ONCE], room))
-        yield so_far
-    return Blend(*(np.concatenate(values) for values in zip(*parts, strict=True)))
-
-
-def _thin_walls(
-    charts: Charts, felt: Felt, tetrahedra: Indices, points: Array, field: Blend, edge: float, new: int
-) -> Generator[float, None, tuple[Indices, Array, Blend]]:
-    """Tetrahedra, points and the field with a point more on each edge that the surface crosses twice.
-
-    A wall or a gap lies between its ends, which are on one side, and the cut would have a hole there. Only
-    tetrahedra with points from number `new` on are looked at. Yields the share of the mesh that is done.
+    up : (k, 3), the way outward; room : a length within which the surface is
     """
-    some = tetrahedra[(tetrahedra >= new).any(axis=1)]
-    parts = []
-    for start in range(0, max(len(some), 1), CELLS_AT_ONCE):
-        few = some[start : start + CELLS_AT_ONCE]
-        parts.append(crossed_twice(few, points, field.distance, field.normal))
+    for _ in range(2):
+        surface = yield from _onto(charts, indicator, vertices, up, room)
+    for _ in range(SMOOTHINGS):
+        vertices = evened(vertices, surface.normal, triangles)
         yield 0.5
-    edges = np.unique(np.vstack(parts), axis=0)
-    a, b = points[edges].transpose(1, 0, 2)[:, :, None]
-    between = (a + SHARES[:, None] * (b - a)).reshape(-1, 3)
-    found = yield from _asked(charts, felt, between, ROOM * CELL * edge, 0.5)
-    depth = -np.sign(field.distance[edges[:, :1]]) * found.distance.reshape(-1, len(SHARES))
-    depth -= UNCERTAIN * found.std.reshape(depth.shape)
-    thin = np.flatnonzero(depth.max(axis=1) > THIN * edge)
-    deepest = thin * len(SHARES) + depth[thin].argmax(axis=1)
-    tetrahedra = split(tetrahedra, edges[thin], len(points))
-    yield 0.5
-    field = Blend(*(np.concatenate([old, new[deepest]]) for old, new in zip(field, found, strict=True)))
-    return tetrahedra, np.concatenate([points, between[deepest]]), field
+    surface = yield from _onto(charts, indicator, vertices, up, room)
+    for _ in range(STEPS):
+        far = np.flatnonzero(np.abs(surface.distance) > FAR * indicator.cell)
+        moved = vertices[far]
+        again = yield from _onto(charts, indicator, moved, up[far], room)
+        for old, new in zip((vertices, *surface), (moved, *again), strict=True):
+            old[far] = new
+    return vertices, surface
 
 
-def _felt(vertices: Array, triangles: Indices, field: Blend) -> Mesh:
-    """The mesh without the triangles that reach beyond what was felt, and without specks at rims."""
+def _onto(
+    charts: Charts, indicator: Indicator, vertices: Array, up: Array, room: float
+) -> Generator[float, None, Surface]:
+    """Moves vertices (k, 3) onto the surface, in place; returns the surface where they were before."""
+    parts = []
+    for start in range(0, max(len(vertices), 1), PLACES_AT_ONCE):
+        some = slice(start, start + PLACES_AT_ONCE)
+        parts.append(surface_at(charts, indicator, vertices[some], up[some], room))
+        yield 0.5
+    surface = Surface(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    vertices -= np.clip(surface.distance, -room, room)[:, None] * surface.normal
+    return surface
+
+
+def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) -> Mesh:
+    """The mesh without triangles where nothing was felt.
+
+    Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
+    as small as some cells of the indicator is bridged.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    triangles = triangles[np.isfinite(field.std)[triangles].all(axis=1)]
-    links = np.ones(2 * len(triangles)), (triangles[:, :2].ravel(), triangles[:, 1:].ravel())
-    piece = connected_components(coo_matrix(links, (len(vertices),) * 2))[1][triangles[:, 0]]
-    sizes = np.bincount(piece, minlength=1)
-    triangles = triangles[sizes[piece] >= min(SPECK, sizes.max())]
+    near = surface.share < MARGIN
+    inside = near & ((surface.share < INSIDE) | (surface.creases > 0))
+    beyond = triangles[~inside[triangles].all(axis=1)]
+    links = np.ones(2 * len(beyond)), (beyond[:, :2].ravel(), beyond[:, 1:].ravel())
+    count, piece = connected_components(coo_matrix(links, (len(vertices),) * 2))
+    far = beyond[~near[beyond].any(axis=1)]
+    a, b, c = vertices[far].transpose(1, 0, 2)
+    areas = np.bincount(piece[far[:, 0]], 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), count)
+    beside = np.bincount(piece[inside], minlength=count) > 0
+    gone = ~inside & ((areas > BRIDGED * cell**2) | ~beside)[piece]
+    triangles = triangles[~gone[triangles].any(axis=1)]
     used, index = np.unique(triangles, return_inverse=True)
-    return Mesh(vertices[used], index.reshape(-1, 3), field.std[used], field.node[used])
-
-
-def _cells(charts: Charts, felt: Felt, size: float) -> Generator[float, None, Indices]:
-    """The cubes of patches and contacts, and those beside them, (n, 3); yields 0 after each patch."""
-    found = []
-    for node in range(len(charts.radii)):
-        half = MARGIN * charts.rims[node].max()
-        count = 2 * int(np.ceil(2.0 * half * charts.radii[node] / size)) + 1  # Odd: the origin is one.
-        if count**2 > MOST_CELLS:
-            raise ValueError(
-                f"edge: expected a few thousand edges at most across a patch, got {size / CELL:g}"
-            )
-        line = np.linspace(-half, half, count)
-        x, y = (axis.ravel() for axis in np.meshgrid(line, line))
-        each = np.full(len(x), node)
-        inside = charts.shares(x, y, each) < MARGIN
-        points, _ = charts.world(each[inside], x[inside], y[inside])
-        found.append(unique(np.floor(points / size).astype(np.intp)))
-        yield 0.0
-    found.append(unique(np.floor(felt.points / size).astype(np.intp)))
-    cells = unique(np.vstack(found))
-    beside = np.vstack([np.zeros((1, 3), dtype=np.intp), np.eye(3, dtype=np.intp), -np.eye(3, dtype=np.intp)])
-    return unique((cells[:, None] + beside).reshape(-1, 3))
+    std = np.where(surface.node < 0, cell, surface.std)
+    return Mesh(vertices[used], index.reshape(-1, 3), std[used], surface.node[used])

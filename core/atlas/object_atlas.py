@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A whole object as it was felt (paper, VI): the graph of its patches, and one surface of all of them."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -11,22 +11,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number
-from ..contours.finger import FACING
+from ..contours.contour import Contour
 from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .boundaries import Edge, blended_curvatures, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
-from .field import INSIDE, Felt, blended, nearest_feet
 from .frontier import Place
-from .join import felt_by, told
-from .meshing import Mesh, meshed
+from .indicator import Indicator
+from .meshing import WALL, Mesh, meshed
+from .reference_mesh import ReferenceMesh
+from .samples import indicated
 
-AHEAD = 0.9  # The normal at a foot tells the side if the cosine of its angle to the way there is more.
-CLOSE = 0.02  # Farther than this share of a radius from a patch the distance is that of the nearest foot.
-OFF_SURFACE = 3.0  # A place of a patch that is off the field by more deviations is none of the surface.
-GRAPH_VERSION = 1  # The version of the graph as plain values.
-SAMPLE_TURNS, SAMPLES_OUTWARD = 16, 6  # From far away distances are those of so many samples of each patch.
+# Edges that are chosen by the curvature are between these shares of the size, those for thin walls above the
+# last one.
+FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
+LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above so many tolerances.
+OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from so many of both away.
+BORDER = 2.0  # Beyond the border of the mesh it does from so many edges away.
+WITHIN_90 = 1.645  # So many deviations are a 90 % interval.
+HELD = 0.8  # At least this share of the contacts of a check is within the 90 % interval of the surface.
+AT_ONCE = 3000  # Distances are found for so many places at once.
+GRAPH_VERSION = 2  # The version of the graph as plain values.
 
 
 class NextTouch(NamedTuple):
@@ -37,13 +43,38 @@ class NextTouch(NamedTuple):
     gain: float
 
 
-class _Samples(NamedTuple):
-    """Points (n, 3) of the surface, deviations (n,), inf at an open rim, how far apart, and a KD-tree."""
+class Check(NamedTuple):
+    """Contacts of a finger that comes from outside, all round.
+
+    points, normals : (n, 3), where it met the object
+    missed : (k, 3), places of the surface that it did not meet
+    """
 
     points: Array
-    stds: Array
-    apart: Array
-    tree: Any
+    normals: Array
+    missed: Array
+
+
+def suggested_edge(patches: Sequence[Reconstruction], charts: Charts, indicator: Indicator) -> float:
+    """The edge at which triangles are off the surface by half its deviation, as a median of the patches.
+
+    A chord e of a circle of curvature k is off it by k e^2 / 8. The edge is at most a sixtieth of the size,
+    and short enough for the thinnest wall.
+    """
+    bends = np.array([max(abs(r.patch.k1), abs(r.patch.k2)) for r in patches])
+    stds, radii = charts.mean_stds, charts.radii
+    chords = np.sqrt(4.0 * stds / np.maximum(bends, stds / radii**2))
+    edge = float(np.clip(np.median(chords), FINE * indicator.size, SHARE * indicator.size))
+    return max(min(edge, WALL * indicator.thinnest), FINEST * indicator.size)
+
+
+def surfaced(
+    patches: Sequence[Reconstruction], charts: Charts, tolerance: float | None
+) -> Generator[float, None, ReferenceMesh]:
+    """The joined surface of patches, as a mesh with edges of the suggested length; yields the share done."""
+    indicator = yield from indicated(charts, tolerance)
+    mesh = yield from meshed(charts, indicator, suggested_edge(patches, charts, indicator))
+    return ReferenceMesh(mesh, indicator)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +83,20 @@ class Atlas:
 
     patches : the n nodes
     charts : the same patches as tables
+    reference : the joined surface as a mesh, and the inside of the object
     tolerance : mean deviation of the height that the touches were to reach, a length; None if there was none
     uncovered : places on rims beyond which the object goes on unfelt
+    check : contacts from outside that the patches do not have; None if there were none
+    taps : contacts between the curves of each patch, to which the joined patches are fitted, too
     """
 
     patches: tuple[Reconstruction, ...]
     charts: Charts
+    reference: ReferenceMesh
     tolerance: float | None = None
     uncovered: tuple[Place, ...] = ()
+    check: Check | None = None
+    taps: tuple[Contour, ...] = ()
 
     @cached_property
     def edges(self) -> list[Edge]:
@@ -101,18 +138,57 @@ class Atlas:
                 f"The patches end at {places} where the object goes on: allow more touches or a larger "
                 "tolerance."
             )
-        rough = len(self._uncertain)
-        if rough:
+        rough, _ = self._rough
+        if rough > ROUGH:
             return "uncertain", (
-                f"{rough} of {len(self.patches)} patches are less certain than the tolerance: touch "
-                "there again or use a larger tolerance."
+                f"The deviation is above the tolerance on {100.0 * rough:.0f} % of the surface: touch there "
+                "again or use a larger tolerance."
             )
-        return "ok", "The object was felt everywhere a finger could reach."
+        return self._checked()
 
     @cached_property
-    def _uncertain(self) -> list[int]:
-        """Indices of the patches less certain than the tolerance, the worst first."""
-        return self.charts.less_certain_than(np.inf if self.tolerance is None else self.tolerance)
+    def _rough(self) -> tuple[float, int]:
+        """The share of the surface less certain than LIMIT tolerances, and the least certain vertex."""
+        mesh = self.reference.mesh
+        if self.tolerance is None or not len(mesh.triangles):
+            return 0.0, -1
+        a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        rough = mesh.std[mesh.triangles].max(axis=1) > LIMIT * self.tolerance
+        return float(areas[rough].sum() / areas.sum()), int(np.argmax(mesh.std))
+
+    @cached_property
+    def _contacts(self) -> tuple[Array, Array]:
+        """Signed distances and deviations (n,) of the contacts of the check."""
+        if self.check is None or not len(self.check.points):
+            return np.zeros(0), np.zeros(0)
+        return self.distance(self.check.points)
+
+    @property
+    def contradicting(self) -> NDArray[np.bool_]:
+        """Which contacts of the check (n,) are farther from the surface than is explained."""
+        distance, std = self._contacts
+        explained = np.maximum(OFF_STDS * std, OFF_TOLERANCES * (self.tolerance or 0.0))
+        # The mesh may end an edge or so before a border of the object.
+        explained[np.isinf(std)] = BORDER * self.reference.mesh.edge
+        return np.abs(distance) > explained
+
+    def _checked(self) -> tuple[str, str]:
+        """The verdict of the check."""
+        (distance, std), missed = self._contacts, 0 if self.check is None else len(self.check.missed)
+        wrong, count = int(self.contradicting.sum()) + missed, len(distance) + missed
+        if wrong:
+            return "uncertain", (
+                f"{wrong} of {count} rays from outside meet something else than the surface: allow more "
+                "touches or use a smaller tolerance."
+            )
+        held = np.mean(np.abs(distance) <= WITHIN_90 * std) if count else 1.0
+        if held < HELD:
+            return "uncertain", (
+                f"Only {100.0 * held:.0f} % of {count} contacts from outside are within the 90 % interval of "
+                "the surface: use a larger tolerance."
+            )
+        return "ok", "The object was felt everywhere a finger could reach."
 
     def next_touch(self) -> NextTouch | None:
         """Where the next touch would bring most, or None if all is covered to the tolerance."""
@@ -120,10 +196,12 @@ class Atlas:
             place = max(self.uncovered, key=lambda place: place.radius)
             area = np.pi * place.radius**2
             return NextTouch(np.array(place.point), np.array(place.normal), area)
-        if not self._uncertain:
+        rough, vertex = self._rough
+        if rough <= ROUGH:
             return None
-        worst = self._uncertain[0]
-        return NextTouch(*self.charts.least_certain(worst), self.patches[worst].domain.area)
+        mesh = self.reference.mesh
+        patch = self.patches[mesh.patch[vertex]]
+        return NextTouch(mesh.vertices[vertex], mesh.normals[vertex], patch.domain.area)
 
     def distance(self, points: ArrayLike) -> tuple[Array, Array]:
         """Signed distances (n,) of points (n, 3), negative inside, and their standard deviations (n,).
@@ -132,51 +210,11 @@ class Atlas:
         something unfelt might be nearer, and the deviation is inf.
         """
         p = finite_array("points", points, (None, 3), LARGEST)
-        field = told(self.charts, self._felt, p)
-        distance, std, near = field.distance.copy(), field.std.copy(), np.isfinite(field.std)
-        far = np.flatnonzero(~near | (np.abs(distance) > CLOSE * self.charts.radii[field.node]))
-        if len(far):
-            distance[far], std[far] = self._far(p[far], distance[far], near[far])
+        parts = [
+            self.reference.distances(self.charts, some) for some in np.array_split(p, len(p) // AT_ONCE + 1)
+        ]
+        distance, std = (np.concatenate(values) for values in zip(*parts, strict=True))
         return distance, std
-
-    def _far(self, points: Array, guess: Array, near: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Distances and deviations (n,) from the nearest feet; the field says a guess, and if it is near."""
-        samples = self._samples
-        nearest = samples.tree.query(points)[1]
-        feet, field = nearest_feet(self.charts, points, samples.points[nearest])
-        off, apart = points - feet, samples.apart[nearest]
-        away, ahead = np.linalg.norm(off, axis=1), np.einsum("ni,ni->n", off, field.normal)
-        # If the way to the foot is not along its normal, the foot is at an edge, or another is nearer.
-        missed = np.minimum(away - np.abs(ahead), apart**2 / np.maximum(2.0 * away, 1e-300))
-        std = np.where(np.isfinite(samples.stds[nearest]), np.hypot(field.std, missed), np.inf)
-        # At an edge the normal of one wall does not tell the side, and beyond it a patch may go on.
-        side = np.where(~near & (np.abs(ahead) > AHEAD * away), ahead, guess)
-        return np.copysign(away, side), std
-
-    @cached_property
-    def _felt(self) -> Felt:
-        return felt_by(self.patches, self.charts)
-
-    @cached_property
-    def _samples(self) -> _Samples:
-        from scipy.spatial import cKDTree
-
-        charts, count = self.charts, len(self.patches)
-        turns = 2.0 * np.pi * np.arange(SAMPLE_TURNS) / SAMPLE_TURNS
-        node = np.repeat(np.arange(count), SAMPLE_TURNS * SAMPLES_OUTWARD)
-        rays = np.tile(np.repeat(np.stack([np.cos(turns), np.sin(turns)]), SAMPLES_OUTWARD, axis=1), count)
-        out = np.tile(np.arange(1, SAMPLES_OUTWARD + 1) / SAMPLES_OUTWARD, SAMPLE_TURNS * count)
-        x, y = rays * out / np.maximum(charts.shares(rays[0], rays[1], node), 1e-9)
-        points, normals = charts.world(node, x, y)
-        pairs = charts.pairs(points)
-        other = (pairs.share < INSIDE) & (pairs.node != node[pairs.place])
-        other &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
-        inside = np.bincount(pairs.place[other], minlength=len(points)) > 0
-        field, apart = blended(charts, points), np.pi / SAMPLE_TURNS * charts.radii[node]
-        field.std[(out == 1.0) & ~inside] = np.inf
-        # At a rim, or beyond an edge, a patch may be off the surface of all.
-        on = np.abs(field.distance) <= OFF_SURFACE * field.std
-        return _Samples(points[on], field.std[on], apart[on], cKDTree(points[on]))
 
     def mesh(self, edge: float) -> Mesh:
         """The surface as triangles whose edges are about as long as asked.
@@ -187,14 +225,8 @@ class Atlas:
         return mesh
 
     def suggested_edge(self) -> float:
-        """The edge at which triangles are off the surface by half its deviation, as a median of the patches.
-
-        A chord e of a circle of curvature k is off it by k e^2 / 8. The edge is at most half a radius long.
-        """
-        bends = np.array([max(abs(r.patch.k1), abs(r.patch.k2)) for r in self.patches])
-        stds, radii = self.charts.mean_stds, self.charts.radii
-        chords = np.sqrt(4.0 * stds / np.maximum(bends, stds / radii**2))
-        return float(np.median(np.minimum(chords, 0.5 * radii)))
+        """The length of the edges of the reference mesh."""
+        return suggested_edge(self.patches, self.charts, self.reference.indicator)
 
     def curvatures(self, mesh: Mesh) -> dict[str, Array]:
         """The curvatures of `curvatures_at` at the vertices of a mesh of this atlas."""
@@ -220,10 +252,10 @@ class Atlas:
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """Makes the `mesh` in steps: yields the share that is done, and returns the mesh."""
-        edge, size = number("edge", edge, above=0.0), float(np.ptp(self._felt.points, axis=0).max())
+        edge, size = number("edge", edge, above=0.0), self.reference.indicator.size
         if edge > size:
             raise ValueError(f"edge: expected at most the size of what was felt, {size:.3g}, got {edge:.3g}")
-        return meshed(self.charts, self._felt, edge)
+        return meshed(self.charts, self.reference.indicator, edge)
 
     def to_dict(self) -> dict[str, Any]:
         """The graph as JSON has it: a dict of numbers, words, lists and dicts, in the caller's unit.

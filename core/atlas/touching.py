@@ -2,36 +2,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches that grow over a whole object by themselves (paper, VI), and the surface of all of them."""
 
-from collections.abc import Callable, Generator, Sequence
+import math
+from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
-from ..contours.contour import tangent_of, vector_of
-from ..contours.finger import FACING, Finger, Surface, first_contact
+from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
+from ..contours.finger import FACING, Finger, Surface, contact_of, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.side_by_side import exploring
 from ..exploration.touches import explore
 from .charts import Charts
-from .field import covered
-from .frontier import Frontier, middle_of
+from .frontier import Frontier
 from .join import Table, agreed, joined
-from .object_atlas import Atlas
+from .meshing import Mesh
+from .object_atlas import LIMIT, Atlas, Check, surfaced
 
 # python -m benchmarks.atlas judges these.
 MOST = 1000  # There are at most so many touches, unless the caller says otherwise.
 FIRST_EXTENT = 300.0  # A half curve of the first touch is at most so many tolerances long.
+GOOD = 10.0  # The first patch is looked for beside the start if its radius is below so many tolerances,
+BESIDE, AROUND = (10.0, 30.0), 8  # so many tolerances away, in so many directions.
 SIZE = 1.4  # A patch may have a mean deviation of so many tolerances before its neighbors are known.
 SMALL = 5.0  # Touches do not go on from a patch whose radius is below so many tolerances.
 NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only so many tolerances.
 SIDE_BY_SIDE = 8  # So many touches at once are faster, and still done in a tenth of a second.
-AGAIN = 2  # Patches less certain than the tolerance are touched again at most so often.
+NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
+AGAIN = 3  # Where something is missing or less certain, touches go on at most so often.
+CHECKS, CHECK_SEED = 256, 0  # So many rays from outside check the surface.
+HAIR = 0.01  # It is cast again this share of the tolerance aside.
+STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
+ROUGH_APART = 0.5  # Touches where the surface is less certain are so many radii apart.
 LARGER = 2.0  # A touch reaches at most so many radii of the patch from which it goes on.
 
-Contact = tuple[Array, Array]  # A point and its normal, (3,) each.
+Contact = tuple[ArrayLike, ArrayLike]  # A point and its normal, (3,) each.
 
 
 class Progress(NamedTuple):
@@ -116,14 +124,52 @@ class _Run:
         self.done = 0
 
     def first(self, point: Array, up: Array) -> Progress:
-        """Makes the touch from which all others go on. Raises ValueError if it fails."""
-        first = explore(self.surface, point, up, farthest=FIRST_EXTENT * self.tolerance, **self.wanted)
+        """Makes the touch from which all others go on. Raises ValueError if it fails, and those beside it.
+
+        Where the point is on a crease or in a corner, a place beside it makes a better patch.
+        """
         p, n = vector_of(point), vector_of(up)
-        side = first_contact(self.surface, p, n, tangent_of(n, None), first.step)[2]
-        self.frontier = Frontier(Finger(self.surface, side), np.pi * (NARROW * self.tolerance) ** 2)
+        best, why = None, None
+        for at, outward in self._places(p, n):
+            try:
+                e = explore(self.surface, at, outward, farthest=FIRST_EXTENT * self.tolerance, **self.wanted)
+            except ValueError as error:
+                why = why or error
+                continue
+            if best is None or e.result.radius > best[0].result.radius:
+                best = e, at, outward
+            if e.result.radius >= GOOD * self.tolerance:
+                break
+        if best is None:
+            assert why is not None
+            raise why
+        first, at, outward = best
+        side = first_contact(self.surface, at, outward, tangent_of(outward, None), first.step)[2]
+        self.frontier = Frontier(
+            Finger(self.surface, side),
+            NEAR * self.tolerance,
+            np.pi * (SMALL * self.tolerance) ** 2,
+            self.wanted["noise"],
+            self.wanted["rng"],
+        )
         self.frontier.add(first.result)
         self.found, self.done = [first], 1
         return self.now(new=[first])
+
+    def _places(self, point: Vector, up: Vector) -> Iterator[tuple[Vector, Vector]]:
+        """The point and its outward direction, then contacts of a finger that comes down on places beside."""
+        yield point, up
+        e1 = tangent_of(up, None)
+        e2 = cross(up, e1)
+        for length in BESIDE:
+            for turn in np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False):
+                reach = length * self.tolerance
+                way = along(scaled(e1, math.cos(turn)), e2, math.sin(turn))
+                start = along(along(point, way, reach), up, reach)
+                hit = self.surface.ray_cast(start, scaled(up, -1.0), 3.0 * reach)
+                if hit is not None:
+                    contact, normal = contact_of(hit, 1.0)
+                    yield contact, scaled(normal, math.copysign(1.0, dot(normal, up)))
 
     def now(self, joining: float | None = None, new: Sequence[Exploration] = ()) -> Progress:
         """The Progress so far, with the new touches."""
@@ -142,8 +188,7 @@ class _Run:
         for e, up, times in zip(results, outward, least, strict=True):
             if isinstance(e, ValueError) or e.result.frame.axes[:, 2] @ up < FACING:
                 continue  # At an edge a fit may end up on the other side.
-            if e.result.radius >= times * self.tolerance:
-                self.frontier.add(e.result, goes_on=e.result.radius >= SMALL * self.tolerance)
+            if self.frontier.add(e.result, times * self.tolerance, SMALL * self.tolerance):
                 new.append(e)
                 yield
         self.found += new
@@ -153,49 +198,100 @@ class _Run:
     def joining(self, known: dict[int, tuple[int, Table]]) -> Generator[float, None, Charts]:
         """The joined patches; yields the share that is done."""
         assert self.frontier.charts is not None
-        contours, results = [e.contours for e in self.found], [e.result for e in self.found]
+        contours = [[*e.contours, taps] for e, taps in zip(self.found, self.frontier.taps, strict=True)]
+        results = [e.result for e in self.found]
         yield 0.0
         return (yield from joined(contours, results, self.frontier.charts, self.wanted["noise"], known))
 
-    def missing(self, charts: Charts, rough: list[int]) -> list[Contact | None]:
-        """For each patch of `rough` the contact in the middle of those that no other covers, or None."""
-        others = charts.chosen(np.setdiff1d(np.arange(len(self.found)), rough))
-        found: list[Contact | None] = []
-        for i in rough:
-            points = np.vstack([contour.points for contour in self.found[i].contours])
-            normals = np.vstack([contour.normals for contour in self.found[i].contours])  # type: ignore[misc]
-            new = np.flatnonzero(~covered(others, points, normals))
-            middle = new[middle_of(points[new])] if len(new) else None
-            found.append(None if middle is None else (points[middle], normals[middle]))
+    def going_on(
+        self, contacts: Sequence[Contact], farthest: float
+    ) -> Generator[Progress, bool | None, bool]:
+        """Touches at contacts, and all over from there. Returns whether to go on."""
+        some, more = contacts[: self.most - self.done], True
+        new: list[Exploration] = []
+        if some:
+            new, more = yield from _told(self.touch(some, farthest, [SMALL] * len(some)), self.now)
+        more = (yield self.now(new=new)) is not False and more
+        return (yield from _all_over(self, more))
+
+    def check(self, mesh: Mesh) -> Check:
+        """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
+        rng = np.random.default_rng(CHECK_SEED)
+        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        middle, far = 0.5 * (low + high), float(np.linalg.norm(high - low))
+        starts = rng.normal(size=(CHECKS, 3))
+        starts *= far / np.linalg.norm(starts, axis=1, keepdims=True)
+        starts += middle
+        # Half of the rays go to places of the surface, the others to any place near the object.
+        aims = middle + 0.5 * far * rng.uniform(-1.0, 1.0, (CHECKS, 3))
+        aimed = mesh.triangles[rng.integers(len(mesh.triangles), size=CHECKS // 2)]
+        aims[: CHECKS // 2] = mesh.vertices[aimed].mean(axis=1)
+        ways = aims - starts
+        away = np.linalg.norm(ways, axis=1)
+        ways /= away[:, None]
+        facing = np.zeros(CHECKS, dtype=bool)
+        facing[: CHECKS // 2] = (
+            np.einsum("ni,ni->n", mesh.normals[aimed[:, 0]], ways[: CHECKS // 2]) < -STRAIGHT
+        )
+        found, missed = [], []
+        for i in range(CHECKS):
+            # Between two faces of a mesh a ray may slip through. A hair's breadth aside it does not.
+            for aside in (0.0, HAIR * self.tolerance):
+                start = vector_of(starts[i] + aside)
+                contact = self.frontier.finger.met(start, vector_of(ways[i]), 3.0 * far)
+                if contact is not None:
+                    found.append(contact)
+                    break
+            else:
+                if facing[i]:
+                    missed.append(aims[i])
+        points, normals = np.array(found).reshape(-1, 2, 3).transpose(1, 0, 2)
+        return Check(points, normals, np.array(missed).reshape(-1, 3))
+
+    def rough(self, mesh: Mesh) -> list[Contact]:
+        """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
+        left = np.flatnonzero(mesh.std > LIMIT * self.tolerance)
+        found: list[Contact] = []
+        assert self.frontier.charts is not None
+        while len(left):
+            worst = left[np.argmax(mesh.std[left])]
+            point, normal = vector_of(mesh.vertices[worst]), vector_of(mesh.normals[worst])
+            contact = self.frontier.finger.near(point, normal, self.frontier.near)
+            found += [contact] if contact else []
+            apart = ROUGH_APART * self.frontier.charts.radii[mesh.patch[worst]]
+            left = left[((mesh.vertices[left] - mesh.vertices[worst]) ** 2).sum(axis=1) > apart**2]
         return found
 
 
 def _joined(run: _Run, more: bool) -> Steps:
-    """The atlas of what was found, after more touches where patches are less certain than the tolerance.
+    """The atlas of what was found, after more touches where something is missing or less certain.
 
-    Patches that stay less certain are left out if others cover all that they have felt.
+    These are where the joined surface ends though the object goes on, where a finger from outside meets
+    something else, and where the surface is less certain than the tolerance.
     """
     known: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
-        charts, goes_on = yield from _told(run.joining(known), run.now)
-        more = goes_on and more
-        rough = charts.less_certain_than(run.tolerance)
-        missing = run.missing(charts, rough)
-        chosen = [contact for contact in missing if contact is not None][: run.most - run.done]
-        if not (again and chosen and more):
+        charts, first = yield from _told(run.joining(known), run.now)
+        charts, second = yield from _told(agreed(charts), run.now)
+        patches = tuple(e.result for e in run.found)
+        reference, third = yield from _told(surfaced(patches, charts, run.tolerance), lambda _: run.now(1.0))
+        check = run.check(reference.mesh)
+        fourth = (yield run.now(1.0)) is not False
+        uncovered = run.frontier.uncovered(reference.mesh)
+        places, taps = tuple(place for place, _ in uncovered), tuple(run.frontier.taps)
+        atlas = Atlas(patches, charts, reference, run.tolerance, places, check, taps)
+        off = atlas.contradicting
+        fifth = (yield run.now(1.0)) is not False
+        more = all((more, first, second, third, fourth, fifth))
+        contacts: list[Contact] = [contact for _, contact in uncovered]
+        contacts += list(zip(check.points[off], check.normals[off], strict=True)) + run.rough(reference.mesh)
+        before = len(run.found)
+        if not (again and more and contacts):
             break
-        farthest, before = float(charts.radii[rough].max()), len(run.found)
-        new, more = yield from _told(run.touch(chosen, farthest, [SMALL] * len(chosen)), run.now)
-        more = (yield run.now(new=new)) is not False and more
-        more = yield from _all_over(run, more)
+        more = yield from run.going_on(contacts, float(charts.radii.max()))
         if len(run.found) == before:
             break
-    gone = [i for i, contact in zip(rough, missing, strict=True) if contact is None]
-    kept = np.setdiff1d(np.arange(len(run.found)), gone)
-    patches, charts = tuple(run.found[i].result for i in kept), charts.chosen(kept)
-    charts, _ = yield from _told(agreed(charts), run.now)
-    uncovered, _ = yield from _told(run.frontier.uncovered(charts), lambda _: run.now(1.0))
-    return Atlas(patches, charts, run.tolerance, tuple(uncovered))
+    return atlas
 
 
 def explore_object(

@@ -26,6 +26,7 @@ DISK_PLACES = 36  # A disk around a contact is felt at so many places.
 LOW = 0.1  # The finger comes down on a place from at most this share of the radius above it.
 ABOVE = 0.6  # The finger is this share of the disk's radius above a contact when it feels around it.
 HAIR = 0.02  # The finger slides along the surface this share of the radius above it.
+ALIKE = 0.5  # The surface is that of a patch if the cosine between their normals is more.
 FACING = 0.34  # The cosine of 70 degrees: what turns away by more is another wall.
 
 _Hit = tuple[Sequence[float], Sequence[float]]  # A point and a normal, as a surface answers.
@@ -81,7 +82,7 @@ def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float)
         )
         if hit is None:
             return None
-        (x, y, z), (nx, ny, nz) = _contact(hit, side)
+        (x, y, z), (nx, ny, nz) = contact_of(hit, side)
         dx, dy, dz = x - x0, y - y0, z - z0
         at = complex(dx * tx + dy * ty + dz * tz, dx * ux + dy * uy + dz * uz)
         up = complex(nx * tx + ny * ty + nz * tz, nx * ux + ny * uy + nz * uz)
@@ -90,7 +91,7 @@ def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float)
     return cast
 
 
-def _contact(hit: _Hit, side: float) -> Contact:
+def contact_of(hit: _Hit, side: float) -> Contact:
     """The point and `side` times the normal that a surface answered. Raises ValueError if these are none."""
     try:
         (x, y, z), (nx, ny, nz) = hit
@@ -202,9 +203,19 @@ class Finger(NamedTuple):
                 hits.append(felt)
         return np.array(hits)
 
+    def met(self, start: Vector, way: Vector, length: float) -> Contact | None:
+        """The first contact of a finger that comes along a unit direction, or None."""
+        return self._felt(self.surface.ray_cast(start, way, length), way)
+
+    def near(self, point: Vector, normal: Vector, length: float) -> Contact | None:
+        """The contact along a normal within a length of a point, if the surface there faces the same way."""
+        down = scaled(normal, -1.0)
+        felt = self._felt(self.surface.ray_cast(along(point, normal, length), down, 2.0 * length), down)
+        return felt if felt is not None and dot(felt[1], normal) > ALIKE else None
+
     def _felt(self, hit: _Hit | None, way: Vector) -> Contact | None:
         """The contact where a ray in this direction has hit, or None if it came from inside the object."""
-        found = None if hit is None else _contact(hit, self.side)
+        found = None if hit is None else contact_of(hit, self.side)
         return None if found is None or dot(found[1], way) >= 0.0 else found
 
 

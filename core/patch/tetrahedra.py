@@ -8,7 +8,6 @@ that of Labelle and Shewchuk 2007: its tetrahedra are all alike.
 
 from collections.abc import Generator
 from functools import cache
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,6 @@ from ..arguments import Array
 Indices = NDArray[np.intp]
 
 # python -m benchmarks.atlas judges these.
-JUMP = 3.0  # Where the field is steeper it jumps from wall to wall and has no surface.
-TURN = 0.5  # The surface may cross an edge twice if the cosine between the gradients at its ends is less.
 SMOOTHING_SHARE = 0.6  # Vertices move this share of the way to their neighbors' mean.
 FACE_CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])  # The corners of a face, from its center.
 
@@ -70,36 +67,11 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
     return points, np.concatenate(index).reshape(-1, 4)
 
 
-def crossed_twice(tetrahedra: Indices, points: Array, values: Array, normals: Array) -> Indices:
-    """Edges (n, 2) on one side of the surface that it may cross twice, for it turns between their ends."""
-    ends = tetrahedra[:, list(combinations(range(4), 2))].reshape(-1, 2)
-    a, b = ends.T
-    some = np.flatnonzero((values[a] < 0.0) == (values[b] < 0.0))
-    some = some[np.einsum("ni,ni->n", normals[a[some]], normals[b[some]]) < TURN]
-    lengths = np.linalg.norm(points[a[some]] - points[b[some]], axis=1)
-    some = some[np.abs(values[a[some]]) + np.abs(values[b[some]]) < lengths]
-    return np.unique(np.sort(ends[some], axis=1), axis=0)
-
-
-def split(tetrahedra: Indices, edges: Indices, new: int) -> Indices:
-    """Tetrahedra with points new, new + 1, ... on edges (n, 2), so that all around one are cut in two."""
-    concerned = np.isin(tetrahedra, edges).sum(axis=1) > 1
-    some = tetrahedra[concerned]
-    for k, (a, b) in enumerate(edges.tolist()):
-        on = (some == a).any(axis=1) & (some == b).any(axis=1)
-        halves = [np.where(some[on] == end, new + k, some[on]) for end in (a, b)]
-        some = np.concatenate([some[~on], *halves])
-    return np.concatenate([tetrahedra[~concerned], some])
-
-
-def cut(tetrahedra: Indices, values: Array, size: float) -> tuple[Indices, Indices]:
+def cut(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
     """Lattice edges (n, 2) that the surface crosses, and its triangles (m, 3) between these crossings."""
     inside = values < 0.0
     signs = inside[tetrahedra]
     mixed = signs.any(axis=1) & ~signs.all(axis=1)
-    # Two corners of a tetrahedron are an edge of a cube apart at most.
-    at = values[tetrahedra]
-    mixed &= np.ptp(at, axis=1) <= JUMP * size
     tetrahedra, signs = tetrahedra[mixed], signs[mixed]
     case = signs @ (1 << np.arange(4))
     table = _table()
@@ -152,3 +124,44 @@ def evened(vertices: Array, normal: Array, triangles: Indices) -> Array:
     move[border | (counts == 0.0)] = 0.0
     moved: Array = vertices + SMOOTHING_SHARE * move
     return moved
+
+
+def sides_of(triangles: Indices, count: int) -> Indices:
+    """The different edges (n, 2) of triangles (m, 3) between `count` vertices."""
+    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    keys = np.unique(ends.min(axis=1) * count + ends.max(axis=1))
+    return np.stack(np.divmod(keys, count), axis=1)
+
+
+def halved(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
+    """Vertices (n, 3) and triangles (m, 3) with a vertex more in the middle of each edge."""
+    sides = sides_of(triangles, len(vertices))
+    middles = vertices[sides].mean(axis=1)
+    return np.vstack([vertices, middles]), split_sides(triangles, sides, len(vertices))
+
+
+def split_sides(triangles: Indices, sides: Indices, new: int) -> Indices:
+    """Triangles with vertices new, new + 1, ... on sides (n, 2)."""
+    if not len(sides):
+        return triangles
+    keys = sides[:, 0] * new + sides[:, 1]
+    order = np.argsort(keys)
+    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
+    wanted = ends[..., 0] * new + ends[..., 1]
+    at = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
+    middle = np.where(keys[order][at] == wanted, new + order[at], -1)
+    halves = (middle >= 0).sum(axis=1)
+    found = [triangles[halves == 0]]
+    for count in (1, 2, 3):
+        some, mid = triangles[halves == count], middle[halves == count]
+        # With one side split, it comes first; with two, the whole one comes last.
+        turn = np.argmax(mid >= 0, axis=1) if count == 1 else (np.argmin(mid, axis=1) + 1) % 3
+        turned = (turn[:, None] + np.arange(3)) % 3
+        (a, b, c), (p, q, r) = np.take_along_axis(some, turned, 1).T, np.take_along_axis(mid, turned, 1).T
+        parts = {
+            1: [(a, p, c), (p, b, c)],
+            2: [(p, b, q), (a, p, q), (a, q, c)],
+            3: [(a, p, r), (p, b, q), (r, q, c), (p, q, r)],
+        }[count]
+        found += [np.stack(part, axis=1) for part in parts]
+    return np.concatenate(found)

@@ -21,9 +21,7 @@ def object_page(obj):
     record = obj[patch_record.ATLAS_RECORD].to_dict()
     was_touched = "touches" in record
     sections = [
-        page.verdict(
-            f"{object_summary(record)}. {record['message']}", record["is_closed"] and record["status"] == "ok"
-        ),
+        page.verdict(f"{object_summary(record)}. {record['message']}", record["status"] == "ok"),
         _pictures(obj.data, unit_of(record), "deviation" if was_touched else "height_std"),
         *(_deviations(obj.data, record) if was_touched else ()),
         *parts.ending(object_table_rows(record), record),

@@ -22,6 +22,7 @@ class DetachedMesh(PlacedMesh):
     name, matrix : name and transform of the object
     points, normals : (n, 3), of the vertices; has_face : (n,), whether they belong to a face
     faces : (m, 3), the first three vertices of each face
+    triangles : (k, 3), all faces in triangles, counterclockwise from outside
     size : the longest edge of the box around all faces, in the world
     spacing : the largest distance of neighboring float32 numbers in the mesh
     """
@@ -44,6 +45,11 @@ class DetachedMesh(PlacedMesh):
         starts = np.empty(len(mesh.polygons), dtype=np.int32)
         mesh.polygons.foreach_get("loop_start", starts)
         self.faces = corners[starts[:, None] + np.arange(3)]
+        mesh.calc_loop_triangles()
+        self.triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", self.triangles.ravel())
+        if np.linalg.det(linear) < 0.0:
+            self.triangles = self.triangles[:, ::-1]
         self.has_face = np.zeros(len(co), dtype=bool)
         self.has_face[corners] = True
         # Loose vertices cannot be touched and may be far away.

@@ -30,9 +30,9 @@ def readable_rows(report):
         ("contacts", contacts),
         *_lengths(report, unit),
         *([("more planes", added_planes(report, unit))] if report.get("added_planes") else []),
-        ("point", f"{_vector(np.divide(report['frame']['origin'], unit[1]))} {unit[0]}".rstrip()),
-        ("normal", _vector(report["frame"]["normal"])),
-        ("direction d1", _vector(report["frame"]["d1"])),
+        ("point", f"{vector(np.divide(report['frame']['origin'], unit[1]))} {unit[0]}".rstrip()),
+        ("normal", vector(report["frame"]["normal"])),
+        ("direction d1", vector(report["frame"]["d1"])),
         ("kappa1, kappa2", ", ".join(_measured(report, key, -1, unit) for key in ("k1", "k2"))),
         ("Gaussian curvature", _measured(report, "gaussian_curvature", -2, unit)),
         ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
@@ -159,12 +159,12 @@ def _spread(found, what, unit):
 
 def _suggestion(plane, unit):
     return (
-        f"azimuth {plane['azimuth']:.0f} degrees, along {_vector(plane['tangent'])}; "
+        f"azimuth {plane['azimuth']:.0f} degrees, along {vector(plane['tangent'])}; "
         f"would take height std to {say(plane['expected_height_std'], 1, unit)}"
     )
 
 
-def _vector(v):
+def vector(v):
     return " ".join(f"{x:.5g}" for x in v)
 
 

@@ -96,7 +96,8 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     def _done(self):
         if self._touches.is_stopped:
             self.stop = "Drop It"
-        return self._touches.words, self._touches.share
+        words, share = self._touches.words, self._touches.share
+        return words if share is None else f"{words}: {share:.0%}", share
 
     def _check(self, context):
         self._touches.surface.require_source(context)
@@ -120,7 +121,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         made = whole_mesh.insert(context.scene, target.name, self._touches.whole, self._touches.report())
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
-        self.report({"INFO"} if record["is_closed"] else {"WARNING"}, object_summary(record))
+        self.report({"INFO"} if record["status"] == "ok" else {"WARNING"}, object_summary(record))
         return {"FINISHED"}
 
     def draw(self, context):

@@ -3,9 +3,10 @@
 """What the panel and the shell say of a whole object."""
 
 import bpy
+import numpy as np
 
 from ..touch import units
-from ..touch.wording import many, table
+from ..touch.wording import many, table, vector
 
 
 def unit_of(record):
@@ -33,6 +34,7 @@ def object_table_rows(record):
         ("tolerance", _tolerance(record)),
         ("height std", units.say(record["height_std"], 1, unit)),
         ("off the mesh", off and f"mean {off}; max {_off(record, 'max')}"),
+        ("farthest at", _place(record)),
         ("mesh", f"{record['vertices']} vertices, {record['triangles']} triangles"),
     )
 
@@ -51,7 +53,7 @@ def object_rows(record):
     return _known(
         ("Touches", record.get("touches")),
         ("Contacts", record.get("contacts")),
-        ("Surface", "Closed" if record["is_closed"] else "Open"),
+        ("Surface", _ends(record)),
         ("Rims Left", record.get("uncovered")),
         ("Tolerance", _tolerance(record)),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
@@ -72,8 +74,13 @@ def _surface(record):
     if record["is_closed"]:
         return "closed all round"
     if record.get("uncovered"):
-        return f"open, with {many(record['uncovered'], 'place', 'places')} from which it could go on"
+        return f"incomplete, with {many(record['uncovered'], 'place', 'places')} from which it could go on"
     return "open where nothing was felt"
+
+
+def _ends(record):
+    """In a word, whether the surface that is shown has no rim; never "Closed" where touches could go on."""
+    return "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"
 
 
 def _tolerance(record):
@@ -85,3 +92,11 @@ def _off(record, what):
     """The mean or largest deviation from the mesh in words, or None if there was no mesh."""
     off = record.get(f"deviation_{what}")
     return None if off is None else units.say(off, 1, unit_of(record))
+
+
+def _place(record):
+    """Where in the world the surface and the mesh are farthest apart, or None if that is unknown."""
+    if "deviation_place" not in record:
+        return None
+    name, size = unit_of(record)
+    return f"{vector(np.divide(record['deviation_place'], size))} {name}".rstrip()

@@ -11,15 +11,15 @@ from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
 from ..touch.units import length
 from ..touch.wording import many
+from .both_ways import BothWays
 from .whole_surface import WholeSurface
 
 # These lengths are shares of the object's size.
 TOLERANCE_SHARE = 1.0 / 500.0  # The default tolerance.
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 SHORTEST_EDGE = 1e-3  # It makes some millions of triangles.
-TARGET_WITHIN = 0.05  # The target is looked for along the normal within this distance.
+OFF_TOLERANCES = 3.0  # The surface is no good if it is off the mesh by more tolerances, as in core's check.
 STARTS = 20  # So many places to begin are tried if none is given.
-COMPARED_AT_ONCE = 2000  # A step measures the deviations of so many vertices from the target.
 
 
 class ObjectTouches:
@@ -30,7 +30,7 @@ class ObjectTouches:
     done : the number of touches so far, including those that gave no patch
     uncovered : the number of places that are known to be uncovered
     words, share : what is going on, and the share of it that is done, or None if that is unknown
-    whole : the WholeSurface, once the steps are done
+    whole, compared : the WholeSurface, and its BothWays from the mesh, once the steps are done
     """
 
     def __init__(self, obj, depsgraph, *, location, tolerance, noise, seed, most, edge):
@@ -51,6 +51,7 @@ class ObjectTouches:
         self.found, self.done, self.uncovered = [], 0, 0
         self.words, self.share = "Looking for a place to begin", None
         self.is_stopped = False
+        self._rounds, self._is_joining = 0, False
         self._start = None
         if location is not None:
             at = np.subtract(location, self.surface.origin)
@@ -130,26 +131,29 @@ class ObjectTouches:
         self.found += [exploration.result for exploration in state.found]
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
-        self.words, self.share = f"{touches}, {places} to go on from", None
-        if state.joining is not None:
-            self.words = f"Joining {many(len(self.found), 'patch', 'patches')}"
-            self.share = 0.5 * state.joining
+        self.words = f"{touches}, {places} to go on from"
+        if state.joining is None:
+            self._is_joining = False
+            return
+        self._rounds += not self._is_joining
+        self._is_joining = True
+        patches = many(len(self.found), "patch", "patches")
+        self.words = f"Joining {patches}" if state.joining < 1.0 else f"Checking the surface of {patches}"
+        # Nobody knows how often it goes back to touching. Each round has half of what is left.
+        left = 0.5**self._rounds
+        self.share = max(self.share or 0.0, 0.5 - left + 0.5 * left * state.joining)
 
     def _shown(self):
         self.words, self.is_stopped = "Meshing", True
         for share in self.whole.steps(self.edge):
-            self.share = 0.5 + 0.4 * share
+            self.share = 0.5 + 0.3 * share
             yield
-        mesh, deviation = self.whole.mesh, self.whole.deviation
-        normals = mesh.normals
-        yield
-        for start in range(0, len(deviation), COMPARED_AT_ONCE):
-            some = slice(start, start + COMPARED_AT_ONCE)
-            deviation[some] = self.surface.deviations(
-                mesh.vertices[some], normals[some], TARGET_WITHIN * self.surface.size
-            )
-            self.share = 0.9 + 0.1 * start / len(deviation)
+        self.words = "Comparing"
+        self.compared = BothWays(self.surface, self.whole.mesh, self.tolerance)
+        for share in self.compared.steps():
+            self.share = 0.8 + 0.2 * share
             yield
+        self.whole.deviation = self.compared.deviation
 
     def stop(self):
         """Makes the steps touch no more, and join the patches so far."""
@@ -157,16 +161,26 @@ class ObjectTouches:
 
     def report(self):
         """What was found, as a dict of plain values."""
-        off = np.abs(self.whole.deviation)
-        return {
+        found = {
             "touches": self.done,
             "uncovered": len(self.whole.atlas.uncovered),
             **self.whole.report(),
-            "deviation_mean": float(off.mean()),
-            "deviation_max": float(off.max()),
+            "deviation_mean": self.compared.mean,
+            "deviation_max": self.compared.largest,
+            "deviation_place": (self.surface.origin + self.compared.place).tolist(),
             "size": self.surface.size,
             "tolerance": self.tolerance,
             "noise": self.noise,
             "seed": self.seed,
             "most": self.most,
         }
+        if found["status"] == "ok" and self.compared.largest > OFF_TOLERANCES * self.tolerance:
+            found["status"], found["message"] = self._off()
+        return found
+
+    def _off(self):
+        """The verdict on a surface that is farther off the mesh than its tolerance explains."""
+        return "uncertain", (
+            f"The surface is up to {length(self.compared.largest)} off the object, which the tolerance does "
+            "not explain: use a smaller tolerance, or close the holes of its mesh."
+        )

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What touches all over an object put into the scene: patches while they grow, then one surface."""
 
+import math
+
 import bpy
 import numpy as np
 from mathutils import Matrix
@@ -10,6 +12,7 @@ from ..scene import colors, patch_object, patch_record, undo
 from ..scene.mesh_data import emission, fill
 from ..scene.viewports import show_colors
 
+SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
 RINGS, SPOKES = (0.5, 1.0), 24  # While a patch is one of many, it is drawn with these rings and spokes.
 
 
@@ -88,6 +91,7 @@ def insert(scene, name, whole, report):
     ]
     fill(mesh, found.vertices, found.triangles, attributes)
     mesh.shade_smooth()
+    mesh.set_sharp_from_angle(angle=SHARP)
     obj[patch_record.ATLAS_RECORD] = report | {"source": name, "object": obj.name}
     obj[patch_record.GRAPH] = whole.graph
     patch_object.recolor(obj)

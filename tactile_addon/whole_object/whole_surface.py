@@ -26,13 +26,10 @@ class WholeSurface:
 
     def steps(self, edge):
         """Does everything, as a generator that yields the share that is done; `edge` is a length or 0."""
-        steps = self.atlas.meshing(edge or self.atlas.suggested_edge())
-        while True:
-            try:
-                yield 0.8 * next(steps)
-            except StopIteration as end:
-                self.mesh = end.value
-                break
+        if edge:
+            yield from self._meshed(edge)
+        else:
+            self.mesh = self.atlas.reference.mesh  # Its edges have the suggested length.
         if not len(self.mesh.triangles):
             raise ValueError("The patches are too small for triangles of that edge length: use a shorter one")
         points, normals = self.mesh.vertices, self.mesh.normals
@@ -52,6 +49,16 @@ class WholeSurface:
         self.graph = json.dumps(graph, allow_nan=False)
         yield 0.9
 
+    def _meshed(self, edge):
+        """Makes the mesh with edges of this length; yields the share of everything that is done."""
+        steps = self.atlas.meshing(edge)
+        while True:
+            try:
+                yield 0.8 * next(steps)
+            except StopIteration as end:
+                self.mesh = end.value
+                return
+
     def _graph(self):
         """The graph of Atlas.to_dict, moved to the world."""
         found = self.atlas.to_dict()
@@ -67,15 +74,33 @@ class WholeSurface:
     def report(self):
         """What was found, as a dict of plain values."""
         atlas, mesh = self.atlas, self.mesh
+        status, message = self._verdict()
         return {
-            "status": atlas.status,
-            "message": atlas.message,
+            "status": status,
+            "message": message,
             "patches": len(atlas.patches),
             "in_doubt": self._in_doubt,
             "edges": len(atlas.edges),
-            "is_closed": mesh.is_closed,
+            "is_closed": mesh.is_closed and not atlas.uncovered,
             "vertices": len(mesh.vertices),
             "triangles": len(mesh.triangles),
             "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # It is inf where nothing was felt.
             "radius": float(np.median([r.radius for r in atlas.patches])),
         }
+
+    def _verdict(self):
+        """The status and the message of the atlas, unless its surface has holes only as it is shown."""
+        if self.atlas.status == "ok" and _rims(self.mesh) > _rims(self.atlas.reference.mesh):
+            return "uncertain", "Triangles of this edge length leave holes: use a shorter edge length."
+        return self.atlas.status, self.atlas.message
+
+
+def _rims(mesh):
+    """The number of rims of a mesh: where its object ends, and around holes."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    ends, index = np.unique(mesh.border, return_inverse=True)
+    a, b = index.reshape(-1, 2).T
+    links = coo_matrix((np.ones(len(a)), (a, b)), (len(ends),) * 2)
+    return connected_components(links)[0] if len(ends) else 0

@@ -19,6 +19,7 @@ bpy.context.object.scale = (-1.0, 1.0, 1.0)
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
 """
 WORDS = ("--tolerance", "0.4%", "--limit", "120")
+HOLE = np.sin(0.5 * np.pi / 48)  # the radius of the holes of the ball
 AROUND = 1.0  # the radius of the torus; that of its tube is 0.4
 
 
@@ -58,8 +59,15 @@ def test_a_surface_is_where_the_object_is(rows):
         assert off.mean() < row["tolerance"]
         assert off.mean() == pytest.approx(row["deviation_mean"], abs=2e-3)  # the mesh has flat faces
         deviations = np.abs(row["vertex_deviations"])
-        assert deviations.mean() == pytest.approx(row["deviation_mean"])
-        assert deviations.max() == pytest.approx(row["deviation_max"])
+        # Vertices are where the surface was felt, and its faces are chords between them.
+        assert deviations.mean() == pytest.approx(row["deviation_mean"], abs=1e-3)
+        assert row["deviation_mean"] < row["deviation_max"]
+        if name == "ball":  # Its mesh has a hole at each pole, which the surface has not.
+            assert row["deviation_max"] == pytest.approx(HOLE, rel=0.02)
+            assert row["status"] == "uncertain" and "off the object, which the tolerance" in row["message"]
+        else:
+            assert row["deviation_max"] < 3.0 * row["tolerance"]
+        assert deviations.max() <= row["deviation_max"] * (1.0 + 1e-6)
         assert np.mean(row["vertex_stds"]) == pytest.approx(row["height_std"])
         a, b, c = vertices[triangles].swapaxes(0, 1)
         normals, outward = np.cross(b - a, c - a), (vertices - middle)[triangles[:, 0]]

@@ -179,7 +179,7 @@ def while_it_is_meshed():
     yield from start(target="Target", tolerance=0.0)  # not the last tolerance
     for _ in range(1200):
         yield 0.05
-        if WORDS[-1] == "Meshing":
+        if WORDS[-1].startswith(("Meshing", "Comparing")):
             break
     check("while it is meshed: it is under way", running(), WORDS[-1])
     picture("whole_meshing")

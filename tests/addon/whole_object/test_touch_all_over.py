@@ -5,6 +5,7 @@
 Progress, Esc and what happens to the scene meanwhile are in tests/gui/whole_object.py.
 """
 
+import math
 import os
 import subprocess
 import sys
@@ -32,10 +33,14 @@ def test_a_ball_is_closed_and_where_the_ball_is(empty, ball):
     place = np.array(surface.matrix_world)
     points = positions(surface.data) @ place[:3, :3].T + place[:3, 3] - (5.0, 6.0, 7.0)
     assert np.abs(np.linalg.norm(points, axis=1) - 2.0).max() < 0.02
-    assert values(surface.data, "gaussian_curvature") == pytest.approx(0.25, abs=0.05)
-    assert values(surface.data, "mean_curvature") == pytest.approx(-0.5, abs=0.05)
-    assert np.abs(values(surface.data, "deviation")).max() == pytest.approx(record["deviation_max"])
-    assert record["deviation_mean"] < 0.01
+    for name, true in (("gaussian_curvature", 0.25), ("mean_curvature", -0.5)):
+        curvatures = values(surface.data, name)
+        assert np.median(curvatures) == pytest.approx(true, abs=0.005)
+        # At few places a patch counts at its rim.
+        assert np.percentile(np.abs(curvatures - true), 99.5) < 0.05
+    assert np.abs(values(surface.data, "deviation")).max() <= record["deviation_max"] * (1.0 + 1e-6)
+    assert record["deviation_mean"] < record["deviation_max"] < 0.01
+    assert math.dist(record["deviation_place"], (5.0, 6.0, 7.0)) == pytest.approx(2.0, abs=0.01)
     assert set(values(surface.data, "patch")) <= set(range(record["patches"]))
 
 
@@ -76,11 +81,17 @@ def test_what_cannot_be_is_refused_and_nothing_is_left(empty, ball, inputs, mess
     assert datablocks(empty) == before
 
 
-def test_a_budget_ends_it_with_what_there_is(empty, ball):
-    _, record = touched(empty, tolerance=0.01, most=3)
+def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
+    surface, record = touched(empty, tolerance=0.01, most=3)
     assert record["touches"] == 3
     assert not record["is_closed"]
     assert record["uncovered"] > 0
+    rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
+    assert (rows["Surface"], rows["Rims Left"]) == ("Incomplete", str(record["uncovered"]))
+    # What was not felt is where the mesh is farthest from the surface.
+    assert record["deviation_max"] > 1.0
+    assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
+    assert np.abs(values(surface.data, "deviation")).max() < 0.1
 
 
 def faces_of(bpy, vertices, faces):

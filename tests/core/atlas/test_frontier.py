@@ -2,19 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where touches go on: beyond rims, elsewhere after one in vain, never inward; and what is left uncovered."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import core
 from core.atlas import touching
-from core.atlas.frontier import TRIES, Frontier, _between
+from core.atlas.charts import AZIMUTHS
+from core.atlas.frontier import Frontier, _between
+from core.atlas.meshing import Mesh
 from core.contours.finger import Finger
-from core.exploration.side_by_side import result_of
 from tests import solids
 
-BALL = solids.ball()
+BALL, NEAR = solids.ball(), 0.03
 
 
 @pytest.fixture
@@ -25,8 +24,8 @@ def first():
 
 @pytest.fixture
 def frontier(first):
-    found = Frontier(Finger(BALL, 1.0))
-    found.add(first)
+    found = Frontier(Finger(BALL, 1.0), NEAR)
+    assert found.add(first)
     return found
 
 
@@ -73,11 +72,54 @@ def test_of_places_that_bring_as_much_but_for_rounding_the_first_is_next(frontie
     assert [place for _, _, place in sorted(frontier.queue)] == [places[2], *places[:2]]
 
 
-def test_nothing_goes_on_from_a_narrow_patch(first):
-    found = Frontier(Finger(BALL, 1.0))
-    found.add(first, goes_on=False)
+def test_nothing_goes_on_from_a_narrow_patch_and_a_narrower_one_is_left_out(first):
+    found, radius = Frontier(Finger(BALL, 1.0), NEAR), first.radius
+    assert found.add(first, goes_on=1.2 * radius)
     assert not found.queue
-    assert len(found.charts.radii) == 1
+    assert len(found.charts.radii) == len(found.taps) == 1
+    assert not found.add(first, least=1.2 * radius)
+    assert len(found.charts.radii) == len(found.taps) == 1
+
+
+class Slab:
+    """The top of a plate, which ends at x = EDGE and has a notch where y > .2 + |x - .1|."""
+
+    def ray_cast(self, origin, direction, distance):
+        if direction[2] >= 0.0:
+            return None
+        way = -origin[2] / direction[2]
+        x, y = (o + way * d for o, d in zip(origin[:2], direction[:2], strict=True))
+        ends = x > EDGE or y > 0.2 + abs(x - 0.1)
+        return None if ends or not 0.0 < way <= distance else ((x, y, 0.0), (0.0, 0.0, 1.0))
+
+
+EDGE = 0.3
+
+
+def test_a_patch_ends_where_the_finger_feels_that_the_surface_does():
+    """Curves end a step before a crease, and the domain between their ends bulges beyond it."""
+    touch = core.explore(Slab(), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), extent=0.5, step=0.02, rng=0)
+    found = Frontier(Finger(Slab(), 1.0), NEAR)
+    assert found.add(touch.result)
+    charts = found.charts
+    x, y = charts.rim_at(np.arange(AZIMUTHS))
+    points, _ = charts.world(np.zeros(AZIMUTHS, dtype=int), x, y)
+    ends, notch = points[:, 0] - EDGE, (points[:, 1] - 0.2 - np.abs(points[:, 0] - 0.1)) / np.sqrt(2.0)
+    assert max(ends.max(), notch.max()) < 0.02
+    beside = np.abs(np.degrees(np.arctan2(points[:, 1], points[:, 0])) + 10.0) < 30.0
+    assert beside.sum() > 10
+    # A domain that ends far before the border stays as it is.
+    assert np.median(np.abs(ends[beside])) < 0.003
+
+
+def test_contacts_between_curves_are_on_the_surface_and_have_the_noise(first):
+    found = Frontier(Finger(BALL, 1.0), NEAR, noise=2e-3, rng=np.random.default_rng(0))
+    found.add(first)
+    (taps,) = found.taps
+    off = np.linalg.norm(taps.points, axis=1) - 1.0
+    assert len(off) == 36
+    assert np.std(off) == pytest.approx(2e-3, rel=0.3)
+    assert np.abs(np.linalg.norm(taps.normals, axis=1) - 1.0).max() < 1e-9
 
 
 def test_what_is_less_than_a_touch_has_to_bring_is_left(frontier):
@@ -88,20 +130,47 @@ def test_what_is_less_than_a_touch_has_to_bring_is_left(frontier):
     assert frontier.beyond([place]) == [None]
 
 
-def test_places_of_touches_in_vain_are_uncovered_where_the_object_goes_on(frontier, first):
-    place = frontier.queue[0][2]
-    frontier.queue = [(-1.0, 0, replace(place, tried=(place.point,) * TRIES))]
-    assert result_of(frontier.taking(4)) == []
-    assert len(result_of(frontier.uncovered(frontier.charts))) == 1
-    frontier.finger = Finger(Nothing(), 1.0)
-    assert result_of(frontier.uncovered(frontier.charts)) == []
-
-
 class Nothing:
     """No surface at all."""
 
     def ray_cast(self, origin, direction, distance):
         return None
+
+
+def cap(height):
+    """The part of the unit ball above a height, as an open mesh."""
+    turns, levels = (
+        np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False),
+        np.linspace(0.0, np.arccos(height), 13)[1:],
+    )
+    rings = [
+        np.stack([np.sin(t) * np.cos(turns), np.sin(t) * np.sin(turns), np.cos(t) + 0 * turns], 1)
+        for t in levels
+    ]
+    points = np.vstack([[[0.0, 0.0, 1.0]], *rings])
+    a = np.arange(48)
+    b = np.roll(a, -1)
+    fans = [np.column_stack([np.zeros_like(a), 1 + a, 1 + b])]
+    for k in range(len(levels) - 1):
+        inner, outer = 1 + 48 * k, 1 + 48 * (k + 1)
+        fans += [
+            np.column_stack([inner + a, outer + a, outer + b]),
+            np.column_stack([inner + a, outer + b, inner + b]),
+        ]
+    count = len(points)
+    return Mesh(points, np.vstack(fans), np.zeros(count), np.zeros(count, dtype=int))
+
+
+def test_beyond_a_border_the_object_goes_on_unless_it_ends_there(frontier):
+    mesh = cap(0.2)
+    found = frontier.uncovered(mesh)
+    assert len(found) > 4
+    for place, (point, normal) in found:
+        assert abs(place.point[2] - 0.2) < 0.02
+        assert point[2] < place.point[2]
+        assert point == pytest.approx(normal, abs=1e-6)
+    frontier.finger = Finger(Nothing(), 1.0)
+    assert frontier.uncovered(mesh) == []
 
 
 def test_a_patch_that_faces_inward_is_no_touch(monkeypatch):

@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Signed distances from the surface of an object: the nearest place on its mesh, moved onto the patches."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from ..patch.tetrahedra import Indices
+from .charts import Charts
+from .field import Surface, surface_at
+from .indicator import Indicator
+from .meshing import LEAST_DIVISOR, ROOM, Mesh
+
+# python -m benchmarks.atlas judges these.
+NEAREST = 3  # The nearest triangle is looked for at so many of the nearest vertices.
+SAME = 1e-6  # Triangles that are nearer by a smaller share of the distance are as near.
+AHEAD = 0.95  # The normal at a foot gives the sign if the cosine of its angle to the way there is more.
+FAR = 2.0  # Places that are farther away than so many cells have the sign of the indicator.
+ON_SIDE = 1e-6  # A foot with a smaller weight of a vertex is on the side across from it.
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceMesh:
+    """The mesh of a whole object from which distances are measured, and the indicator that it follows."""
+
+    mesh: Mesh
+    indicator: Indicator
+
+    @cached_property
+    def tree(self) -> Any:
+        """A KD-tree of the vertices."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.mesh.vertices)
+
+    @cached_property
+    def fans(self) -> Indices:
+        """The triangles at each vertex, (n, most); the first one again where there are fewer."""
+        corners = self.mesh.triangles.ravel()
+        order, counts = (
+            np.argsort(corners, kind="stable"),
+            np.bincount(corners, minlength=len(self.mesh.vertices)),
+        )
+        start, steps = np.cumsum(counts) - counts, np.arange(counts.max())
+        found: Indices = order[start[:, None] + np.where(steps < counts[:, None], steps, 0)] // 3
+        return found
+
+    @cached_property
+    def normals(self) -> Array:
+        """Unit normals of the triangles, (m, 3)."""
+        a, b, c = self.mesh.vertices[self.mesh.triangles].transpose(1, 0, 2)
+        normals = np.cross(b - a, c - a)
+        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), LEAST_DIVISOR)
+
+    @cached_property
+    def is_open(self) -> NDArray[np.bool_]:
+        """Whether the mesh ends at each vertex, (n,)."""
+        found = np.zeros(len(self.mesh.vertices), dtype=bool)
+        found[self.mesh.border] = True
+        return found
+
+    def feet(self, points: Array) -> tuple[Array, Indices, Array, NDArray[np.bool_]]:
+        """The nearest places (n, 3) on the mesh; triangles, deviations, and whether it ends there, (n,).
+
+        Of triangles that are as near, it is the one that is most across the way to the place.
+        """
+        nearest = self.tree.query(points, min(NEAREST, len(self.mesh.vertices)))[1].reshape(len(points), -1)
+        some = self.fans[nearest].reshape(len(points), -1)
+        feet, weights = closest(self.mesh.vertices[self.mesh.triangles[some]], points[:, None])
+        off = points[:, None] - feet
+        away = np.linalg.norm(off, axis=2)
+        across = np.abs(np.einsum("nki,nki->nk", off, self.normals[some]))
+        as_near = away <= (1.0 + SAME) * away.min(axis=1, keepdims=True)
+        best = np.argmax(np.where(as_near, across, -1.0), axis=1)
+        row = np.arange(len(points))
+        triangle = some[row, best]
+        corners = self.mesh.triangles[triangle]
+        ends = (self.is_open[corners] | (weights[row, best] < ON_SIDE)).all(axis=1)
+        std = np.einsum("ni,ni->n", weights[row, best], self.mesh.std[corners])
+        return feet[row, best], triangle, std, ends
+
+    def distances(self, charts: Charts, points: Array) -> tuple[Array, Array]:
+        """Signed distances (n,) of places (n, 3), and deviations (n,), inf beyond where the mesh ends."""
+        feet, triangle, std, ends = self.feet(points)
+        up, side = self.normals[triangle], np.einsum("ni,ni->n", points - feet, self.normals[triangle])
+        surface, feet = self._settled(charts, feet, up)
+        off = points - feet
+        ahead = np.einsum("ni,ni->n", off, surface.normal)
+        away = np.linalg.norm(off, axis=1)
+        # A triangle is a chord: the foot of its plane is a little beside that of the surface.
+        across = off - ahead[:, None] * surface.normal
+        some = np.flatnonzero(
+            (np.abs(ahead) > AHEAD * away) & (np.linalg.norm(across, axis=1) < self.mesh.edge)
+        )
+        there, tried = self._settled(charts, feet[some] + across[some], up[some])
+        left = np.linalg.norm(points[some] - tried, axis=1)
+        nearer = (left < away[some]) & (np.abs(there.distance) < there.std)
+        some = some[nearer]
+        for old, new in zip((away, feet, *surface), (left, tried, *there), strict=True):
+            old[some] = new[nearer]
+        ahead = np.einsum("ni,ni->n", points - feet, surface.normal)
+        smooth = np.abs(ahead) > AHEAD * away
+        side = np.where(smooth & (surface.node >= 0), ahead, side)
+        if not self.is_open.any():
+            side = np.where(away > FAR * self.indicator.cell, -self.indicator.at(points), side)
+        return np.copysign(away, side), np.where(ends, np.inf, np.where(surface.node < 0, std, surface.std))
+
+    def _settled(self, charts: Charts, places: Array, up: Array) -> tuple[Surface, Array]:
+        """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""
+        room = max(ROOM * self.indicator.cell, self.mesh.edge)
+        first = surface_at(charts, self.indicator, places, up, room)
+        places = places - first.distance[:, None] * first.normal
+        surface = surface_at(charts, self.indicator, places, up, room)
+        return surface, places - surface.distance[:, None] * surface.normal
+
+
+def closest(triangles: Array, points: Array) -> tuple[Array, Array]:
+    """The places (..., 3) of triangles (..., 3, 3) nearest to points (..., 3), and their weights (..., 3)."""
+    a, b, c = np.moveaxis(triangles, -2, 0)
+    ab, ac, ap = b - a, c - a, points - a
+
+    def dot(u: Array, v: Array) -> Array:
+        """Products (...) of vectors (..., 3)."""
+        found: Array = np.einsum("...i,...i->...", u, v)
+        return found
+
+    d1, d2 = dot(ab, ap), dot(ac, ap)
+    aa, bb, cc = dot(ab, ab), dot(ab, ac), dot(ac, ac)
+    area = np.maximum(aa * cc - bb * bb, LEAST_DIVISOR)
+    v, w = (cc * d1 - bb * d2) / area, (aa * d2 - bb * d1) / area
+    inside = (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
+    # Else the nearest place is on one of the three sides.
+    on_ab = np.clip(d1 / np.maximum(aa, LEAST_DIVISOR), 0.0, 1.0)
+    on_ac = np.clip(d2 / np.maximum(cc, LEAST_DIVISOR), 0.0, 1.0)
+    on_bc = np.clip((d2 - d1 + aa - bb) / np.maximum(aa - 2.0 * bb + cc, LEAST_DIVISOR), 0.0, 1.0)
+    zero = np.zeros_like(v)
+    tried = np.stack(
+        [np.stack(each, axis=-1) for each in ((on_ab, zero), (zero, on_ac), (1.0 - on_bc, on_bc))], axis=-2
+    )
+    off = ap[..., None, :] - tried[..., :1] * ab[..., None, :] - tried[..., 1:] * ac[..., None, :]
+    best = np.argmin(dot(off, off), axis=-1)[..., None, None]
+    side = np.take_along_axis(tried, best, axis=-2)[..., 0, :]
+    v, w = np.where(inside, v, side[..., 0]), np.where(inside, w, side[..., 1])
+    return a + v[..., None] * ab + w[..., None] * ac, np.stack([1.0 - v - w, v, w], axis=-1)

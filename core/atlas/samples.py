@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Samples of the surface of many patches, each with its share of the area, and the indicator of these."""
+
+from collections.abc import Generator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from .charts import Charts
+from .field import facing_alike, node_weights, weights_of
+from .indicator import Indicator, solved
+
+# python -m benchmarks.atlas judges these.
+PITCH = 1.2  # Samples of a patch are so many cells apart.
+# Weights of other patches are those of one sample for at most PARTS^2 around, ACROSS^2 or more a patch.
+ACROSS, PARTS = 12, 8
+STEEPEST = 0.1  # Where a patch is steeper, this cosine to its own plane, it has no samples.
+FINEST, COARSEST = 1.0 / 200.0, 1.0 / 80.0  # Cells are between these shares of the size.
+TOLERANCES = 5.0  # A cell is at most so many tolerances.
+LAYERS = 3.0  # There are at least so many cells across the thinnest wall.
+OPPOSITE = -0.9  # Two patches are the sides of a wall if the cosine between their normals is less.
+THIN_SHARE = 0.01  # Walls are at least as thick as all but this share of the area is.
+CERTAIN = 5.0  # Two sides that are nearer than so many deviations are no wall.
+PATCHES_AT_ONCE, SAMPLES_AT_ONCE = 20, 3000  # A step takes so many patches, or so many samples.
+
+
+def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None, Indicator]:
+    """The indicator of patches that are as certain as a tolerance, or None; yields 0 between its steps."""
+    reach = charts.radii[:, None] * charts.rims.max(axis=1)[:, None]
+    size = float(((charts.origins + reach).max(axis=0) - (charts.origins - reach).min(axis=0)).max())
+    cell = min(COARSEST * size, np.inf if tolerance is None else TOLERANCES * tolerance)
+    samples = yield from samples_of(charts, PITCH * max(cell, FINEST * size))
+    size, thinnest = float(np.ptp(samples.points, axis=0).max()), samples.thinnest
+    cell = max(min(cell, COARSEST * size, thinnest / LAYERS), FINEST * size)
+    return (yield from solved(samples.points, samples.areas[:, None] * samples.normals, cell, thinnest))
+
+
+class Samples(NamedTuple):
+    """n points of patches, outward normals (n, 3) each, areas (n,) and the thickness of the wall there (n,).
+
+    Where patches overlap, their areas add up to that of the surface. The thickness is inf where nothing on
+    the other side was felt.
+    """
+
+    points: Array
+    normals: Array
+    areas: Array
+    thickness: Array
+
+    @property
+    def thinnest(self) -> float:
+        """The thickness which all but THIN_SHARE of the area exceeds."""
+        order = np.argsort(self.thickness, kind="stable")
+        thinner = np.cumsum(self.areas[order]) <= THIN_SHARE * self.areas.sum()
+        return float(self.thickness[order[min(int(thinner.sum()), len(order) - 1)]])
+
+
+def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
+    """Points of all patches at most `pitch` apart, with the share of the area there that is theirs; yields 0.
+
+    The weights of other patches are smooth over a patch, so they are computed once for many samples.
+    """
+    half = charts.rims.max(axis=1)
+    across = np.maximum(ACROSS, np.ceil(2.0 * half * charts.radii / pitch).astype(np.intp))
+    each = np.maximum(1, np.minimum(across // ACROSS, PARTS))  # Samples of a group, along each axis.
+    places, groups = [], 0
+    for i, (count, few) in enumerate(zip(across.tolist(), each.tolist(), strict=True)):
+        line = half[i] * ((2.0 * np.arange(count) + 1.0) / count - 1.0)
+        x, y = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
+        row, column = np.divmod(np.arange(count**2), count)
+        inside = charts.shares(x, y, np.full(len(x), i)) < 1.0
+        group = (row // few * (count // few + 1) + column // few)[inside]
+        aside = np.maximum(np.abs(row % few - few // 2), np.abs(column % few - few // 2))[inside]
+        places.append((np.full(len(group), i), x[inside], y[inside], groups + group, aside))
+        groups += (count // few + 1) ** 2
+        if i % PATCHES_AT_ONCE == 0:
+            yield 0.0
+    node, x, y, group, aside = (np.concatenate(values) for values in zip(*places, strict=True))
+    # The sample in the middle of a group is first.
+    order = np.lexsort((aside, group))
+    _, first, of = np.unique(group[order], return_index=True, return_inverse=True)
+    middle, group = order[first], np.empty(len(order), dtype=np.intp)
+    group[order] = of
+    parts = []
+    for start in range(0, len(middle), SAMPLES_AT_ONCE):
+        few = middle[start : start + SAMPLES_AT_ONCE]
+        parts.append(_others(charts, node[few], x[few], y[few]))
+        yield 0.0
+    others, thickness = (np.concatenate(values)[group] for values in zip(*parts, strict=True))
+    flat, found = (2.0 * half * charts.radii / across) ** 2, []
+    for start in range(0, len(node), SAMPLES_AT_ONCE):
+        some = slice(start, start + SAMPLES_AT_ONCE)
+        found.append(
+            _samples(charts, node[some], x[some], y[some], flat[node[some]], others[some], thickness[some])
+        )
+        yield 0.0
+    return Samples(*(np.concatenate(values) for values in zip(*found, strict=True)))
+
+
+def _others(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
+    """Weights of the other patches of a wall at local (x, y) of patches, and its thickness, (n,) each."""
+    points, normals = charts.world(node, x, y)
+    pairs, count = charts.pairs(points), len(points)
+    up, radius = normals[pairs.place], charts.radii[node[pairs.place]]
+    alike = facing_alike(charts, pairs, up, np.zeros(len(up)), radius) * (pairs.node != node[pairs.place])
+    others: Array = np.bincount(pairs.place, node_weights(charts, pairs) * alike, count).astype(np.float64)
+    behind = (np.einsum("mi,mi->m", pairs.normal, up) < OPPOSITE) & (pairs.share < 1.0)
+    behind &= np.abs(pairs.distance) > CERTAIN * pairs.std
+    thickness = np.full(count, np.inf)
+    np.minimum.at(thickness, pairs.place[behind], np.abs(pairs.distance[behind]))
+    return others, thickness
+
+
+def _samples(
+    charts: Charts, node: NDArray[np.intp], x: Array, y: Array, flat: Array, others: Array, thickness: Array
+) -> Samples:
+    """Samples of patches at local (x, y); `flat` are their areas in the tangent planes."""
+    points, normals = charts.world(node, x, y)
+    share, steep = charts.shares(x, y, node), np.einsum("ni,ni->n", normals, charts.axes[node, :, 2])
+    inside = steep > STEEPEST
+    own = weights_of(share, charts.radii[node] * charts.stds_at(x, y, node) * steep, charts.radii[node])
+    areas = flat * own / (own + others) / np.maximum(steep, STEEPEST)
+    return Samples(*(values[inside] for values in (points, normals, areas, thickness)))

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a surface is off the mesh that was touched, and that mesh off the surface, all over their faces."""
+
+import math
+from contextlib import suppress
+
+import numpy as np
+from mathutils.bvhtree import BVHTree
+
+from ... import core
+
+WITHIN = 0.05  # The mesh is looked for along the normal within this share of its size.
+PLACES, SEED = 10_000, 0  # So many places of the mesh's faces are compared, and at most as many vertices.
+AT_ONCE, BACK_AT_ONCE = 1000, 300  # A step compares so many places of the surface, or of the mesh.
+FACES_AT_ONCE = 10_000  # A tree has so many faces, because making a larger one takes too long for a step.
+WAYS = 40  # A place is hidden if rays in so many directions all meet the mesh again.
+LIFT = 1e-4  # They begin this share of the size away from it.
+GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+
+
+class BothWays:
+    """The deviations of a surface from the mesh that was touched, and back, found step by step.
+
+    deviation : (n,), signed distances of the surface's vertices from the mesh, positive outside it
+    mean : the mean distance of the surface from the mesh and of the mesh from the surface, by area
+    largest, place : the largest distance of either from the other, and where that is, (3,)
+
+    Places of the mesh that no finger could reach, because the mesh hides them, do not count.
+    """
+
+    def __init__(self, target, mesh, tolerance):
+        """`target` is the DetachedMesh that was touched, and `mesh` the core.Mesh of what was felt."""
+        self._target, self._mesh, self._tolerance = target, mesh, tolerance
+        self.deviation = np.zeros(len(mesh.vertices))
+        self.mean, self.largest, self.place = 0.0, 0.0, mesh.vertices[0]
+
+    def steps(self):
+        """Does everything, as a generator that yields the share that is done."""
+        corners, triangles = self._mesh.vertices, self._mesh.triangles
+        normals = self._mesh.normals
+        yield 0.0
+        for share in self._off_target(corners, normals, self.deviation):
+            yield 0.3 * share
+        a, b, c = corners[triangles].transpose(1, 0, 2)
+        normals = np.cross(b - a, c - a)
+        areas = np.linalg.norm(normals, axis=1)
+        normals /= np.maximum(areas, 1e-300)[:, None]
+        middles, off = (a + b + c) / 3.0, np.zeros(len(areas))
+        yield 0.3
+        for share in self._off_target(middles, normals, off):
+            yield 0.3 + 0.4 * share
+        there, places = np.average(np.abs(off), weights=areas), self._places()
+        yield 0.7
+        trees = yield from self._trees()
+        back = []
+        for points in places:
+            off = yield from self._off_surface(points, trees)
+            back.append(off.mean() if len(off) else 0.0)
+        self.mean = 0.5 * float(there + back[0])
+
+    def _off_target(self, points, normals, off):
+        """Fills in the signed distances (n,) of points (n, 3) of the surface; yields the share done."""
+        for start in range(0, len(points), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            found = self._target.deviations(points[some], normals[some], WITHIN * self._target.size)
+            # Beside a crease a ray along the normal may meet a face that is not the nearest.
+            for i in np.flatnonzero(np.abs(found) > self._tolerance).tolist():
+                with suppress(ValueError):  # The nearest face has no area.
+                    nearest = self._target.project(points[start + i].tolist())[2]
+                    found[i] = math.copysign(min(abs(found[i]), nearest), found[i])
+            off[some] = found
+            self._note(points[some], np.abs(found))
+            yield start / len(points)
+
+    def _places(self):
+        """Places of the mesh, (n, 3) each: such that are spread by area over its faces, and vertices."""
+        target, rng = self._target, np.random.default_rng(SEED)
+        corners = np.flatnonzero(target.has_face)
+        if len(corners) > PLACES:
+            corners = rng.choice(corners, PLACES, replace=False)
+        return core.scattered(target.points, target.triangles, PLACES, rng)[0], target.points[corners]
+
+    def _trees(self):
+        """Trees of the surface's faces, some in each; yields the share that is done."""
+        trees = []
+        for start in range(0, len(self._mesh.triangles), FACES_AT_ONCE):
+            used, index = np.unique(self._mesh.triangles[start : start + FACES_AT_ONCE], return_inverse=True)
+            corners, faces = self._mesh.vertices[used].tolist(), index.reshape(-1, 3).tolist()
+            trees.append(BVHTree.FromPolygons(corners, faces, all_triangles=True))
+            yield 0.7
+        return trees
+
+    def _off_surface(self, points, trees):
+        """The distances of those points (n, 3) of the mesh that are not hidden; yields the share done."""
+        found = [np.zeros(0)]
+        for start in range(0, len(points), BACK_AT_ONCE):
+            some = points[start : start + BACK_AT_ONCE]
+            off = np.array([_nearest(trees, point) for point in some.tolist()])
+            yield 0.8
+            far = (off > self._tolerance).tolist()
+            seen = np.array([not (far[i] and self._is_hidden(point)) for i, point in enumerate(some)])
+            self._note(some[seen], off[seen])
+            found.append(off[seen])
+            yield 0.8
+        return np.concatenate(found)
+
+    def _is_hidden(self, point):
+        """Whether rays from a place of the mesh meet it again in all directions."""
+        size = self._target.size
+        starts = (point + LIFT * size * DIRECTIONS).tolist()
+        rays = zip(starts, DIRECTIONS.tolist(), strict=True)
+        return all(self._target.ray_cast(start, way, 2.0 * size) is not None for start, way in rays)
+
+    def _note(self, points, off):
+        """Keeps the largest of the distances (n,) of points (n, 3)."""
+        if len(off) and off.max() > self.largest:
+            self.largest, self.place = float(off.max()), points[np.argmax(off)]
+
+
+def _nearest(trees, point):
+    """The distance of a point from the nearest face in trees."""
+    best = math.inf
+    for tree in trees:
+        found = tree.find_nearest(point) if best == math.inf else tree.find_nearest(point, best)
+        if found[3] is not None:
+            best = min(best, found[3])
+    return best
+
+
+def _directions():
+    """Unit vectors (WAYS, 3) all round."""
+    z = 1.0 - (2.0 * np.arange(WAYS) + 1.0) / WAYS
+    turn, out = GOLDEN * np.arange(WAYS), np.sqrt(1.0 - z**2)
+    return np.column_stack([out * np.cos(turn), out * np.sin(turn), z])
+
+
+DIRECTIONS = _directions()

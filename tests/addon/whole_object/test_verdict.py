@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is said of a whole object is true of the mesh that is shown, and of the mesh that was touched."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from scenes import made, positions, values
+
+from core import Mesh
+
+OK = "The object was felt everywhere a finger could reach."
+TETRAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype=float)
+FACES = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
+
+
+def touched(bpy, **arguments):
+    return made(bpy.ops.tactile.touch_all_over, "tactile_object", **arguments)
+
+
+@pytest.fixture
+def touches_of(empty, extension):
+    """A function that prepares the ObjectTouches of an object."""
+
+    def touches_of(obj, **given):
+        values = {"location": None, "tolerance": 0.01, "noise": 0.0, "seed": 0, "most": 1000, "edge": 0.0}
+        touches = extension.tactile_addon.whole_object.object_touches.ObjectTouches
+        return touches(obj, empty.context.evaluated_depsgraph_get(), **values | given)
+
+    return touches_of
+
+
+def test_a_cube_is_a_cube_with_sharp_edges(empty):
+    empty.ops.mesh.primitive_cube_add(size=2.0, location=(3.0, 0.0, 0.0))
+    surface, record = touched(empty)
+    assert (record["status"], record["message"], record["is_closed"]) == ("ok", OK, True)
+    assert record["deviation_max"] < 1e-5
+    mesh = surface.data
+    ends = np.array([edge.vertices for edge in mesh.edges])[values(mesh, "sharp_edge").astype(bool)]
+    at_faces = np.isclose(np.abs(positions(mesh)), 1.0, atol=1e-5).sum(axis=1)
+    assert (at_faces[ends] >= 2).all()
+    assert (at_faces == 3).sum() == 8
+    lengths = np.linalg.norm(np.diff(positions(mesh)[ends], axis=1), axis=2)
+    assert lengths.sum() == pytest.approx(24.0, abs=1e-3)
+
+
+def test_what_the_mesh_hides_does_not_count(empty, ball):
+    empty.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8, radius=0.5)
+    ball.select_set(True)
+    empty.context.view_layer.objects.active = ball
+    empty.ops.object.join()
+    _, record = touched(empty, location=(0.0, 0.0, 2.0), tolerance=0.01)
+    assert (record["status"], record["is_closed"]) == ("ok", True)
+    assert record["deviation_max"] < 0.01
+
+
+def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
+    """A dent beside the surface, which is made after the touches, because these would feel it."""
+    touches = touches_of(ball, tolerance=0.02)
+    for _ in touches.steps():
+        pass
+    assert (touches.report()["status"], touches.report()["message"]) == ("ok", OK)
+    for vertex in ball.data.vertices:
+        if vertex.co.z > 1.9:
+            vertex.co.z = 1.5
+    ball.data.update()
+    empty.context.view_layer.update()
+    other = touches_of(ball)
+    both_ways = extension.tactile_addon.whole_object.both_ways.BothWays
+    touches.compared = both_ways(other.surface, touches.whole.mesh, touches.tolerance)
+    shares = list(touches.compared.steps())
+    assert shares == sorted(shares)
+    report = touches.report()
+    assert report["deviation_max"] == pytest.approx(0.5, abs=0.1)
+    assert report["deviation_place"][2] > 1.4
+    assert report["status"] == "uncertain"
+    told = "which the tolerance does not explain: use a smaller tolerance, or close the holes of its mesh."
+    assert report["message"].endswith(f"off the object, {told}")
+
+
+def test_without_an_edge_length_the_mesh_is_that_of_the_distances(ball, touches_of):
+    touches = touches_of(ball, tolerance=0.02)
+    for _ in touches.steps():
+        pass
+    assert touches.whole.mesh is touches.whole.atlas.reference.mesh
+
+
+@pytest.mark.parametrize(
+    ("left_out", "shown", "uncovered", "status", "is_closed"),
+    [
+        (0, 0, (), "ok", True),
+        (0, 1, (), "uncertain", False),  # Only triangles of this length leave a hole.
+        (1, 1, (), "ok", False),  # The object ends there.
+        (1, 0, ("a place",), "ok", False),
+    ],
+)
+def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered, status, is_closed):
+    def mesh(left):
+        return Mesh(TETRAHEDRON, FACES[left:], np.full(4, 0.1), np.zeros(4, dtype=int))
+
+    atlas = SimpleNamespace(
+        status="ok",
+        message=OK,
+        uncovered=uncovered,
+        reference=SimpleNamespace(mesh=mesh(left_out)),
+        patches=[SimpleNamespace(radius=1.0)],
+        edges=[],
+    )
+    whole = extension.tactile_addon.whole_object.whole_surface.WholeSurface(atlas, np.zeros(3))
+    whole.mesh = mesh(shown)
+    report = whole.report()
+    assert (report["status"], report["is_closed"]) == (status, is_closed)
+    told = OK if status == "ok" else "Triangles of this edge length leave holes: use a shorter edge length."
+    assert report["message"] == told
+    rows = extension.tactile_addon.whole_object.object_report.object_rows
+    told = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))["Surface"]
+    assert told == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
+
+
+@pytest.fixture
+def cylinder(empty):
+    """A cylinder, whose first join misses something, so that it is touched again."""
+    empty.ops.mesh.primitive_cylinder_add()
+    return empty.context.object
+
+
+def test_progress_never_runs_backward(cylinder, touches_of):
+    touches, words, shares = touches_of(cylinder, tolerance=0.02), [], []
+    for _ in touches.steps():
+        words.append(touches.words.split()[0])
+        shares.append(touches.share)
+    first = words.index("Joining")
+    assert shares[:first] == [None] * first
+    assert shares[first:] == sorted(shares[first:])
+    assert shares[-1] <= 1.0
+    again = [i for i, word in enumerate(words) if i > first and word[0].isdigit()]
+    assert again and "Joining" in words[again[-1] :]
+    assert words[-1] == "Comparing"
+
+
+@pytest.mark.parametrize("word", ["Joining", "Checking"])
+def test_once_stopped_it_touches_no_more(cylinder, touches_of, word):
+    touches = touches_of(cylinder, tolerance=0.02)
+    done = None
+    for _ in touches.steps():
+        if done is None and touches.words.startswith(word):
+            touches.stop()
+            done = touches.done
+    assert done is not None
+    assert touches.done == done
+    assert len(touches.found) == len(touches.whole.atlas.patches)

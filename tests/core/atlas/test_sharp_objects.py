@@ -1,0 +1,194 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects with edges: closed, sharp and right from any start, with signs and intervals that are true."""
+
+import math
+
+import numpy as np
+import pytest
+
+import core
+from core.atlas.creases import creased
+from core.atlas.reference_mesh import closest
+from core.exploration.side_by_side import result_of
+from tests import solids
+
+BLOCK = solids.block()
+HALF = np.array(BLOCK.half)
+CORNERS = HALF * (np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3))
+TOLERANCE = 8e-3
+
+
+class Room(solids.Block):
+    """The inside of the block: air with six walls around it, whose edges are all concave."""
+
+    def ray_cast(self, origin, direction, distance):
+        hit = super().ray_cast(origin, direction, distance)
+        return hit and (hit[0], tuple(-n for n in hit[1]))
+
+
+ROOM = Room(BLOCK.distance, (0.05, 0.03, -0.5), (0.0, 0.0, 1.0), BLOCK.half)
+
+
+def explored(solid, **options):
+    options = {"tolerance": TOLERANCE, "noise": 1e-3, "rng": 0} | options
+    return core.explore_object(solid, solid.start, solid.outward, **options)
+
+
+@pytest.fixture(scope="module")
+def block():
+    return explored(BLOCK)
+
+
+@pytest.fixture(scope="module")
+def room():
+    return explored(ROOM)
+
+
+def volume(mesh):
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    return np.einsum("ni,ni->", np.cross(a, b), c) / 6.0
+
+
+@pytest.mark.parametrize(("name", "sign"), [("block", 1.0), ("room", -1.0)])
+def test_a_block_and_the_room_inside_it_are_closed_and_sharp(name, sign, request):
+    mesh = request.getfixturevalue(name).mesh(0.06)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    assert volume(mesh) == pytest.approx(sign * 8.0 * HALF.prod(), rel=0.003)
+    for point in CORNERS:
+        assert np.linalg.norm(mesh.vertices - point, axis=1).min() < 0.5 * TOLERANCE
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    turned = np.degrees(np.arccos(np.clip(np.abs(normals / areas[:, None]).max(axis=1), 0.0, 1.0)))
+    assert areas[turned > 5.0].sum() < 1e-3 * areas.sum()
+
+
+@pytest.mark.parametrize("edge", [0.2, 0.1, 0.04, 0.02])
+def test_edges_of_any_length_leave_the_topology_and_the_place(block, edge):
+    mesh = block.mesh(edge)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    assert np.abs(BLOCK.distances(mesh.vertices)).max() < TOLERANCE
+    assert mesh.edge == pytest.approx(edge, rel=0.3)
+
+
+def test_edges_are_straight_to_half_a_tolerance(block):
+    mesh, along = block.mesh(0.06), np.linspace(-0.95, 0.95, 200)
+    for axis in range(3):
+        for signs in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
+            points = np.insert(np.outer(np.ones(200), signs), axis, along, axis=1) * HALF
+            triangles = mesh.vertices[mesh.triangles]
+            near = np.linalg.norm(triangles.mean(axis=1)[None] - points[:, None], axis=2).argsort(axis=1)[
+                :, :12
+            ]
+            feet, _ = closest(triangles[near], points[:, None])
+            off = np.linalg.norm(feet - points[:, None], axis=2).min(axis=1)
+            assert np.percentile(off, 95) < 0.5 * TOLERANCE
+
+
+@pytest.mark.parametrize("name", ["block", "room"])
+def test_signs_and_intervals_are_true_around_edges(name, request):
+    atlas, sign = request.getfixturevalue(name), 1.0 if name == "block" else -1.0
+    points = np.random.default_rng(1).uniform(-1.3, 1.3, (4000, 3)) * HALF
+    distance, std = atlas.distance(points)
+    true = sign * BLOCK.distances(points)
+    finite, off = np.isfinite(std), np.abs(distance - true)
+    assert finite.mean() > 0.99
+    assert (np.sign(distance) == np.sign(true))[finite & (np.abs(true) > 3.0 * std)].all()
+    assert np.mean((off <= 1.645 * std)[finite]) > 0.8
+    assert np.mean(((off > 8.0 * std) & (off > 5e-3 * 2.0))[finite]) < 1e-3
+
+
+def test_far_away_and_outside_of_the_grid_the_side_is_right(block):
+    far = np.random.default_rng(2).normal(size=(200, 3)) * 50.0
+    distance, std = block.distance(far)
+    assert (distance > 0.0).all()
+    assert np.isfinite(std).all()
+    assert distance == pytest.approx(BLOCK.distances(far), rel=1e-3)
+
+
+def test_a_block_is_right_and_ok_from_any_start():
+    """Starts on a face beside an edge, and on other faces."""
+    starts = [((0.99, 0.0, 0.5), (0, 0, 1)), ((-1.0, 0.5, 0.4), (-1, 0, 0)), ((0.3, 0.7, -0.3), (0, 1, 0))]
+    for point, outward in starts:
+        atlas = core.explore_object(BLOCK, point, outward, tolerance=TOLERANCE, noise=1e-3, rng=1)
+        assert (atlas.status, atlas.reference.mesh.is_closed) == ("ok", True)
+        assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 2, 1)
+        assert np.abs(BLOCK.distances(atlas.reference.mesh.vertices)).max() < 1.5 * TOLERANCE
+
+
+@pytest.mark.parametrize("point", [(1.0, 0.0, 0.5), (1.0, 0.7, 0.5), (1.0 - 1e-4, 0.7 - 1e-4, 0.5)])
+def test_a_start_on_an_edge_or_in_a_corner_finds_a_good_place_beside_it(point):
+    outward = np.array([1.0, 1.0, 1.0]) / np.sqrt(3.0)
+    atlas = core.explore_object(BLOCK, point, outward, tolerance=TOLERANCE, noise=1e-3, rng=0)
+    assert atlas.status == "ok"
+    assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 2, 1)
+
+
+def test_two_balls_with_a_gap_are_two_pieces_though_no_finger_slides_from_one_to_the_other():
+    def distance(x, y, z):
+        return min(math.hypot(x + 1.04, y, z), math.hypot(x - 1.04, y, z)) - 1.0
+
+    solid = solids.Solid(distance, (-2.04, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    atlas = explored(solid)
+    assert atlas.status == "ok"
+    assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 4, 2)
+    assert np.abs(solid.distances(atlas.reference.mesh.vertices)).max() < 1.5 * TOLERANCE
+
+
+def test_half_a_shell_has_a_border_and_beyond_it_the_deviation_is_infinite():
+    def sheet(origin, direction, distance):
+        (x, y, z), (a, b, c) = origin, direction
+        along = a * x + b * y + c * z
+        root = along**2 - (x * x + y * y + z * z - 1.0)
+        for way in (-along - math.sqrt(root), -along + math.sqrt(root)) if root > 0.0 else ():
+            hit = tuple(o + way * d for o, d in zip(origin, direction, strict=True))
+            if 0.0 < way <= distance and hit[2] > 0.0:
+                return hit, hit
+        return None
+
+    class Shell:
+        ray_cast = staticmethod(sheet)
+
+    atlas = core.explore_object(Shell(), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), tolerance=TOLERANCE, rng=0)
+    mesh = atlas.reference.mesh
+    shape = solids.topology(mesh.triangles)
+    assert (shape.euler, shape.pieces, shape.tangled) == (1, 1, 0)
+    assert shape.open > 0
+    border = mesh.vertices[np.unique(mesh.border)]
+    assert np.abs(border[:, 2]).max() < 0.05
+    assert atlas.status == "ok"
+    points = np.random.default_rng(0).normal(size=(3000, 3))
+    away = np.linalg.norm(points, axis=1)
+    (distance, std), true, height = atlas.distance(points), away - 1.0, points[:, 2] / away
+    finite = np.isfinite(std)
+    assert finite[height > 0.1].all()
+    assert not finite[height < -0.1].any()
+    assert np.abs(distance - true)[finite].max() < 5.0 * TOLERANCE
+    assert (np.sign(distance) == np.sign(true))[finite & (np.abs(true) > 3.0 * std)].all()
+
+
+def test_the_nearest_places_on_triangles_are_no_farther_than_any_of_their_places():
+    rng = np.random.default_rng(0)
+    triangles, points = rng.normal(size=(300, 3, 3)), 2.0 * rng.normal(size=(300, 3))
+    feet, weights = closest(triangles, points)
+    assert weights.min() > -1e-12
+    assert weights.sum(axis=1) == pytest.approx(np.ones(300))
+    assert np.einsum("ni,nij->nj", weights, triangles) == pytest.approx(feet, abs=1e-12)
+    away = np.linalg.norm(points - feet, axis=1)
+    for _ in range(200):
+        other = np.einsum("ni,nij->nj", rng.dirichlet(np.ones(3) * 0.5, 300), triangles)
+        assert (np.linalg.norm(points - other, axis=1) >= away - 1e-9).all()
+
+
+def test_where_walls_turn_smoothly_there_is_no_crease():
+    """A mesh of a ball whose edges are so long that normals at their ends differ by up to 40 degrees."""
+    atlas = explored(solids.ball(), rng=1)
+    mesh = atlas.mesh(0.6)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).max() < TOLERANCE
+    a, b = mesh.vertices[mesh.triangles[:, :2]].transpose(1, 0, 2)
+    assert np.einsum("ni,ni->n", a, b).min() < 0.8
+    found = result_of(creased(atlas.charts, mesh.vertices, mesh.triangles, mesh.vertices, 0.6))
+    assert len(found.vertices) == len(mesh.vertices)
+    assert (found.vertices == mesh.vertices).all()
