@@ -19,6 +19,9 @@ Markdown tables:
     atlas and Poisson where normals are off by ten degrees;
 (d) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of touching.
 
+`--shapes [--starts N] [--first START] [--places N]` prints one other table instead: objects with creases,
+thin walls and several pieces, each from several starts (benchmarks.atlas_shapes).
+
 `--memory` touches the lemon up to 1000 times and prints how much memory that took at most.
 """
 
@@ -30,20 +33,19 @@ from time import process_time
 import numpy as np
 
 import core
-from core.atlas.join import agreed, charts_of, joined, told
-from core.atlas.object_atlas import Atlas
+from core.atlas.field import surface_at
 from core.atlas.touching import SIZE
-from core.exploration.side_by_side import result_of
 from tests import solids
 from tools import blender
 
 from . import ROOT, SCANS_FOLDER, machine, table
+from .atlas_shapes import print_shapes
 from .real import Scan
+from .whole import EDGE, NOISE, away, cloud, contacts_of, matrices, poisson, put_together, spread, tree_of
 
 SCANS = ("pear", "lemon", "bottle", "asteroid", "stone")
 TOLERANCES = (0.016, 0.008, 0.004, 0.002, 0.001)
-NOISE, COMPARED, POINTS, MOST = 0.0005, 0.001, 2500, 1500
-EDGE = 0.008  # The length of an edge of the mesh; those of Poisson at depth 8 are half as long.
+COMPARED, POINTS, MOST = 0.001, 2500, 1500
 FINE = 0.0002  # With this tolerance and noise 1000 touches are not enough.
 BLURRED = np.radians(10.0)  # The root mean square angle by which blurred normals are off.
 CREASE, WITHIN = 20.0, 0.01  # There is a crease where the object turns by more degrees within this length.
@@ -129,12 +131,7 @@ class Blurred:
 
 def off_mesh(vertices, triangles, points):
     """Distances (n,) of points (n, 3) from a mesh, in permille of the size."""
-    import bpy  # noqa: F401  # It brings mathutils.
-    from mathutils.bvhtree import BVHTree
-
-    tree = BVHTree.FromPolygons(np.asarray(vertices).tolist(), np.asarray(triangles).tolist())
-    found = (tree.find_nearest(tuple(p))[3] for p in points)
-    return 1e3 * np.array([1.0 if d is None else d for d in found])
+    return 1e3 * away(tree_of(vertices, triangles), points)
 
 
 def three(off):
@@ -173,7 +170,10 @@ def agreeing(thing, atlas):
     smooth = turns(points, thing.normals) < CREASE
 
     def surface(at):
-        return told(atlas.charts, atlas._felt, at).normal
+        """Normals (n, 3) of the joined surface near points (n, 3): the field's, or those of the mesh."""
+        up = atlas.reference.normals[atlas.reference.feet(at)[1]]
+        found = surface_at(atlas.charts, atlas.reference.indicator, at, up)
+        return np.where(found.node[:, None] < 0, up, found.normal)
 
     some = points[np.random.default_rng(0).permutation(len(points))[:POINTS]]
     up = surface(some)
@@ -191,7 +191,7 @@ def row(thing, tolerance):
     off = off_mesh(mesh.vertices, mesh.triangles, thing.points)
     within = np.mean(np.abs(distance[felt]) <= 1.645 * std[felt])
     shape = solids.topology(mesh.triangles)
-    contacts = sum(len(c.points) for e in found for c in e.contours)
+    contacts = len(contacts_of(found, atlas.taps)[0])
     angle, smooth, share, across, alike = agreeing(thing, atlas)
     cells = [thing.name, f"{1e3 * tolerance:g}", str(len(atlas.patches)), str(contacts)]
     cells += [f"{touching:.1f}", f"{meshing:.1f}", f"{100 * felt.mean():.1f}", three(off), f"{within:.2f}"]
@@ -202,35 +202,18 @@ def row(thing, tolerance):
         f"{alike:.2f}",
         f"{shape.open} / {shape.euler} / {shape.pieces}",
     ]
-    return cells, (thing.name, tolerance, len(atlas.patches), touching + meshing, off.mean()), found
-
-
-def poisson(points, normals, depth, weight):
-    meshes = _cloud(points, normals)
-    meshes.generate_surface_reconstruction_screened_poisson(
-        depth=depth, fulldepth=5, pointweight=weight, threads=1
+    return (
+        cells,
+        (thing.name, tolerance, len(atlas.patches), touching + meshing, off.mean()),
+        found,
+        atlas.taps,
     )
-    return _matrices(meshes)
 
 
 def moving_squares(points, normals, method, scale):
-    meshes = _cloud(points, normals)
+    meshes = cloud(points, normals)
     getattr(meshes, f"generate_marching_cubes_{method}")(filterscale=scale, resolution=150)
-    return _matrices(meshes)
-
-
-def _cloud(points, normals):
-    import pymeshlab
-
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
-    return meshes
-
-
-def _matrices(meshes):
-    """Arrays of the mesh, taken before its set is gone."""
-    mesh = meshes.current_mesh()
-    return mesh.vertex_matrix(), mesh.face_matrix()
+    return matrices(meshes)
 
 
 def implicit_basis(points, normals, at, smoothing, offset=0.01):
@@ -261,12 +244,9 @@ def implicit_process(points, normals, at, length, offset=0.01, most=700):
     return np.abs(np.concatenate([kernel(part, where) @ weights for part in np.array_split(at, 20)])) * 1e3
 
 
-def peers(thing, found, some=""):
+def peers(thing, found, taps, some=""):
     """Rows of the third table, of the peers with `some` in their names."""
-    points = np.vstack([c.points for e in found for c in e.contours])
-    normals = np.vstack([c.normals for e in found for c in e.contours])
-    points, first = np.unique(points, axis=0, return_index=True)
-    normals, at = normals[first], thing.points
+    (points, normals), at = contacts_of(found, taps), thing.points
 
     def meshed(method):
         def run(*options):
@@ -307,15 +287,6 @@ def by_hundred(thing, found, seconds):
     return [thing.name, f"{each * seconds:.2f}", f"{each * (process_time() - start):.2f}"]
 
 
-def spread(points, count):
-    """Indices of `count` of the points, each the farthest from those before it."""
-    found, nearest = [0], np.linalg.norm(points - points[0], axis=1)
-    while len(found) < count:
-        found.append(int(np.argmax(nearest)))
-        nearest = np.minimum(nearest, np.linalg.norm(points - points[found[-1]], axis=1))
-    return found
-
-
 def elsewhere(thing, which, where, tolerance):
     """A row of the fourth table: touches at the random places with indices `which`; `where` names them."""
     points, outward = thing.random[which, 0], thing.random[which, 1]
@@ -323,31 +294,28 @@ def elsewhere(thing, which, where, tolerance):
     start = process_time()
     found = [e for e in core.explore_many(thing, points, outward, **wanted) if not isinstance(e, ValueError)]
     seconds = process_time() - start
-    results = [e.result for e in found]
-    charts = charts_of(results, deviations=False)
-    joining = joined([e.contours for e in found], results, charts, NOISE, {})
-    atlas = Atlas(tuple(results), result_of(agreed(result_of(joining))), tolerance)
+    atlas = put_together(found, tolerance)
     mesh = atlas.mesh(EDGE)
     covered = np.isfinite(atlas.distance(thing.points)[1]).mean()
     off = off_mesh(mesh.vertices, mesh.triangles, thing.points)
     return [thing.name, where, str(len(found)), f"{100 * covered:.1f}", three(off), f"{seconds:.1f}"]
 
 
-def compared(thing, found, cells, tolerance, some):
+def compared(thing, found, taps, cells, tolerance, some):
     """Rows of the third and of the fourth table.
 
     If `some` names peers, there are only their rows, and only with the normals of the object as it is.
     """
     others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]]
-    others += peers(thing, found, some)
+    others += peers(thing, found, taps, some)
     if some:
         return others, []
     badly = Blurred(thing)
-    cells, _, again = row(badly, tolerance)
+    cells, _, again, more = row(badly, tolerance)
     others.append(
         [thing.name, "this atlas, normals 10° off", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]
     )
-    for line in peers(badly, again, "Poisson"):
+    for line in peers(badly, again, more, "Poisson"):
         others.append([line[0], f"{line[1]}, normals 10° off", *line[2:]])
     count = min(len(found), len(thing.random))
     even = spread(thing.random[:, 0], count)
@@ -406,9 +374,17 @@ def main():
     parser.add_argument("--coarsest", type=float, default=max(TOLERANCES), help="tolerance (%(default)s)")
     parser.add_argument("--peers", default="", help="only peers with this in their names, and not (d)")
     parser.add_argument("--memory", action="store_true", help="print only the memory that 1000 touches take")
+    parser.add_argument("--shapes", action="store_true", help="print only the table of made objects")
+    parser.add_argument("--starts", type=int, default=8, help="so many starts of each of these (%(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="the first of these starts (%(default)s)")
+    parser.add_argument("--places", type=int, default=20_000, help="places around each (%(default)s)")
     options = parser.parse_args()
     if options.memory:
         print_memory()
+        return
+    if options.shapes:
+        starts = range(options.first, options.first + options.starts)
+        print_shapes(options.only, (options.finest, options.coarsest), starts, options.places)
         return
     names = [name for name in (*SCANS, "ring", "egg") if options.only in name]
     rows, hundreds, others, random, numbers = [], [], [], [], []
@@ -416,12 +392,12 @@ def main():
         with blender.quiet():
             thing = Scanned(name) if name in SCANS else Exact(name)
         for tolerance in (t for t in TOLERANCES if options.finest <= t <= options.coarsest):
-            cells, number, found = row(thing, tolerance)
+            cells, number, found, taps = row(thing, tolerance)
             rows.append(cells)
             numbers.append(number)
             if tolerance == COMPARED:
                 hundreds.append(by_hundred(thing, found, number[3]))
-                lines = compared(thing, found, cells, tolerance, options.peers)
+                lines = compared(thing, found, taps, cells, tolerance, options.peers)
                 others += lines[0]
                 random += lines[1]
     head = "object|tolerance|touches|contacts|s touch, join|s mesh|% covered|mean / median / 95 %|within 90 %"

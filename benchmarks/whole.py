@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the tables of whole objects share: atlases of any touches, distances from a mesh, screened Poisson."""
+
+import numpy as np
+
+from core.atlas.join import agreed, charts_of, joined
+from core.atlas.object_atlas import Atlas, surfaced
+from core.exploration.side_by_side import result_of
+
+NOISE = 0.0005
+EDGE = 0.008  # The length of an edge of the mesh; those of Poisson at depth 8 are half as long.
+
+
+def put_together(found, tolerance):
+    """The atlas of explorations, joined as they are, without a search for places that were not felt."""
+    results = [e.result for e in found]
+    charts = charts_of(results, deviations=False)
+    charts = result_of(joined([e.contours for e in found], results, charts, NOISE, {}))
+    charts = result_of(agreed(charts))
+    return Atlas(tuple(results), charts, result_of(surfaced(results, charts, tolerance)), tolerance)
+
+
+def contacts_of(found, taps=()):
+    """The different contacts of explorations and of taps, and their normals, (n, 3) each."""
+    contours = [*(c for e in found for c in e.contours), *taps]
+    points = np.vstack([c.points for c in contours])
+    normals = np.vstack([c.normals for c in contours])
+    points, first = np.unique(points, axis=0, return_index=True)
+    return points, normals[first]
+
+
+def tree_of(vertices, triangles):
+    """Blender's tree of the triangles of a mesh."""
+    import bpy  # noqa: F401  # It brings mathutils.
+    from mathutils.bvhtree import BVHTree
+
+    return BVHTree.FromPolygons(
+        np.asarray(vertices).tolist(), np.asarray(triangles).tolist(), all_triangles=True
+    )
+
+
+def away(tree, points):
+    """Distances (n,) of points (n, 3) from the triangles of a tree; 1 from one without triangles."""
+    found = (tree.find_nearest(tuple(p))[3] for p in points)
+    return np.array([1.0 if d is None else d for d in found])
+
+
+def spread(points, count):
+    """Indices of `count` of the points, each the farthest from those before it."""
+    found, nearest = [0], np.linalg.norm(points - points[0], axis=1)
+    while len(found) < count:
+        found.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(points - points[found[-1]], axis=1))
+    return found
+
+
+def poisson(points, normals, depth, weight):
+    """Vertices and triangles of the surface by screened Poisson reconstruction of pymeshlab."""
+    meshes = cloud(points, normals)
+    meshes.generate_surface_reconstruction_screened_poisson(
+        depth=depth, fulldepth=5, pointweight=weight, threads=1
+    )
+    return matrices(meshes)
+
+
+def cloud(points, normals):
+    """A set of meshes of pymeshlab, with these points and normals as its only one."""
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
+    return meshes
+
+
+def matrices(meshes):
+    """Arrays of the mesh, taken before its set is gone."""
+    mesh = meshes.current_mesh()
+    return mesh.vertex_matrix(), mesh.face_matrix()
