@@ -34,6 +34,7 @@ import numpy as np
 
 import core
 from core.atlas.field import surface_at
+from core.atlas.meshing import ROOM
 from core.atlas.touching import SIZE
 from tests import solids
 from tools import blender
@@ -171,8 +172,8 @@ def agreeing(thing, atlas):
 
     def surface(at):
         """Normals (n, 3) of the joined surface near points (n, 3): the field's, or those of the mesh."""
-        up = atlas.reference.normals[atlas.reference.feet(at)[1]]
-        found = surface_at(atlas.charts, atlas.reference.indicator, at, up)
+        up, inside = atlas.reference.normals[atlas.reference.feet(at)[1]], atlas.reference.indicator
+        found = surface_at(atlas.charts, inside, at, up, ROOM * inside.cell)
         return np.where(found.node[:, None] < 0, up, found.normal)
 
     some = points[np.random.default_rng(0).permutation(len(points))[:POINTS]]

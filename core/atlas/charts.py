@@ -193,12 +193,6 @@ class Charts:
         sums: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
         return self.radii * sums
 
-    def less_certain_than(self, std: float) -> list[int]:
-        """Indices of the patches whose mean deviation is above `std`, the worst first."""
-        order = np.argsort(-self.mean_stds, kind="stable")
-        found: list[int] = order[self.mean_stds[order] > std].tolist()
-        return found
-
     def _inside(self) -> NDArray[np.bool_]:
         """Which knots are inside the domains, (n, SIDE, SIDE)."""
         count = len(self.radii)
@@ -210,13 +204,6 @@ class Charts:
         """Local x and y of all knots, (2, n, SIDE, SIDE)."""
         along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
         return np.array(np.broadcast_arrays(along[:, :, None], along[:, None]))
-
-    def least_certain(self, node: int) -> tuple[Array, Array]:
-        """The point and the normal, (3,) each, where a patch is least certain inside its domain."""
-        at = np.argmax(np.where(self._inside()[node], self.stds[node], -1.0))
-        x, y = self.knots()[:, node].reshape(2, -1)[:, [at]]
-        points, normals = self.world(np.array([node]), x, y)
-        return points[0], normals[0]
 
     def chosen(self, which: NDArray[Any]) -> "Charts":
         """The tables of some of the patches."""

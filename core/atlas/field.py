@@ -117,10 +117,10 @@ def _within(off: Array, room: Array) -> Array:
     return inside * inside
 
 
-def walls_at(charts: Charts, pairs: Pairs, count: int, most: int = WALLS) -> list[Blend]:
+def walls_at(charts: Charts, pairs: Pairs, count: int) -> list[Blend]:
     """At most so many walls at each of `count` places, the nearest first, of pairs of places and patches."""
     weights, walls = node_weights(charts, pairs), []
-    for _ in range(most):
+    for _ in range(WALLS):
         key = np.abs(pairs.distance) + 0.5 * LAYER * charts.radii[pairs.node] * pairs.share**2
         nearest = least_of(pairs.place, key, count)[pairs.place]
         up, offset, radius = pairs.normal[nearest], pairs.distance[nearest], charts.radii[pairs.node[nearest]]
@@ -197,13 +197,10 @@ def wall_facing(charts: Charts, points: Array, up: Array, near: Array | float) -
     return _mean(pairs, node_weights(charts, pairs) * alike, len(points))
 
 
-def covered(charts: Charts, points: Array, normals: Array, reach: float = INSIDE) -> NDArray[np.bool_]:
-    """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3).
-
-    reach : how far out a patch counts, as a share of its domain's radius
-    """
+def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
+    """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3)."""
     pairs = charts.pairs(points)
-    on = pairs.share < reach
+    on = pairs.share < INSIDE
     on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
     on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
     found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
