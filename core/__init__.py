@@ -8,7 +8,7 @@ has negative curvatures, because normals point outward.
 
 from .atlas.boundaries import Edge
 from .atlas.measured import atlas_of, cover_contacts
-from .atlas.meshing import Mesh
+from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
 from .atlas.touching import Progress, explore_object, touch_all_over
 from .contours.common_point import common_point, in_running_order
@@ -89,6 +89,7 @@ __all__ = [
     "reconstruct_many",
     "register",
     "scattered",
+    "shortest_edge",
     "spaced",
     "spaced_count",
     "suggest_plane",

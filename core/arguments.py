@@ -84,6 +84,17 @@ def unit_vector(name: str, value: ArrayLike) -> Array:
     return np.array([x / length, y / length, z / length])
 
 
+def unit_vectors(name: str, vectors: Array) -> Array:
+    """Finite `vectors` (n, 3) scaled to length 1. Raises ValueError if one of them has no direction."""
+    largest = np.abs(vectors).max(axis=1, keepdims=True, initial=0.0)
+    if not largest.all():
+        raise ValueError(f"{name}: expected vectors with a direction, got (0, 0, 0) among them: remove them")
+    # The squares of 1e200 and of denormal numbers would be lost.
+    scaled = vectors / largest
+    found: Array = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+    return found
+
+
 def number(name: str, value: float, *, above: float | None = None, least: float | None = None) -> float:
     """`value` as a float that is above one bound, or at least the other. Raises ValueError if it is not."""
     try:

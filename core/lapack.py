@@ -9,6 +9,7 @@ these wait for each other's processors, and a touch takes twice as long, or ten 
 
 from collections.abc import Callable
 from functools import cache, wraps
+from threading import Lock
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -17,6 +18,10 @@ from .arguments import Array
 
 P = ParamSpec("P")
 R = TypeVar("R")
+# The numbers of threads before each call that is under way, in any thread of Python: the last of them to end
+# puts back what was there before the first.
+_BEFORE: list[int] = []
+_LOCK = Lock()
 
 
 def on_one_thread(run: Callable[P, R]) -> Callable[P, R]:
@@ -28,12 +33,14 @@ def on_one_thread(run: Callable[P, R]) -> Callable[P, R]:
         if threads is None:
             return run(*args, **kwargs)
         get, set_to = threads
-        before = get()
-        set_to(1)
+        with _LOCK:
+            _BEFORE.append(get())
+            set_to(1)
         try:
             return run(*args, **kwargs)
         finally:
-            set_to(before)
+            with _LOCK:
+                set_to(_BEFORE.pop())
 
     return limited
 

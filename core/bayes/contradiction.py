@@ -5,6 +5,7 @@
 Beside the paper. Contacts alone show the surface's slopes and second derivatives at the point, and so do
 normals. How far apart the two are is judged by the deviations of both. The normals of a texture scatter about
 the patch by more than their deviation, which is no contradiction; so their scatter counts as deviation too.
+Along the curves, though, contacts show a texture as normals do: normals that scatter widely there are wrong.
 """
 
 import math
@@ -57,3 +58,20 @@ def contradiction(contacts: Array, normals: Array, posterior: Posterior) -> tupl
     certainty = np.minimum(np.linalg.norm(normals, axis=1), 1.0 / SLOPE_MISFIT)
     angles = slopes[:, :FREE] @ apart / np.tile(certainty, 2)
     return math.sqrt(float(told @ told) / scatter), math.sqrt(2.0 * float(np.mean(angles**2)))
+
+
+def scatter(contacts: Array, normals: Array, slopes: Array) -> tuple[float, float]:
+    """The number of deviations, and the angle, by which normals are off a surface along the curves.
+
+    contacts, normals : (n, 3), of `measured_normals`
+    slopes : (n, 2), of the surface at the contacts
+
+    The curves run from the point outward. Both are root mean squares, and the angle is in radians.
+    """
+    ahead = contacts[:, :2] / np.maximum(np.linalg.norm(contacts[:, :2], axis=1, keepdims=True), 1e-300)
+    tangents = np.column_stack([ahead, np.einsum("ni,ni->n", slopes, ahead)])
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    certainty = np.linalg.norm(normals, axis=1)
+    angles = np.arcsin(np.clip(np.einsum("ni,ni->n", normals, tangents) / certainty, -1.0, 1.0))
+    deviations = angles * np.minimum(certainty, 1.0 / SLOPE_MISFIT)
+    return math.sqrt(float(np.mean(deviations**2))), math.sqrt(float(np.mean(angles**2)))

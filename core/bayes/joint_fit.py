@@ -171,11 +171,26 @@ def _with_evidence(touches: _Touches, system: System, stale: NDArray[np.bool_]) 
 
 def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> Posterior:
     """The posterior of contacts (n, 3) in a given frame with curvatures k1 and k2, all in unit radius."""
-    weights, expected = np.ones((1, len(contacts))), prior_mean(np.array([k1]), np.array([k2]))
-    system = linear_system(contacts[None], weights, expected, contacts[None, :0])
-    data = restricted(system.equations)
-    hyper = hyperparameters(system, data, np.array([max(noise, MISFIT)]))
-    return posterior(expected + solution(system, hyper), system, data.triangle, hyper, weights).at(0)
+    return posteriors_of(k1, k2, contacts, np.ones((1, len(contacts))), noise).at(0)
+
+
+def posteriors_of(
+    k1: float, k2: float, contacts: Array, weights: Array, noise: float, by_evidence: bool = True
+) -> Posterior:
+    """What `posterior_of` gives for b different weights (b, n) of the contacts.
+
+    by_evidence : whether waviness and noise follow from the contacts. If not, they are the usual waviness and
+        the given noise, which is quick; the visibility is 0 then
+    """
+    b = len(weights)
+    expected, local = prior_mean(np.full(b, k1), np.full(b, k2)), contacts[None].repeat(b, axis=0)
+    system = linear_system(local, weights, expected, local[:, :0])
+    floor, usual = np.full(b, max(noise, MISFIT)), prior_variances(np.full(b, USUAL_WAVINESS))
+    triangle, hyper = np.zeros((b, *2 * usual.shape[1:])), Hyperparameters(usual, usual, floor)
+    if by_evidence:
+        data = restricted(system.equations)
+        triangle, hyper = data.triangle, hyperparameters(system, data, floor)
+    return posterior(expected + solution(system, hyper), system, triangle, hyper, weights)
 
 
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:

@@ -234,9 +234,12 @@ def _normal_points() -> Array:
 
 @cache
 def nodes() -> tuple[Array, Array, Array]:
-    """x, y and weights (52,) that integrate products of two terms over the disk: Gauss nodes on circles."""
+    """x, y and weights (56,) that integrate products of two terms over the disk: Gauss nodes on circles.
+
+    Thirteen azimuths suffice. An even number is the same for either way of d1.
+    """
     at, weights = np.polynomial.legendre.leggauss(4)  # type: ignore[no-untyped-call]  # The nodes are in r^2.
-    azimuths = 2.0 * np.pi * np.arange(13) / 13
+    azimuths = 2.0 * np.pi * np.arange(14) / 14
     radii = DISK * np.sqrt((at + 1.0) / 2.0)
     x, y = np.outer(radii, np.cos(azimuths)).ravel(), np.outer(radii, np.sin(azimuths)).ravel()
-    return x, y, np.repeat(weights, 13)
+    return x, y, np.repeat(weights, 14)

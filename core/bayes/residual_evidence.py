@@ -28,7 +28,7 @@ AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Grid of the residual's 
 ALONE = np.array([0.3, 0.6, 1.2])  # Grid of the waviness of a surface without a residual.
 RESIDUAL_NOISES, MIDDLE = 3, 1  # Grid points of the noise, up to what the sextic leaves; the middle one.
 RESIDUAL_UPWARD = np.arange(RESIDUAL_NOISES) / (RESIDUAL_NOISES - 1.0)
-MOST_PLACES = 150  # At most so many contacts carry a residual and tell how large it is.
+MOST_PLACES = 150  # About so many contacts at most carry a residual and tell how large it is.
 ODDS = 0.2  # There is a residual from these odds on: it costs a smooth surface little.
 NEGLIGIBLE = 160.0  # If -2 log likelihood exceeds the best by more, no other noise is tried.
 # Prior variance of slopes and second derivatives beside a residual: with 100 they run away if curves end
@@ -45,6 +45,7 @@ class Observations(NamedTuple):
     weights : (n,), above 0
     least, most : bounds of the contacts' noise
     normals : (n, 3), measured normals over their standard deviation; None if there are none
+    ranks : (n,), of the contacts on each half of a curve, from the rim, and of those beside
     """
 
     contacts: Array
@@ -52,6 +53,7 @@ class Observations(NamedTuple):
     least: float
     most: float
     normals: Array | None
+    ranks: NDArray[np.intp]
 
     def moved(self, turn: Array, scale: float) -> "Observations":
         """This touch in the axes `turn` (3, 3), with lengths divided by `scale`."""
@@ -81,8 +83,8 @@ def system_of(touch: Observations) -> System:
     """The system of a touch."""
     flat = touch.contacts[:, :2]
     basis = monomials(flat[:, 0], flat[:, 1], TERMS)
-    m = min(len(flat), MOST_PLACES)  # They are evenly spread.
-    places = np.arange(m) * len(flat) // m
+    # They are evenly spread on each half of a curve, whichever way it runs and whichever curve is the first.
+    places = np.flatnonzero(touch.ranks * min(len(flat), MOST_PLACES) % len(flat) < MOST_PLACES)
     return System(basis, touch.contacts[:, 2], places, kernels(flat, flat[places]))
 
 

@@ -58,6 +58,7 @@ def rough_fit(
     noise: Array,
     told: NDArray[np.bool_],
     tangent: Array,
+    ranks: NDArray[np.intp],
     normals: Array | None = None,
     through: bool = True,
 ) -> RoughFit:
@@ -69,6 +70,7 @@ def rough_fit(
     noise : (b,), standard deviation of a contact, at least
     told : (b,), whether this is known to be all of the noise
     tangent : (b, 3), which d1 is to follow
+    ranks : (b, n), of the contacts on each half of a curve, and of those beside
     normals : (b, n, 3), measured normals over their standard deviation; they act on the terms alone
     through : whether the origin was touched
     """
@@ -89,6 +91,7 @@ def rough_fit(
             least,
             max(float(posterior.noise[i]), least),
             None if normals is None else np.vstack([normals[i][there], point]),
+            np.append(ranks[i][there], np.zeros(len(point), dtype=np.intp)),
         )
         system = system_of(touch)
         size = sizes(touch, system)

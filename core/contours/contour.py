@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import (
     LARGEST,
@@ -70,6 +70,9 @@ class Contour:
     normal_std : standard deviation of measured normals, in radians, with which "bayes" fits them as slopes;
       None leaves them out. The paper's methods never use them
 
+    Repeated contacts, as of a sensor at rest, are there once, with the mean of their normals, because they
+    tell no more.
+
     Raises ValueError for another shape, for numbers that are not finite, for numbers of single
     precision too far from the origin, and for measured normals without a direction.
     """
@@ -109,12 +112,31 @@ class Contour:
                 raise ValueError("normal_std: expected the measured normals that it belongs to, got none")
             if not np.abs(self.normals).max(axis=1, initial=0.0).all():
                 raise ValueError("normals: expected directions where normal_std is given, got (0, 0, 0)")
+        self._keep_each_once()
+
+    def _keep_each_once(self) -> None:
+        """Leaves one of each group of equal contacts, the first, with the mean of their normals."""
+        order, starts = equal_points(self.points)
+        if len(starts) == len(order):
+            return
+        firsts = np.argsort(order[starts])
+        object.__setattr__(self, "points", self.points[order[starts]][firsts])
+        if self.normals is not None:
+            normals = np.add.reduceat(alike(self.normals, order, starts)[order], starts, axis=0)
+            object.__setattr__(self, "normals", normals[firsts])
 
     def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
         """The contour of some of its contacts, which are known to be valid."""
         found = object.__new__(Contour)
         normals = None if self.normals is None else self.normals[which]
         vars(found).update(vars(self), points=self.points[which], normals=normals, stops=stops)
+        return found
+
+    def copied(self) -> "Contour":
+        """A copy whose arrays cannot be written to."""
+        found = object.__new__(Contour)
+        arrays = {key: read_only(value) for key, value in vars(self).items() if isinstance(value, np.ndarray)}
+        vars(found).update(vars(self) | arrays)
         return found
 
     def moved(self, scale: float, turn: Array, start: Array, end: Array) -> "Contour":
@@ -129,6 +151,33 @@ class Contour:
             normals=None if self.normals is None else self.normals @ turn.T,
             noise=None if self.noise is None else scale * self.noise,
         )
+
+
+def read_only(array: Array) -> Array:
+    """A copy of an array that cannot be written to."""
+    found = array.copy()
+    found.setflags(write=False)
+    return found
+
+
+def equal_points(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """An order (n,) in which equal points of (n, 3) follow each other, and the start of each group in it.
+
+    In its group the first point comes first.
+    """
+    order = np.lexsort(points.T)
+    changes = np.any([np.diff(column[order]) != 0.0 for column in points.T], axis=0)
+    return order, np.flatnonzero(np.append(True, changes)[: len(order)])
+
+
+def alike(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) -> Array:
+    """The normals (n, 3) with length 1, or 0, each on the side of the first in its group."""
+    unit = normals / np.maximum(np.abs(normals).max(axis=1, keepdims=True), 1e-300)
+    unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-300)
+    group = np.empty(len(order), dtype=np.intp)
+    group[order] = np.searchsorted(starts, np.arange(len(order)), side="right") - 1
+    side = np.einsum("ni,ni->n", unit, unit[order[starts]][group])
+    return np.where(side[:, None] < 0.0, -unit, unit)
 
 
 def tangent_of(n: Vector, tangent: ArrayLike | None) -> Vector:

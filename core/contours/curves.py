@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import SMALLEST, Array
+from ..arguments import SMALLEST, Array, unit_vectors
 from .contour import Contour
 
 # So many contacts are "very close to p" (benchmarks.accuracy). The number is even, because a cubic term does
@@ -65,8 +65,7 @@ def stacked(
             r[i, j, :count] = contour.points - points[i]
             present[i, j, :count] = True
             if contour.normals is not None and contour.normal_std is not None:
-                normals = contour.normals / np.abs(contour.normals).max(axis=1, keepdims=True)
-                normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+                normals = unit_vectors("normals", contour.normals)
                 measured[i, j, :count] = normals / max(contour.normal_std, EXACT)
     return r, present, measured if any(map(has_measured_normals, touches)) else None
 

@@ -121,7 +121,13 @@ def degeneracy(
             "or sort the contacts along each curve"
         )
     in_plane = tangents - heights[:, None] * normal
-    return _indistinct(in_plane / np.sqrt(np.einsum("ci,ci->c", in_plane, in_plane))[:, None])
+    lengths = np.sqrt(np.einsum("ci,ci->c", in_plane, in_plane))
+    if not lengths.min() > 0.0:
+        return DegenerateCurvesError(
+            f"curve {np.argmin(lengths) + 1} has no direction at the point: split it where it passes the "
+            "point again, or sort its contacts"
+        )
+    return _indistinct(in_plane / lengths[:, None])
 
 
 def _indistinct(tangents: Array) -> DegenerateCurvesError | None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from .contour import Contour
+from .contour import Contour, alike
 from .curves import WINDOW, besides_point
 
 # With so many contacts a contour no fit is worse, with noise in all directions (tests: test_thinning).
@@ -37,7 +37,9 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     along = _along(r, max(WINDOW * size, len(r) // 4))
     order = np.argsort(along, kind="stable")
     before = int(np.count_nonzero(along < 0.0))
-    starts = np.concatenate([_starts(0, before, size), _starts(before, len(order), size)])
+    # Groups are counted from the point outward, so that the way in which a contour runs makes no difference.
+    behind, ahead = _bounds(before, size), _bounds(len(order) - before, size)
+    starts = np.concatenate([before - behind[:0:-1], before + ahead[:-1]])
     counts = np.diff(starts, append=len(order))[:, None]
 
     def means(values: Array) -> Array:
@@ -49,7 +51,7 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     fewer = replace(
         contour,
         points=point + means(r),
-        normals=None if normals is None else means(_alike(normals[beside], order, starts)),
+        normals=None if normals is None else means(alike(normals[beside], order, starts)),
         noise=None if noise is None else noise / root,
         normal_std=None if std is None else std / root,
     )
@@ -67,17 +69,7 @@ def _along(r: Array, count: int) -> Array:
     return along
 
 
-def _alike(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) -> Array:
-    """The normals (n, 3) with length 1, or 0, each on the side of the first in its group."""
-    unit = normals / np.maximum(np.abs(normals).max(axis=1, keepdims=True), 1e-300)
-    unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-300)
-    group = np.empty(len(order), dtype=np.intp)
-    group[order] = np.searchsorted(starts, np.arange(len(order)), side="right") - 1
-    side = np.einsum("ni,ni->n", unit, unit[order[starts]][group])
-    return np.where(side[:, None] < 0.0, -unit, unit)
-
-
-def _starts(first: int, last: int, size: int) -> NDArray[np.intp]:
-    """The starts of groups of about this size among places from first to last."""
-    count = max(1, (last - first) // size) if last > first else 0
-    return first + np.arange(count, dtype=np.intp) * (last - first) // max(count, 1)
+def _bounds(length: int, size: int) -> NDArray[np.intp]:
+    """The bounds, from 0 to the length, of groups of about this size; 0 alone if the length is 0."""
+    count = max(1, length // size) if length else 0
+    return np.arange(count + 1, dtype=np.intp) * length // max(count, 1)

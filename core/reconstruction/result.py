@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
-from ..bayes.contradiction import contradiction, measured_normals
+from ..bayes.contradiction import contradiction, measured_normals, scatter
 from ..bayes.joint_fit import posterior_of
+from ..bayes.other_curves import contradicting_curve
 from ..bayes.posterior import FREE, Posterior, terms_to
-from ..contours.contour import Contour
+from ..contours.contour import Contour, read_only
 from ..contours.curves import Curves, besides_point, curves_through, has_measured_normals, misses, stacked
 from ..contours.local_geometry import Frame
 from ..paper import least_squares
@@ -43,7 +44,8 @@ class Reconstruction:
     known_height_std : mean_height_std, if it is known already
     known_curves : the contours as Curves of one touch, in the world, if they are known already
 
-    All else is computed from these when it is asked for.
+    All else is computed from these when it is asked for, so contours and strokes are copies that cannot be
+    written to.
     """
 
     geometry: Geometry
@@ -57,6 +59,10 @@ class Reconstruction:
     taps: Taps | None = None
     known_height_std: float | None = None
     known_curves: Curves | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "contours", tuple(contour.copied() for contour in self.contours))
+        object.__setattr__(self, "strokes", read_only(self.strokes))
 
     @property
     def frame(self) -> Frame:
@@ -194,6 +200,20 @@ class Reconstruction:
         return float(np.median(self._departures))
 
     @cached_property
+    def waves(self) -> float:
+        """What a quartic leaves of the surface at the contacts: a root mean square; 0 without a residual.
+
+        Outlying contacts do not count, because the surface itself leaves them out.
+        """
+        if self.residual is None:
+            return 0.0
+        x, y = self.contacts[:, :2].T
+        basis = monomials(x / self.radius, y / self.radius, exponents(1, 4))
+        height = self.height(x, y)
+        off = height - basis @ np.linalg.lstsq(basis, height, rcond=None)[0]
+        return math.sqrt(float(np.mean(off**2)))
+
+    @cached_property
     def total_absolute_curvature(self) -> float:
         """The integral of |K| over the patch (8)."""
         return total_absolute_curvature(self.patch, self.domain)
@@ -237,11 +257,37 @@ class Reconstruction:
         return contradicted(self.taps) or doubt(self) or ("ok", "The patch describes its contacts.")
 
     @cached_property
+    def curve_contradiction(self) -> tuple[float, float]:
+        """The number of deviations, and the share of L, by which a curve is off what the others tell."""
+        if self.joint_posterior is None:
+            return 0.0, 0.0
+        beside = [besides_point(contour.points - self.frame.origin)[1] for contour in self.contours]
+        curve = np.repeat(np.arange(len(beside)), list(map(np.count_nonzero, beside)))
+        curve = np.append(curve, np.full(len(self.strokes), -1))
+        return contradicting_curve(self.contacts / self.radius, curve, self.joint_posterior, self.noise)
+
+    @cached_property
+    def _fitted_normals(self) -> tuple[Array, Array]:
+        """Contacts with fitted normals and these normals, (n, 3) each, as `measured_normals` has them."""
+        if self.joint_posterior is None or not has_measured_normals(self.contours):
+            return np.empty((0, 3)), np.empty((0, 3))
+        return measured_normals(self.contours, self.frame, self.radius)
+
+    @cached_property
     def contradiction(self) -> tuple[float, float]:
         """The number of deviations, and the angle in radians, by which fitted normals contradict contacts."""
-        if self.joint_posterior is None or not has_measured_normals(self.contours):
+        contacts, normals = self._fitted_normals
+        if not len(normals):
             return 0.0, 0.0
-        contacts, normals = measured_normals(self.contours, self.frame, self.radius)
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
         alone = posterior_of(k1, k2, self.contacts / self.radius, self.noise)
         return contradiction(contacts, normals, alone)
+
+    @cached_property
+    def normal_scatter(self) -> tuple[float, float]:
+        """The number of deviations, and the angle in radians, by which fitted normals are off the curves."""
+        contacts, normals = self._fitted_normals
+        if not len(normals):
+            return 0.0, 0.0
+        d = self.geometry.derivatives(*(self.radius * contacts[:, :2].T))
+        return scatter(contacts, normals, np.column_stack([d.x, d.y]))

@@ -138,6 +138,7 @@ def _with_residuals(start: Start, fit: _Fit, posteriors: Posterior, weights: Arr
         start.stds / radii,
         start.told,
         (start.tangents[:, None] @ axes)[:, 0],
+        start.ranks(),
         _normals(start.curves, axes, contacts),
         through=not start.alone,
     )

@@ -23,16 +23,17 @@ from ..contours.local_geometry import (
 from ..contours.thinning import thinned
 from ..patch.domain import BRINK, Domain, closed_spline_domain
 from ..patch.monge import TERMS, monomials
-from .strokes import STRIPS, FirstFrame, first_frame, means, unit_in
+from .strokes import STRIPS, FirstFrame, first_frame, means, toward_farthest
 
 TOUCH_ROUNDING = 1e-3  # Far from the origin rounding may take this share of a touch; MISFIT has room for it.
 
 
 class Given(NamedTuple):
-    """The contacts of one touch: contours, strokes (n, 3), and the largest noise that strokes state."""
+    """The contacts of one touch: contours, and strokes (n, 3) as `gathered` has them."""
 
     contours: list[Contour]
     strokes: Array
+    when: NDArray[np.intp]
     noise: float
 
     @property
@@ -76,6 +77,13 @@ class Start(NamedTuple):
         present = self.curves.present.reshape(b, -1)
         return np.concatenate([local, beside], axis=1), np.concatenate([present, there], axis=1)
 
+    def ranks(self) -> NDArray[np.intp]:
+        """How many contacts are farther out on the same half curve, or before it in the strokes, (b, n)."""
+        index, last = np.indices(self.curves.along.shape)[2], self.curves.present.sum(axis=2)[..., None] - 1
+        of_curves = np.where(self.curves.along < 0.0, index, last - index).reshape(len(self.points), -1)
+        of_strokes = np.arange(max(map(len, self.strokes)))[None].repeat(len(self.points), axis=0)
+        return np.concatenate([of_curves, of_strokes], axis=1)
+
 
 Started = tuple[Start | None, list[list[Contour]], list[DegenerateCurvesError | None]]
 
@@ -89,7 +97,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     each = zip(touches, curves.present, curves.tangents, normals, strict=True)
     apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
     errors = [
-        degeneracy(*touch) or (_coarse(gap, size) if gap > TOUCH_ROUNDING * size else None)
+        degeneracy(*touch) or (too_coarse(gap, size) if gap > TOUCH_ROUNDING * size else None)
         for touch, gap, size in zip(each, apart, reach, strict=True)
     ]
     good = [i for i, error in enumerate(errors) if error is None]
@@ -99,8 +107,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     axes, k1, k2, radii = darboux_frames(curves, normals[good])
     strokes, stds, told = [], [], []
     for row, i in enumerate(good):
-        relative = given[i].strokes - points[i]
-        beside, size = _beside(curves.at(row), touches[i], axes[row], radii[row], relative)
+        beside, size = _beside(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
@@ -118,14 +125,20 @@ def _std(noise: float | None, size: int, known: list[float]) -> float:
 
 
 def _beside(
-    curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, strokes: Array
+    curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, point: Array, given: Given
 ) -> tuple[Array, int]:
     """Strokes (n, 3) over the domain of curves as means, in unit radius; the least number in a mean."""
-    if not len(strokes):
-        return strokes, 1
-    local = strokes @ axes / radius
+    if not len(given.strokes):
+        return given.strokes, 1
+    local = (given.strokes - point) @ axes / radius
     turned = replace(curves, points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
-    return means(local[_over(turned, contours, local)], unit_in(axes, curves.tangents[0]))
+    over = _over(turned, contours, local)
+    return _means(local[over], given.when[over])
+
+
+def _means(contacts: Array, when: NDArray[np.intp]) -> tuple[Array, int]:
+    """The means of contacts (n, 3) of strokes, and the least number in a mean; see `means`."""
+    return means(contacts, toward_farthest(contacts[:, :2]), when) if len(contacts) else (contacts, 1)
 
 
 def _over(curves: Curves, contours: Sequence[Contour], strokes: Array) -> NDArray[np.bool_]:
@@ -148,14 +161,14 @@ def strokes_start(
     for i, gap in enumerate(np.spacing(np.abs(points)).max(axis=1)):
         first = frames[i]
         if isinstance(first, FirstFrame) and gap > TOUCH_ROUNDING * first.radius:
-            frames[i] = _coarse(gap, first.radius)
+            frames[i] = too_coarse(gap, first.radius)
     errors = [None if isinstance(first, FirstFrame) else first for first in frames]
     firsts = {i: first for i, first in enumerate(frames) if isinstance(first, FirstFrame)}
     none: list[list[Contour]] = [[] for _ in given]
     if not firsts:
         return None, none, errors
     good = list(firsts)
-    thin = [means(first.contacts, first.along) for first in firsts.values()]
+    thin = [_means(first.contacts, given[i].when[first.used]) for i, first in firsts.items()]
     stds = [
         _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
     ]
@@ -197,7 +210,8 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     return closed_spline_domain(ends[counted], 1.0, brinks[counted])
 
 
-def _coarse(gap: float, size: float) -> DegenerateCurvesError:
+def too_coarse(gap: float, size: float) -> DegenerateCurvesError:
+    """The error for a touch of this size where neighboring coordinates are a length apart."""
     return DegenerateCurvesError(
         f"neighboring coordinates at the point are {gap:.2g} apart in double precision, too coarse "
         "for curves of "

@@ -12,6 +12,7 @@ from ..bayes.posterior import terms_to
 # benchmarks.stability chose these, and benchmarks.real LIKELY and what taps say. A fit is in doubt beyond
 # them.
 DOUBTFUL_STD = 0.02  # Mean deviation of the height over the domain, as a share of the radius.
+DOUBTFUL_WAVES = 0.012  # What a quartic leaves of a rough surface along its curves, as a share of the radius.
 DOUBTFUL_CONDITION = 1e3  # Plain least squares makes noise so many times larger.
 DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
 LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
@@ -22,6 +23,9 @@ SIGNIFICANT = 5.0  # so many standard deviations as well.
 LEAST_SCATTER = 0.3
 # Angle in radians by which normals contradict the contacts, if it is SIGNIFICANT as well.
 CONTRADICTED = 0.01
+# Angle in radians by which normals are off the curves, if it is so many of their deviations as well.
+SCATTERED, SCATTERED_DEVIATIONS = 0.15, 3.0
+CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the others show.
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
 CONTRADICTING = 3.0  # Mean number of deviations by which the surface is off the patch between the curves.
 DOUBTFUL_GAP = 0.1  # Share of the taps between the curves that feel no surface.
@@ -55,7 +59,7 @@ def doubt(r: Judged) -> tuple[str, str] | None:
             "The contacts alone do not determine the surface between the curves (condition number "
             f"{r.condition_number:.1e}): use another method or add sampling planes."
         )
-    return _about_data(r) or _about_heights(r) or _about_frame(r)
+    return _about_data(r) or _about_heights(r) or _about_frame(r) or _about_curves(r) or _about_waves(r)
 
 
 def contradicted(taps: Taps | None) -> tuple[str, str] | None:
@@ -97,6 +101,13 @@ def _about_data(r: Judged) -> tuple[str, str] | None:
             "average, more than their deviation explains: check the frame they were measured in, or "
             "leave them out."
         )
+    deviations, angle = r.normal_scatter
+    if deviations > SCATTERED_DEVIATIONS and angle > SCATTERED:
+        return "uncertain", (
+            f"The measured normals are off the curves by {math.degrees(angle):.0f} degrees, which is "
+            f"{deviations:.0f} times their deviation: check which contact each belongs to, give their "
+            "deviation, or leave them out."
+        )
     missed = r.typical_miss / r.radius
     if missed > DOUBTFUL_FIT + r.noise:
         return "uncertain", (
@@ -136,5 +147,25 @@ def _about_frame(r: Judged) -> tuple[str, str] | None:
         return "uncertain", (
             f"Curvatures are accurate to only {std / r.radius:.2g} in the least known direction: "
             "use a longer extent or add sampling planes."
+        )
+    return None
+
+
+def _about_curves(r: Judged) -> tuple[str, str] | None:
+    deviations, off = r.curve_contradiction
+    if deviations > CONTRADICTING_CURVE:
+        return "uncertain", (
+            f"A curve is {100.0 * off:.2g} % of the radius off what the others show, {deviations:.0f} times "
+            "the deviation, as if it were upside down or its plane were another: check each curve."
+        )
+    return None
+
+
+def _about_waves(r: Judged) -> tuple[str, str] | None:
+    waves = r.waves / r.radius
+    if waves > DOUBTFUL_WAVES and not len(r.strokes):
+        return "uncertain", (
+            f"Waves of {100.0 * waves:.1f} % of the radius run along the curves, which do not show where "
+            "they go on between them: use a shorter extent or add sampling planes."
         )
     return None

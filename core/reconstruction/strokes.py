@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, SMALLEST, Array, finite_array, list_of
 from ..bayes.joint_fit import turned
-from ..contours.contour import Contour, cross
+from ..contours.contour import Contour, cross, equal_points
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.monge import QUADRIC, QUARTIC, monomials
 
@@ -25,14 +25,12 @@ from ..patch.monge import QUADRIC, QUARTIC, monomials
 STRIPS, LEAST_STRIPS = 10, 6
 ROWS = 4  # A mean consists of contacts of at least so many rows, on average.
 STROKE_CELL = 0.02  # Contacts in a square of this share of the radius tell of one place.
-QUARTIC_CONTACTS = 2000  # The quartic is fitted to so many contacts.
 FIRST_REACH = 0.5  # The first quadric is fitted within this share of the largest distance, if that suffices.
 DETERMINED = 0.02  # It suffices if the least singular value of its terms, averaged over contacts, is larger.
 OPEN = 1e-3  # Terms of a quartic below this share of the largest singular value are left out.
 STRAY = 2.0  # Contacts so many times as far away as all others do not belong to the surface,
 FEW = 0.02  # if they are at most this share of all.
-# Contacts at this share of the largest distance count as equally far, so that rounding does not choose.
-FAR = 0.999
+DECIMALS = 9  # Places of contacts count to so many decimals, so that rounding does not choose.
 
 
 class FirstFrame(NamedTuple):
@@ -42,7 +40,7 @@ class FirstFrame(NamedTuple):
     k1, k2 : curvatures in unit radius
     radius : the largest distance of a contact from the place in the tangent plane
     contacts : (n, 3), relative to the place, in these axes and in unit radius
-    along : (2,), toward the farthest of them, the same for either side of the normal
+    used : (m,), which of the contacts given these are
     """
 
     axes: Array
@@ -50,50 +48,65 @@ class FirstFrame(NamedTuple):
     k2: float
     radius: float
     contacts: Array
-    along: Array
+    used: NDArray[np.bool_]
 
 
-def gathered(strokes: Sequence[ArrayLike | Contour], contours: Sequence[Contour] = ()) -> tuple[Array, float]:
-    """All different contacts of strokes, (n, 3), and the largest noise that any of them states.
+def gathered(
+    strokes: Sequence[ArrayLike | Contour], contours: Sequence[Contour] = ()
+) -> tuple[Array, NDArray[np.intp], float]:
+    """All different contacts of strokes, (n, 3), when each was felt, and the largest noise that one states.
 
-    Repeated contacts, as of a sensor at rest or of contours that are given too, would tell no more. Raises
-    ValueError for strokes of another shape or with numbers that are not finite.
+    Contacts are in the order of their coordinates, so that no other order makes a difference. Those that
+    follow each other in a stroke have consecutive numbers in the second array, (n,). Repeated contacts, as of
+    contours that are given too, would tell no more. Raises ValueError for strokes of another shape or with
+    numbers that are not finite.
     """
     given: list[object] = list_of("strokes", strokes, object)
     if not given:  # In most cases there are only contours, which should not take longer.
-        return np.empty((0, 3)), 0.0
+        return np.empty((0, 3)), np.empty(0, dtype=np.intp), 0.0
     arrays = [
         stroke.points if isinstance(stroke, Contour) else finite_array("strokes", stroke, (None, 3), LARGEST)  # type: ignore[arg-type]
         for stroke in given
     ]
     noise = max((stroke.noise or 0.0 for stroke in given if isinstance(stroke, Contour)), default=0.0)
     points = np.vstack([*(contour.points for contour in contours), *arrays])
-    first = np.unique(points, axis=0, return_index=True)[1]
-    beside = len(points) - sum(map(len, arrays))
-    return points[np.sort(first[first >= beside])], noise
+    order, starts = equal_points(points)
+    first = order[starts]
+    first = first[first >= len(points) - sum(map(len, arrays))]
+    stroke = np.repeat(
+        np.arange(len(contours) + len(arrays)), [*(len(c.points) for c in contours), *map(len, arrays)]
+    )
+    return points[first], first + stroke[first], noise
 
 
-def means(contacts: Array, along: Array, strips: int = STRIPS) -> tuple[Array, int]:
+def means(
+    contacts: Array, along: Array, when: NDArray[np.intp] | None = None, strips: int = STRIPS
+) -> tuple[Array, int]:
     """Contacts (n, 3) in unit radius, or strips^2 means of neighbors; the least number of contacts in a mean.
 
     Strips run across the direction `along` (2,). Each mean has an equal share of the area that was felt,
-    because a sensor tells no more of the shape where it dwells. Contacts that follow each other share the
-    error of their row, so there are fewer strips if rows are far apart.
+    because a sensor tells no more of the shape where it dwells. Contacts that follow each other, as `when`
+    says, share the error of their row, so there are fewer strips if rows are far apart. Without `when` they
+    follow each other as they are given.
     """
     n = len(contacts)
     if n <= strips**2:
         return contacts, 1
     groups = _groups(contacts[:, :2], along, strips)
-    order = np.argsort(groups, kind="stable")
+    when = np.arange(n) if when is None else when
+    order = np.lexsort((when, groups))
     starts = np.flatnonzero(np.diff(groups[order], prepend=-1))
-    rows = np.count_nonzero((np.diff(order) != 1) | (np.diff(groups[order]) != 0)) + 1
+    rows = np.count_nonzero((np.diff(when[order]) != 1) | (np.diff(groups[order]) != 0)) + 1
     if strips > LEAST_STRIPS and rows < ROWS * len(starts):
-        return means(contacts, along, strips - 2)
+        return means(contacts, along, when, strips - 2)
+    order = np.argsort(groups, kind="stable")
     counts = np.diff(starts, append=n)[:, None]
-    some = contacts[:: max(1, n // QUARTIC_CONTACTS)]
-    quartic = np.linalg.lstsq(_basis(some), some[:, 2], rcond=OPEN)[0]
     over = contacts[order]
-    over[:, 2] -= _basis(over) @ quartic
+    basis = _basis(over)
+    # Singular values of the contacts are roots of those of their normal equations.
+    inverse = np.linalg.pinv(basis.T @ basis, rcond=OPEN**2, hermitian=True)
+    quartic = inverse @ (basis.T @ over[:, 2])
+    over[:, 2] -= basis @ quartic
     found: Array = np.add.reduceat(over, starts, axis=0) / counts
     found[:, 2] += _basis(found) @ quartic
     return found, int(counts.min())
@@ -101,13 +114,15 @@ def means(contacts: Array, along: Array, strips: int = STRIPS) -> tuple[Array, i
 
 def _groups(flat: Array, along: Array, strips: int) -> NDArray[np.intp]:
     """The group (n,) of each contact (n, 2), such that all groups have equal shares of occupied cells."""
+    flat = flat.round(DECIMALS)  # Rows of a raster are equally far along, whatever rounding makes of them.
     run, across = flat @ along, flat[:, 1] * along[0] - flat[:, 0] * along[1]
-    across *= np.copysign(1.0, np.sum(across**3))  # It is the same for either side of the normal.
+    # They are the same for either side of the normal, and for either way of d1.
+    run, across = (part * np.copysign(1.0, np.sum(part**3)) for part in (run, across))
     places = np.clip(np.column_stack([run, across]), -1.0, 1.0) / STROKE_CELL
     cells = places.round().astype(np.intp) @ [1, round(4.0 / STROKE_CELL)]
     cells -= cells.min()
     shares = 1.0 / np.bincount(cells)[cells]
-    first = _equal(shares, np.argsort(run, kind="stable"), np.zeros(len(flat), dtype=np.intp), strips)
+    first = _equal(shares, np.lexsort((across, run)), np.zeros(len(flat), dtype=np.intp), strips)
     return strips * first + _equal(shares, np.lexsort((across, first)), first, strips)
 
 
@@ -139,7 +154,7 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
     reach = float(distances.max(initial=0.0))
     if len(r) < len(QUADRIC) or reach < SMALLEST:
         return _too_few(len(r))
-    tangent = r[np.argmax(distances >= FAR * reach)] / reach
+    tangent = toward_farthest(r)
     for share in (FIRST_REACH, 1.0):
         near = r[distances <= share * reach] / (share * reach)
         plane = _plane(near, outward)
@@ -154,12 +169,22 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
     axes, k1, k2, _ = turned(plane, quadric[1:], tangent)
     local = r @ axes
     flat = np.hypot(local[:, 0], local[:, 1])
-    local = local[np.abs(local[:, 2] - quadric[0] * share * reach) <= flat.max()]
+    near = np.abs(local[:, 2] - quadric[0] * share * reach) <= flat.max()
+    local = local[near]
+    used[used] = near
     if len(local) < len(QUADRIC):
         return _too_few(len(local))
     radius = float(np.hypot(local[:, 0], local[:, 1]).max())
     scale = radius / (share * reach)
-    return FirstFrame(axes, k1 * scale, k2 * scale, radius, local / radius, unit_in(axes, tangent))
+    return FirstFrame(axes, k1 * scale, k2 * scale, radius, local / radius, used)
+
+
+def toward_farthest(points: Array) -> Array:
+    """The unit vector (k,) to the farthest of points (n, k), the first of those that are equally far."""
+    distances = np.sqrt(np.einsum("ni,ni->n", points, points))
+    reach = max(float(distances.max()), 1e-300)
+    found: Array = points[np.argmax((distances / reach).round(DECIMALS))] / reach
+    return found
 
 
 def _farthest(distances: Array) -> float:
@@ -167,13 +192,6 @@ def _farthest(distances: Array) -> float:
     last = np.sort(distances)[-1 - int(FEW * len(distances)) :]
     gaps = np.flatnonzero(last[1:] > STRAY * last[:-1])
     return float(last[gaps[0] if len(gaps) else -1]) if len(last) else 0.0
-
-
-def unit_in(axes: Array, direction: Array) -> Array:
-    """The part (2,) of a direction in the tangent plane of axes (3, 3), scaled to length 1."""
-    flat = direction @ axes[:, :2]
-    found: Array = flat / max(float(np.hypot(*flat)), 1e-300)
-    return found
 
 
 def _too_few(count: int) -> DegenerateCurvesError:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..contours.finger import Surface
+from ..contours.finger import Surface, contact_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING
 
@@ -56,8 +56,9 @@ def _height_off(surface: Surface, start: list[float], up: list[float], reach: fl
             hit = surface.ray_cast(at, _along([0.0, 0.0, 0.0], up, sign), reach - gone)
             if hit is None:
                 break
-            gone = abs(_dot([a - b for a, b in zip(hit[0], start, strict=True)], up))
-            if _dot(hit[1], up) > 0.0:
+            point, normal = contact_of(hit, 1.0)
+            gone = abs(_dot([a - b for a, b in zip(point, start, strict=True)], up))
+            if _dot(normal, up) > 0.0:
                 nearest = reach = gone
                 break
             gone += 1e-4 * reach

@@ -58,7 +58,7 @@ def scattered(
 
     Raises ValueError for a mesh without area.
     """
-    corner, second, third = (points[triangles[:, i]] for i in range(3))
+    corner, second, third = (np.asarray(points[triangles[:, i]], dtype=float) for i in range(3))
     sides = second - corner, third - corner
     normals = np.cross(*sides)
     areas = np.linalg.norm(normals, axis=1)
@@ -73,7 +73,7 @@ def scattered(
 
 def _one_a_cell(points: Array, size: float) -> NDArray[np.intp]:
     """The indices of the first of the points (n, 3) in each cell of a grid."""
-    cells = np.floor(points / size)
+    cells = np.floor(np.asarray(points, dtype=float) / size)
     cells -= cells.min(axis=0)
     across = cells.max(axis=0) + 1.0
     return np.unique((cells[:, 0] * across[1] + cells[:, 1]) * across[2] + cells[:, 2], return_index=True)[1]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, finite_array
-from ..contours.contour import SamplingPlane, Vector
-from ..contours.finger import Surface
+from ..contours.contour import SamplingPlane, Vector, dot
+from ..contours.finger import Surface, contact_of
 from ..contours.tracking import track
 from ..patch.domain import GRID, Domain
 from ..patch.geometry import Geometry, distances, fit_error, overlapped
@@ -146,10 +146,10 @@ def _below(r: Reconstruction, surface: Surface, local: Vector, distance: float) 
     """The world point where a ray from a local point down along the normal meets what a finger can reach."""
     up = _vector(r.frame.axes[:, 2])
     hit = surface.ray_cast(_vector(r.frame.to_world(local)), (-up[0], -up[1], -up[2]), distance)
-    if hit is None or np.dot(hit[1], up) <= 0.0:
+    if hit is None:
         return None
-    point = _vector(hit[0])
-    return None if is_hidden(surface, point, up, 2.0 * r.radius) else point
+    point, normal = contact_of(hit, 1.0)
+    return None if dot(normal, up) <= 0.0 or is_hidden(surface, point, up, 2.0 * r.radius) else point
 
 
 def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Systems solved by LAPACK against numpy's, and the one thread that they run on."""
 
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
 import numpy as np
 import pytest
 
@@ -38,5 +41,28 @@ def test_one_thread_during_a_call_and_as_many_as_before_afterwards():
         with pytest.raises(np.linalg.LinAlgError):
             lapack.cholesky(-np.eye(3))
         assert get() == 2
+    finally:
+        set_to(before)
+
+
+def test_calls_in_several_threads_of_python_leave_as_many_threads_as_before():
+    get, set_to = lapack._threads()
+    before, count = get(), 4
+    both, seen = Barrier(count), []
+
+    @lapack.on_one_thread
+    def overlapping(rank):
+        both.wait()  # All calls have begun before the first ends, and they end one by one.
+        for _ in range(rank):
+            lapack.cholesky(MATRIX.copy())
+        seen.append(get())
+
+    set_to(2)
+    try:
+        for _ in range(20):
+            with ThreadPoolExecutor(count) as pool:
+                list(pool.map(overlapping, range(count)))
+            assert get() == 2
+        assert set(seen) == {1}
     finally:
         set_to(before)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, reconstruct_many
 from core.bayes import evidence, linear_system, posterior
-from core.bayes.contradiction import contradiction, measured_normals
+from core.bayes.contradiction import contradiction, measured_normals, scatter
 from core.bayes.measured_slopes import slope_equations
 from core.contours.local_geometry import Frame
 from core.patch.monge import monomials
@@ -238,6 +238,82 @@ def test_normals_that_only_scatter_more_than_was_said_contradict_nothing():
     for seed in range(20):
         contours = [replace(c, normal_std=0.02) for c in measured(touched(surface, 0.02), 0.1, seed)]
         assert not contradicts(surface.fit(contours))
+
+
+def scattered(r):
+    return "measured normals are off the curves" in r.message
+
+
+@pytest.mark.parametrize("std", [0.005, 0.01, 0.02, 0.05, 0.1])
+def test_random_normals_are_told(std):
+    for number, surface in enumerate(EXACT):
+        for seed in range(3):
+            rng = np.random.default_rng([number, seed])
+            contours = [
+                replace(c, normals=rng.normal(size=c.normals.shape), normal_std=std)
+                for c in touched(surface, 0.05, seed)
+            ]
+            r = surface.fit(contours)
+            assert r.status == "uncertain"
+            assert scattered(r) or contradicts(r)
+            assert r.normal_scatter[0] > 3.0
+
+
+@pytest.mark.parametrize("std", [0.01, 0.05])
+def test_normals_that_are_mirrored_at_every_second_contact_are_told(std):
+    for seed, surface in enumerate((surfaces.sphere(20), surfaces.torus(40, 15, 0.6), surfaces.cylinder(15))):
+        up, contours = surface.normal, []
+        for c in measured(touched(surface, 0.05, seed), std, seed):
+            normals = c.normals.copy()
+            normals[::2] = 2.0 * np.outer(normals[::2] @ up, up) - normals[::2]
+            contours.append(replace(c, normals=normals))
+        r = surface.fit(contours)
+        assert (r.status, scattered(r) or contradicts(r)) == ("uncertain", True)
+
+
+def test_right_normals_of_a_texture_are_not_doubted():
+    """Waves that contacts follow tilt the normals by up to 0.35 radians, many times their deviation."""
+    tilts = []
+    for length in (4.0, 6.0, 9.0):
+        for seed in range(4):
+            p, phase = 2.0 * np.pi / length, 1.7 * seed
+            surface = surfaces.Exact(
+                lambda x, y, z, p=p, phase=phase: (
+                    z + 0.015 * (x**2 + y**2) - 0.2 * (np.cos(p * x + phase) + np.cos(p * y))
+                ),
+                lambda q, p=p, phase=phase: np.array(
+                    [
+                        0.03 * q[0] + 0.2 * p * np.sin(p * q[0] + phase),
+                        0.03 * q[1] + 0.2 * p * np.sin(p * q[1]),
+                        1.0,
+                    ]
+                ),
+                np.array([0.0, 0.0, 0.2 * (np.cos(phase) + 1.0)]),
+                0.0,
+                0.0,
+            )
+            contours = surface.track(PLANES, step=0.5, rng=seed)
+            tilts.append(max(np.arccos(np.abs(c.normals[:, 2])).max() for c in contours))
+            for std in (0.02, 0.05):
+                assert not scattered(surface.fit(measured(contours, std, seed)))
+    assert max(tilts) > 0.35
+
+
+def test_scatter_is_counted_along_the_curves_in_radians_and_deviations():
+    rng = np.random.default_rng(3)
+    contacts = np.column_stack([rng.uniform(-0.8, 0.8, (40, 2)), np.zeros(40)])
+    ahead = contacts[:, :2] / np.linalg.norm(contacts[:, :2], axis=1, keepdims=True)
+    slopes, turn = 0.3 * ahead, np.arctan(0.3) + np.where(np.arange(40) % 2, 0.2, -0.2)
+    along = np.column_stack([-np.sin(turn)[:, None] * ahead, np.cos(turn)])
+    across = np.column_stack([-ahead[:, 1], ahead[:, 0], np.zeros(40)])
+    normals = along + 0.5 * across  # A lean across the curve makes no difference in the plane of the curve.
+    found = scatter(contacts, along / 0.05, slopes)
+    assert found == pytest.approx((4.0, 0.2))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    assert scatter(contacts, normals / 0.05, slopes)[1] == pytest.approx(
+        np.arcsin(np.sin(0.2) / np.hypot(1.0, 0.5))
+    )
+    assert scatter(contacts, along / 1e-6, slopes)[0] == pytest.approx(20.0)
 
 
 def test_too_few_normals_contradict_nothing():

@@ -80,7 +80,7 @@ def test_the_mean_alone_is_that_of_the_posterior(weight):
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     contacts = np.column_stack([flat, rough(3)(flat)])
     weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
-    touch = Observations(contacts, weights, 1e-3, 4e-3, None)
+    touch = Observations(contacts, weights, 1e-3, 4e-3, None, np.arange(len(weights)))
     system = system_of(touch)
     size = residual_evidence.sizes(touch, system)
     mean = residual_evidence.mean_given(touch, system, size)
@@ -120,7 +120,7 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     _, r = touched(noise=noise)
     contacts, (x, y, z) = r.contacts / r.radius, r.contacts.T / r.radius
     sizes = np.array([4e-4, 9e-4])
-    touch = Observations(contacts, np.ones(len(x)), noise, noise, None)
+    touch = Observations(contacts, np.ones(len(x)), noise, noise, None, np.arange(len(x)))
     residual = fitted(touch, system_of(touch), sizes, noise)
     variances = np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(USUAL_WAVINESS))])
     places, points = contacts[:, :2], over(r) / r.radius
@@ -377,7 +377,7 @@ def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
 def test_the_noise_may_be_all_that_a_sextic_leaves_over():
     rng = np.random.default_rng(6)
     contacts = np.column_stack([rng.uniform(-0.7, 0.7, (120, 2)), rng.normal(0.0, 0.008, 120)])
-    touch = Observations(contacts, np.ones(120), 1e-3, 8e-3, None)
+    touch = Observations(contacts, np.ones(120), 1e-3, 8e-3, None, np.arange(120))
     assert residual_evidence.sizes(touch, system_of(touch)).noise > 6e-3
 
 

@@ -9,7 +9,7 @@ from surfaces import TILTED, UPRIGHT
 
 from core import Contour, DegenerateCurvesError, SamplingPlane, reconstruct
 from core.contours.curves import curves_through, stacked
-from core.contours.local_geometry import darboux_frames, principal_curvatures, surface_normals
+from core.contours.local_geometry import darboux_frames, degeneracy, principal_curvatures, surface_normals
 
 EXACT = {
     "plane": surfaces.plane(),
@@ -209,3 +209,12 @@ def test_at_an_umbilic_of_large_curvatures_rounding_makes_no_direction():
     angles, known = np.array([0.1, 1.0, 2.0, 0.0]), np.array([True, True, True, False])
     curvatures = 1e9 * (1.0 + 1e-12 * np.array([1.0, -1.0, 0.5, 0.0]))
     assert principal_curvatures(angles, curvatures, known)[2] == 0.0
+
+
+def test_a_closed_curve_that_runs_through_the_point_twice_has_no_direction():
+    contours = [Contour(np.outer(np.arange(1.0, 9.0), way)) for way in (*np.eye(3)[:2], (1.0, 1.0, 0.0))]
+    tangents = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.6, 0.8, 0.0)])
+    error = degeneracy(contours, np.ones((3, 8), dtype=bool), tangents, np.array([0.0, 0.0, 1.0]))
+    assert str(error).startswith(
+        "curve 2 has no direction at the point: split it where it passes the point again"
+    )

@@ -2,11 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Contour tracking on exact surfaces."""
 
+import warnings
+
 import numpy as np
 import pytest
 import surfaces
 
-from core import Contour, SamplingPlane, azimuth_of, track
+from core import (
+    Contour,
+    SamplingPlane,
+    azimuth_of,
+    explore,
+    height_error,
+    track,
+    verify,
+)
 
 PLANES = surfaces.planes((10, 70, 130), (0, 20, -35))
 
@@ -278,3 +288,35 @@ def test_a_ray_that_slips_between_two_faces_is_cast_again_a_thousandth_of_a_step
     (contour,) = track(Plate(), (0, 0, 0), (0, 0, 1), [SamplingPlane(0.0)], extent=4 * step, step=step)
     assert len(contour.points) == 9
     assert contour.points[5] == pytest.approx([step, 0.0, 0.0], abs=1.1e-3 * step)
+
+
+class Single:
+    """A surface that answers in single precision."""
+
+    def __init__(self, surface):
+        self.surface = surface
+
+    def ray_cast(self, *ray):
+        hit = self.surface.ray_cast(*ray)
+        return hit and tuple(part.astype(np.float32) for part in hit)
+
+
+def test_a_surface_of_single_precision_is_touched_in_double_precision():
+    exact = surfaces.pear()
+    single = Single(exact)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        contours = track(single, exact.point, exact.normal, PLANES, extent=10, step=0.5)
+        touch = explore(single, exact.point, exact.normal)
+        r = touch.result
+        vertices = r.frame.to_world(r.mesh()[0]).astype(np.float32)
+        off, report = height_error(r, single), verify(r, single, vertices)
+    for contour, other in zip(contours, exact.track(PLANES, extent=10, step=0.5), strict=True):
+        assert contour.points.dtype == contour.normals.dtype == np.float64
+        assert contour.points == pytest.approx(other.points, abs=1e-5)
+        # The ways between contacts are as long in spite of the rounding of each.
+        steps = np.linalg.norm(np.diff(contour.points, axis=0), axis=1)
+        assert np.abs(steps / 0.5 - 1.0).max() < 2e-3
+    assert type(off) is float
+    assert off < 3.0 * r.mean_height_std
+    assert all(type(value) in (int, float) for value in report.values())

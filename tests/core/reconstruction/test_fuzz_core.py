@@ -96,7 +96,7 @@ def is_sentence(error):
     words = str(error)
     if type(error) is DegenerateCurvesError:
         known = words.startswith(
-            ("curve ", "curves ", "three curves ", "the tangents ", "the curves ", "the ")
+            ("curve ", "curves ", "three curves ", "the tangents ", "the curves ", "the ", "neighboring ")
         )
         return known and len(words) < 400 and "nan" not in words
     return (

@@ -408,3 +408,48 @@ def test_the_weight_that_is_not_given_is_that_of_the_method(method, weight):
     one, other, half = (surface.fit(contours, method=method, weight=w) for w in (None, weight, weight / 2.0))
     assert np.array_equal(one.patch.coefficients, other.patch.coefficients)
     assert not np.array_equal(one.patch.coefficients, half.patch.coefficients)
+
+
+@pytest.mark.parametrize("measured", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_repeated_contacts_count_once(seed, measured):
+    """They follow each other, as of a sensor at rest, or come back later, as of one that goes to and fro."""
+    surface, rng, given, repeated = surfaces.pear(), np.random.default_rng(seed), [], []
+    for contour in surface.track(UPRIGHT, noise=0.05, rng=seed):
+        normals, std = (contour.normals, 0.02) if measured else (None, None)
+        given.append(Contour(contour.points, normals=normals, normal_std=std))
+        order = np.concatenate([np.arange(25), rng.integers(0, 25, 40)])
+        points, normals = contour.points[order], None if normals is None else normals[order]
+        repeated.append(Contour(points, normals=normals, normal_std=std))
+    one, other = (surface.fit(contours) for contours in (given, repeated))
+    assert [len(contour.points) for contour in other.contours] == [25, 25, 25]
+    assert other.patch.degree == one.patch.degree
+    assert (other.status, other.message) == (one.status, one.message)
+    assert other.frame.axes == pytest.approx(one.frame.axes, abs=1e-9)
+    assert other.patch.coefficients == pytest.approx(one.patch.coefficients, rel=1e-6, abs=1e-12)
+    assert other.mean_height_std == pytest.approx(one.mean_height_std, rel=1e-9)
+
+
+def test_normals_of_a_repeated_contact_count_by_their_mean():
+    contour = Contour(
+        [[1, 0, 0], [2, 0, 0], [1, 0, 0], [0, 0, 0]],
+        normals=[[0, 0, 3], [0, 1, 0], [0, -0.6, -0.8], [1, 0, 0]],
+    )
+    assert contour.points.tolist() == [[1, 0, 0], [2, 0, 0], [0, 0, 0]]
+    assert contour.normals[0] / np.linalg.norm(contour.normals[0]) == pytest.approx([0, 0.1**0.5, 0.9**0.5])
+    assert contour.normals[1:].tolist() == [[0, 1, 0], [1, 0, 0]]
+
+
+def test_a_result_keeps_the_contacts_that_it_was_made_of():
+    surface = surfaces.pear()
+    contours = [replace(c, normal_std=0.02) for c in surface.track(UPRIGHT, noise=0.05, rng=1)]
+    before, after = surface.fit(contours), surface.fit(contours)
+    names = "misses", "fit_error", "typical_miss", "contradiction", "status", "message"
+    expected = [getattr(before, name) for name in names]
+    for contour in contours:
+        contour.points[1:] += 3.0
+        contour.normals[:] = contour.normals[:, ::-1]
+    for name, value in zip(names, expected, strict=True):
+        assert np.array_equal(getattr(after, name), value), name
+    with pytest.raises(ValueError, match="read-only"):
+        after.contours[0].points[0] = 0.0

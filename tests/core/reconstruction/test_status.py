@@ -289,3 +289,58 @@ def test_normals_contradict_by_five_deviations_and_a_hundredth(deviations, angle
     r = surfaces.pear().fit(contours_of(surfaces.pear()))
     vars(r)["contradiction"] = (deviations, angle)
     assert (r.status == "uncertain") is told
+
+
+def waves(length, height, azimuth, k2=-0.01):
+    """A quadric with waves of this length and height along an azimuth in degrees."""
+    p, q = 2.0 * np.pi / length * np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))])
+    return surfaces.Exact(
+        lambda x, y, z: z + 0.02 * x**2 - 0.5 * k2 * y**2 - height * (np.cos(p * x + q * y) - 1.0),
+        lambda r: np.array(
+            [
+                0.04 * r[0] + p * height * np.sin(p * r[0] + q * r[1]),
+                -k2 * r[1] + q * height * np.sin(p * r[0] + q * r[1]),
+                1.0,
+            ]
+        ),
+        np.zeros(3),
+        -0.04,
+        k2,
+    )
+
+
+@pytest.mark.parametrize("azimuth", [20, 75])
+@pytest.mark.parametrize(("length", "height"), [(8, 0.6), (10, 0.6), (13, 1.2)])
+def test_waves_as_long_as_curves_are_apart_are_a_doubt(length, height, azimuth):
+    """They are up to a sixth of the radius off a fit that describes all contacts."""
+    surface = waves(length, height, azimuth)
+    contours = surface.track(surfaces.planes((0, 60, 120)), extent=13, step=13 / 24)
+    r = surface.fit(contours)
+    assert r.fit_error < 1e-4 * r.radius
+    assert r.status == "uncertain"
+    points, heights = surfaces.heights_over(surface, r)
+    if "Waves of" in r.message:
+        assert np.abs(heights - r.height(*points.T)).max() > 0.03 * r.radius
+        assert f"Waves of {100.0 * r.waves / r.radius:.1f} %" in r.message
+
+
+def test_low_waves_and_waves_that_strokes_show_are_none_to_doubt():
+    rng = np.random.default_rng(0)
+    for azimuth in (20, 75):
+        low, high = waves(10, 0.1, azimuth), waves(13, 0.6, azimuth)
+        for surface, strokes in ((low, 0), (high, 150)):
+            contours = surface.track(surfaces.planes((0, 60, 120)), extent=13, step=13 / 24)
+            x, y = rng.uniform(-9.0, 9.0, (2, strokes))
+            flat = np.column_stack([x, y, np.full(strokes, 13.0)])
+            beside = [surface.crossings(flat, np.array([0.0, 0.0, -1.0]), 26.0)] if strokes else []
+            assert "Waves" not in surface.fit(contours, strokes=beside).message
+
+
+def test_outlying_contacts_are_no_waves():
+    for seed in range(5):
+        rng, surface, found = np.random.default_rng(seed), surfaces.saddle(), []
+        for contour in surface.track(surfaces.planes((0, 60, 120)), noise=0.05, rng=seed):
+            points = contour.points.copy()
+            points[:, 2] += np.where(rng.random(len(points)) < 0.2, rng.normal(0.0, 1.2, len(points)), 0.0)
+            found.append(Contour(points, noise=0.05))
+        assert "Waves" not in surface.fit(found).message

@@ -56,3 +56,17 @@ def test_nothing_is_scattered_on_what_has_no_area():
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     with pytest.raises(ValueError, match="triangles: expected some with an area, got none"):
         core.scattered(points, np.array([[0, 1, 2]]), 5, np.random.default_rng(0))
+
+
+def test_points_of_single_precision_are_sampled_in_double_precision():
+    single = np.random.default_rng(0).uniform(-1.0, 1.0, (6000, 3)).astype(np.float32)
+    triangles = np.arange(6000).reshape(-1, 3)
+    found, expected = (
+        (
+            *sampling.scattered(points, triangles, 50, np.random.default_rng(2)),
+            list(sampling.spaced(points, 1e-3, np.random.default_rng(3))),
+        )
+        for points in (single, single.astype(float))
+    )
+    for one, other in zip(found, expected, strict=True):
+        assert np.array_equal(one, other)

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether one curve contradicts the others, as if it were upside down or its plane were another.
+
+Beside the paper. Three curves always agree, because the normal curvatures H + A cos 2 phi + B sin 2 phi are
+three numbers. Where there are more contacts, all others tell where each curve should be, with a deviation.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from .joint_fit import posteriors_of
+from .posterior import Posterior
+
+ENOUGH = 4  # So many curves, or strokes in place of one, may contradict each other.
+OUTER = 0.5  # A curve counts from this share of its reach on, where it leaves the tangent plane.
+NOTICED = 4.0  # Waviness and noise of the others are found where this many deviations are exceeded without.
+
+
+def contradicting_curve(
+    contacts: Array, curve: NDArray[np.intp], posterior: Posterior, noise: float
+) -> tuple[float, float]:
+    """The number of deviations, and the height in unit radius, by which a curve is off what the others tell.
+
+    contacts : (n, 3), besides the reference point, in the frame and in unit radius
+    curve : (n,), the number of the curve of each, -1 beside curves
+    posterior : of all contacts; noise : least deviation of a contact
+
+    Both are medians over the outer contacts of the curve that is off by most deviations, so outliers do not
+    count. They are 0 if there are too few curves to tell.
+    """
+    numbers = np.unique(curve)
+    if len(numbers) < ENOUGH:
+        return 0.0, 0.0
+    others = (curve != numbers[numbers >= 0][:, None]).astype(float)
+    k1, k2 = (2.0 * float(posterior.mean[i]) for i in (2, 4))
+    found = _most_off(
+        contacts, others, posteriors_of(k1, k2, contacts, others, float(posterior.noise), False)
+    )
+    if found[0] <= NOTICED:
+        return found
+    return _most_off(contacts, others, posteriors_of(k1, k2, contacts, others, noise))
+
+
+def _most_off(contacts: Array, others: Array, told: Posterior) -> tuple[float, float]:
+    """The medians for the curve that is off by most deviations, given what `others` (b, n) tell of each."""
+    reach, found = np.hypot(contacts[:, 0], contacts[:, 1]), []
+    for i, weights in enumerate(others):
+        own = reach * (weights == 0.0)
+        outer, alone = contacts[own > OUTER * own.max()], told.at(i)
+        off = outer[:, 2] - alone.height(*outer[:, :2].T)
+        std = np.hypot(alone.height_std(*outer[:, :2].T), alone.noise)
+        found.append((abs(float(np.median(off / std))), abs(float(np.median(off)))))
+    return max(found)

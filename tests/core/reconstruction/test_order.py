@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The order of contacts, curves and strokes, and the way in which each runs, change nothing in the world."""
+
+import numpy as np
+import pytest
+import surfaces
+
+from core import Contour, reconstruct
+
+TO_ROUNDING = 1e-6  # In deviations of the height. Rounding itself is a thousandth of this.
+
+
+def wavy(rng, rough):
+    """The height of a random cubic with waves, which ask for a residual if they are `rough`."""
+    k, c = rng.uniform(-0.5, 0.5, 2), rng.normal(0.0, 0.1, 2)
+    lengths = rng.uniform(2.0, 12.0, 4) * (1.0 if rough else 0.3)
+    azimuths, phases, sizes = *rng.uniform(0.0, 7.0, (2, 4)), rng.uniform(0.002, 0.03, 4)
+
+    def height(x, y):
+        z = 0.5 * (k[0] * x**2 + k[1] * y**2) + c[0] * x**3 + c[1] * x**2 * y
+        for p, a, phase, size in zip(lengths, azimuths, phases, sizes, strict=True):
+            z = z + size * (np.cos(p * (x * np.cos(a) + y * np.sin(a)) + phase) - np.cos(phase))
+        return z
+
+    return height
+
+
+def touched(count, curves, strokes, seed):
+    """Curves of up to `count` contacts with noise in all directions, and 12 strokes of some contacts each."""
+    rng, noise = np.random.default_rng(seed), (0.0, 0.002, 0.01)[seed % 3]
+    height, felt = wavy(rng, seed % 2), []
+    for azimuth in np.pi / curves * np.arange(curves) + rng.uniform(0.0, 7.0):
+        t = np.sort(rng.uniform(-rng.uniform(0.7, 1.0), 1.0, int(count * rng.uniform(0.7, 1.0))))
+        felt.append(np.column_stack([t * np.cos(azimuth), t * np.sin(azimuth)]))
+    x = np.linspace(-0.9, 0.9, strokes)
+    beside = (
+        [np.column_stack([x, np.full(strokes, y)]) for y in np.linspace(-0.9, 0.9, 12)] if strokes else []
+    )
+    return [
+        [np.column_stack([p, height(*p.T)]) + rng.normal(0.0, noise, (len(p), 3)) for p in some]
+        for some in (felt, beside)
+    ]
+
+
+def fitted(curves, strokes):
+    return reconstruct((0, 0, 0), list(map(Contour, curves)), outward=(0, 0, 1), strokes=strokes)
+
+
+def require_same(one, other):
+    assert (other.status, other.patch.degree) == (one.status, one.patch.degree)
+    assert other.mean_height_std == pytest.approx(one.mean_height_std, rel=1e-6)
+    assert [other.patch.k1, other.patch.k2] == pytest.approx([one.patch.k1, one.patch.k2], abs=1e-7)
+    x, y = one.domain.grid(100)[0].T
+    there = other.frame.to_local(one.frame.to_world(np.column_stack([x, y, one.height(x, y)])))
+    off = np.abs(there[:, 2] - other.height(*there[:, :2].T))
+    assert (off / one.height_std(x, y)).max() < TO_ROUNDING
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("count", "curves"), [(20, 3), (60, 4), (101, 3), (150, 6), (1000, 3)])
+@pytest.mark.parametrize("strokes", [0, 8, 40])
+def test_a_fit_is_the_same_in_any_order(count, curves, strokes, seed):
+    felt, beside = touched(count, curves, strokes, seed)
+    rng, one = np.random.default_rng(seed), fitted(felt, beside)
+    require_same(one, fitted([points[::-1] for points in felt], beside))
+    require_same(one, fitted([felt[0][::-1], *felt[1:]], beside))
+    require_same(one, fitted([*felt[1:], felt[0]], beside))
+    require_same(one, fitted(map(rng.permutation, felt), beside))
+    if strokes:
+        require_same(one, fitted(felt, [points[::-1] for points in beside]))
+        require_same(one, fitted(felt, [beside[i] for i in rng.permutation(12)]))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("strokes", [8, 40])
+def test_strokes_alone_are_the_same_in_any_order(strokes, seed):
+    _, beside = touched(20, 3, strokes, seed)
+    one = fitted([], beside)
+    require_same(one, fitted([], [points[::-1] for points in beside]))
+    require_same(one, fitted([], [beside[i] for i in np.random.default_rng(seed).permutation(12)]))
+
+
+@pytest.mark.parametrize("count", [81, 301])
+def test_measured_normals_and_ends_belong_to_their_contacts_in_any_order(count):
+    surface = surfaces.torus(40, 20, 0.6)
+    contours = surface.track(surfaces.planes((0, 50, 120)), extent=10, step=20 / count, noise=0.05, rng=1)
+    given = [
+        Contour(c.points, normals=c.normals, normal_std=0.02, stops=stops)
+        for c, stops in zip(
+            contours, [("extent", "crease"), ("extent", "extent"), ("no contact", "extent")], strict=True
+        )
+    ]
+    back = [
+        Contour(c.points[::-1], normals=c.normals[::-1], normal_std=0.02, stops=c.stops[::-1]) for c in given
+    ]
+    one = surface.fit(given)
+    for other in (surface.fit(back), surface.fit(given[1:] + given[:1])):
+        require_same(one, other)
+        assert other.domain.area == pytest.approx(one.domain.area)
+        assert other.contradiction == pytest.approx(one.contradiction, rel=1e-6)
