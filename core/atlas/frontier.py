@@ -21,25 +21,22 @@ from ..contours.finger import DISK_PLACES, Contact, Finger
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, Charts
 from .field import INSIDE, covered
-from .join import FARTHEST_RIM, charts_of
+from .join import stacked, table_of
 from .meshing import LEAST_DIVISOR, Mesh
+from .reference_mesh import ReferenceMesh
+from .rims import felt_rim
 
 # python -m benchmarks.atlas judges these.
 RIM = 24  # Each rim has so many places.
-TAPS = 48  # Around a patch the finger feels in so many directions where it ends;
-NARROWEST = 5.0  # A patch reaches at most so many times as far as it is wide.
-BETWEEN = (
-    (0.97, 1),
-    (0.6, 2),
-)  # It also feels at these shares of the rim, on every first or second ray to RIM places.
-HALVINGS = 5  # So many halvings find where a patch ends at a crease,
-LEAST_RIM = 0.02  # which is at least this share of the radius away.
+# The finger taps each patch at these shares of its rim, on every first or second ray to RIM places.
+BETWEEN = ((0.97, 1), (0.6, 2))
 REACHES = (0.35, 0.12, 0.04)  # The finger goes on by these shares of the radius, until something is new.
 DISK_REACHES = 3.0  # What is new is measured on a disk of so many reaches, at most the patch's radius.
 BORDER_RADIUS, BORDER_APART = (
     5.0,
     0.5,
 )  # Places on the border of a mesh have a radius of so many edges, and are so many radii apart.
+OFF = 0.5  # Beyond a border a contact counts from so many edges off the mesh.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
 TRIES = 3  # Touches go on from a place at most so many times.
 LOOK = 15  # So many other places are looked at together with the first of the queue, which is faster.
@@ -104,54 +101,16 @@ class Frontier:
 
         least, goes_on : lengths; patches that the finger feels to be smaller are left out, or have no places
         """
-        chart = self._to_creases(charts_of([r], deviations=False))
-        radius = r.radius * math.sqrt(np.mean(chart.rims**2))
+        rim = felt_rim(r, self.finger, self.near)
+        radius = r.radius * math.sqrt(np.mean(rim**2))
         if radius <= least:
             return False
+        chart = stacked([r], [table_of(r, rim, deviations=False)])
         self.taps.append(self._felt_between(chart))
         self.charts = chart if self.charts is None else self.charts.joined(chart)
         for p, n, t in zip(*chart.rim(RIM, 1.01 * INSIDE), strict=True) if radius >= goes_on else ():
             self.push(Place(vector_of(p), vector_of(n), vector_of(t), r.radius), np.pi * r.radius**2)
         return True
-
-    def _to_creases(self, chart: Charts) -> Charts:
-        """The table of a patch whose rim is where the finger feels that the surface turns away from it.
-
-        Between the ends of curves a domain may bulge beyond a crease, and at a crease they end a step early.
-        """
-        azimuths = np.arange(TAPS) * (AZIMUTHS // TAPS)
-        turns, radii = 2.0 * np.pi * azimuths / AZIMUTHS, chart.rims[0, azimuths]
-        rays = np.stack([np.cos(turns), np.sin(turns)])
-
-        def felt(out: Array, which: NDArray[np.intp]) -> NDArray[np.bool_]:
-            """Whether the surface is there at these shares (k,) of the radii of some azimuths (k,)."""
-            met = self._taps(chart, out * radii[which] * rays[:, which])
-            return np.array([contact is not None for contact in met], dtype=bool)
-
-        every = np.arange(TAPS)
-        there = felt(np.ones(TAPS), every)
-        ends = np.flatnonzero(~(there & felt(np.full(TAPS, FARTHEST_RIM), every)))
-        if not len(ends):
-            return chart
-        low, high = np.where(there[ends], 1.0, 0.0), np.where(there[ends], FARTHEST_RIM, 1.0)
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            met = felt(middle, ends)
-            low, high = np.where(met, middle, low), np.where(met, high, middle)
-        radii[ends] *= low
-        # A straight crease is a line between azimuths whose inverse radius is nearly linear.
-        if not radii.any():
-            return replace(chart, rims=0.0 * chart.rims)
-        inverse = 1.0 / np.maximum(radii, LEAST_RIM * radii.max())
-        straight = 1.0 / np.interp(
-            np.arange(AZIMUTHS), np.append(azimuths, AZIMUTHS), np.append(inverse, inverse[0])
-        )
-        ended = np.isin(every, ends)
-        beside = np.repeat(ended | np.roll(ended, -1), AZIMUTHS // TAPS)
-        rim = np.where(beside, straight, chart.rims[0])
-        # Rays from its middle do not resolve the ends of a narrow patch.
-        across = np.roll(rim, AZIMUTHS // 4) + np.roll(rim, -AZIMUTHS // 4)
-        return replace(chart, rims=np.minimum(rim, NARROWEST * across)[None])
 
     def _taps(self, chart: Charts, xy: Array) -> list[Contact | None]:
         """What the finger feels of a patch at local places (2, k)."""
@@ -206,16 +165,16 @@ class Frontier:
             heapq.heappush(self.queue, entry)
         return found
 
-    def uncovered(self, mesh: Mesh) -> list[tuple[Place, Contact]]:
+    def uncovered(self, reference: ReferenceMesh) -> list[tuple[Place, Contact]]:
         """Places on the border of a mesh beyond which the object goes on, each with a contact there."""
         found = []
-        for place in border_places(mesh):
+        for place in border_places(reference.mesh):
             contacts = [
                 self.finger.ahead(place.point, place.normal, place.ahead, place.radius, share * place.radius)
                 for share in REACHES
             ]
-            # The mesh may end an edge or so before a real border.
-            if contacts[0] is not None:
+            # Across a notch the finger meets the mesh again.
+            if contacts[0] is not None and reference.away(contacts[0][0]) > OFF * reference.mesh.edge:
                 found.append((place, next(contact for contact in contacts[::-1] if contact is not None)))
         return found
 

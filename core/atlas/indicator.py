@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 
 # python -m benchmarks.atlas judges these.
+LAYERS = 3.0  # So many cells across a wall resolve it.
 BORDER = 0.1  # The grid is wider than the samples by this share of the size, on each side.
 MOST_CELLS = 16_000_000  # More cells, of four bytes each, and a copy of them would take too much memory.
 SAMPLES_AT_ONCE = 3000  # A step takes so many samples,
@@ -32,7 +33,7 @@ class Indicator(NamedTuple):
     low : (3,), the first grid point
     cell : the length between grid points
     size : the largest extent of what was felt
-    thinnest : the thickness of the thinnest walls, inf if there are none
+    thinnest : the thickness of the thinnest walls and gaps that were felt, inf if there are none
     """
 
     values: NDArray[np.float32]
@@ -40,6 +41,11 @@ class Indicator(NamedTuple):
     cell: float
     size: float
     thinnest: float
+
+    @property
+    def resolved(self) -> float:
+        """The thickness of the thinnest walls and gaps that were felt and that the cells resolve."""
+        return max(self.thinnest, LAYERS * self.cell)
 
     def at(self, points: Array) -> Array:
         """The indicator less its level at points (n, 3); outside of the grid it is that at its faces."""

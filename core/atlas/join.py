@@ -27,9 +27,7 @@ LOOSER = 5.0  # So many times larger they count a radius beyond the rim, where a
 FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another wall.
 LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
 PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes so many patches, or so many places.
-FARTHEST_RIM = (
-    1.25  # Where a finger feels a patch go on to a crease, it counts up to so many radii of its domain.
-)
+FARTHEST_RIM = 1.25  # A patch that is not flat counts up to so many radii of its domain.
 KNOTS_WITHIN = 1.3  # A patch is asked for heights at knots up to so many times its domain's radius.
 ROUNDS = 2  # Patches are moved so often.
 MOVED = 0.03  # A place of a patch is moved by less than this share of the radius.
@@ -137,7 +135,7 @@ def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[
 
 def charts_of(results: Sequence[Reconstruction], deviations: bool = True) -> Charts:
     """The tables of patches, each fitted to its own contacts alone; `deviations` may be left out, as 0."""
-    return stacked(results, [table_of(r, deviations) for r in results])
+    return stacked(results, [table_of(r, r.domain.radii(AZIMUTHS) / r.radius, deviations) for r in results])
 
 
 def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Charts:
@@ -154,12 +152,11 @@ def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Chart
     )
 
 
-def table_of(r: Reconstruction, deviations: bool) -> Table:
-    """The table of a patch fitted to its own contacts alone."""
+def table_of(r: Reconstruction, rim: Array, deviations: bool) -> Table:
+    """The table of a patch with this rim (AZIMUTHS,), in unit radius, fitted to its own contacts alone."""
     from scipy.ndimage import spline_filter
 
-    rim = r.domain.radii(AZIMUTHS) / r.radius
-    half = _half(FARTHEST_RIM * rim)
+    half = _half(rim)
     x, y = (axis.ravel() for axis in np.meshgrid(*2 * [np.linspace(-half, half, SIDE)], indexing="ij"))
     at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) % AZIMUTHS
     share = np.hypot(x, y) / np.interp(at, np.arange(AZIMUTHS + 1), np.append(rim, rim[0]))

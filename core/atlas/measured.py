@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import Array, list_of, number, unit_vector
+from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
 from ..contours.contour import Contour
 from ..contours.finger import FACING
 from ..exploration.side_by_side import result_of
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
+from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from .join import charts_of
 from .object_atlas import Atlas, surfaced
 
@@ -89,8 +90,7 @@ def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -
     if len(points) < FEWEST:
         raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
     if up is None:
-        normals = np.vstack([stroke.normals for stroke in strokes])  # type: ignore[misc]
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        normals = unit_vectors("normals", np.vstack([stroke.normals for stroke in strokes]))  # type: ignore[misc]
     else:
         normals = _normals(points, up)
     return points, normals, max(stroke.noise or 0.0 for stroke in strokes)
@@ -140,10 +140,11 @@ class _Cloud(NamedTuple):
     def least_radius(self) -> Generator[float, None, float]:
         """The least radius at which patches exist at half of some places, for contacts may lie in lines.
 
-        Raises ValueError if there is none. Yields 0 after each trial.
+        Raises ValueError if there is none, or numbers do not hold such patches. Yields 0 after each trial.
         """
         some = np.linspace(0, len(self.points) - 1, SOME_PLACES).astype(np.intp)
         radius = float(np.median(self.tree.query(self.points[some], FEWEST)[0][:, -1]))
+        self._require_fine(radius)
         for _ in range(WIDENINGS):
             if sum(self.patch(i, radius) is not None for i in some.tolist()) * 2 >= SOME_PLACES:
                 return radius
@@ -153,6 +154,18 @@ class _Cloud(NamedTuple):
             "contours_or_strokes: expected contacts all around at least one of them, got "
             f"{len(self.points)} without"
         )
+
+    def _require_fine(self, radius: float) -> None:
+        """Raises ValueError if patches of this radius are too small for double precision."""
+        size = float(np.ptp(self.points, axis=0).max())
+        if any(0.0 < length < SMALLEST for length in (size, radius)):
+            raise ValueError(
+                f"contours_or_strokes: expected contacts at least {SMALLEST:g} apart, got nearer ones: use "
+                "another unit of length"
+            )
+        gap = float(np.spacing(np.abs(self.points).max()))
+        if gap > TOUCH_ROUNDING * radius > 0.0:
+            raise too_coarse(gap, radius)
 
 
 def _patches(cloud: _Cloud) -> Generator[float, None, list[Reconstruction]]:

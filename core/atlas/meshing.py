@@ -10,6 +10,7 @@ from collections.abc import Generator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..patch.tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
@@ -29,6 +30,8 @@ ROOM = 5.0  # The surface is within so many cells of the level of the indicator.
 HALVINGS = 5  # So many halvings of an edge of the lattice find the level.
 LATTICE_AT_ONCE = 100_000  # A step takes so many points of the lattice,
 PLACES_AT_ONCE = 3000  # or the surface near so many places.
+# The squares of an edge and of a cube's side take so much memory, and a mesh takes at most so much.
+EDGE_BYTES, LATTICE_BYTES, MOST_BYTES = 900.0, 17_000.0, 2e9
 LEAST_DIVISOR = 1e-300  # No vector is divided by less.
 
 
@@ -65,6 +68,17 @@ class Mesh(NamedTuple):
         return ends[first[counts == 1]]
 
     @property
+    def sides_on_border(self) -> Indices:
+        """The number of sides (m,) of each triangle that are on the border."""
+        _, first, counts = self._edges
+        return np.bincount(first[counts == 1] // 3, minlength=len(self.triangles))
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Mesh":
+        """Some of the triangles, and their vertices."""
+        used, index = np.unique(self.triangles[which], return_inverse=True)
+        return Mesh(self.vertices[used], index.reshape(-1, 3), self.std[used], self.patch[used])
+
+    @property
     def _edges(self) -> tuple[Indices, Indices, Indices]:
         """The edges (3 m, 2) of all triangles; the first of each that are the same, and their number."""
         ends = self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -77,15 +91,36 @@ class Mesh(NamedTuple):
         return len(self.triangles) > 0 and bool((self._edges[2] == 2).all())
 
 
+def memory_of(vertices: Array, triangles: Indices, edge: float, lattice: float = np.inf) -> float:
+    """About how many bytes it takes to mesh the surface of triangles (m, 3) with edges of a length.
+
+    lattice : the length of the lattice's cubes, if it is known
+    """
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return area * max(EDGE_BYTES / edge / edge, LATTICE_BYTES / lattice / lattice)
+
+
+def shortest_edge(vertices: Array, triangles: Indices) -> float:
+    """The shortest edge with which the surface of triangles (m, 3) can be meshed in about 2 GB of memory."""
+    return float(np.sqrt(memory_of(vertices, triangles, 1.0) / MOST_BYTES))
+
+
+def lattice_of(indicator: Indicator, edge: float) -> tuple[float, int]:
+    """The length of the lattice's cubes, and how often edges are halved, for triangles with such edges."""
+    size, halvings = CELL * edge, 0
+    while size < 0.5 * indicator.cell:
+        size, halvings = 2.0 * size, halvings + 1
+    return size, halvings
+
+
 def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float, None, Mesh]:
     """The mesh of the surface; yields the share that is done.
 
     edge : about the length of its edges, which are shorter than a quarter of the thinnest wall
     """
-    edge, halvings = min(edge, WALL * indicator.thinnest), 0
-    while CELL * edge * 2**halvings < 0.5 * indicator.cell:
-        halvings += 1
-    size = CELL * edge * 2**halvings
+    edge = min(edge, WALL * indicator.resolved)
+    size, halvings = lattice_of(indicator, edge)
     vertices, up, triangles = yield from _level(indicator, size)
     room = max(ROOM * indicator.cell, CLIP * size)
     vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
@@ -208,7 +243,5 @@ def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) ->
     areas = np.bincount(piece[far[:, 0]], 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), count)
     beside = np.bincount(piece[inside], minlength=count) > 0
     gone = ~inside & ((areas > BRIDGED * cell**2) | ~beside)[piece]
-    triangles = triangles[~gone[triangles].any(axis=1)]
-    used, index = np.unique(triangles, return_inverse=True)
     std = np.where(surface.node < 0, cell, surface.std)
-    return Mesh(vertices[used], index.reshape(-1, 3), std[used], surface.node[used])
+    return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))

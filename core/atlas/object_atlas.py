@@ -3,7 +3,7 @@
 """A whole object as it was felt (paper, VI): the graph of its patches, and one surface of all of them."""
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -15,11 +15,12 @@ from ..contours.contour import Contour
 from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
+from .borders import Border, bordered
 from .boundaries import Edge, blended_curvatures, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
 from .frontier import Place
 from .indicator import Indicator
-from .meshing import WALL, Mesh, meshed
+from .meshing import LEAST_DIVISOR, MOST_BYTES, WALL, Mesh, lattice_of, memory_of, meshed
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
@@ -28,9 +29,9 @@ from .samples import indicated
 FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
 LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above so many tolerances.
 OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from so many of both away.
+THIN = 0.9  # Walls are resolved from this share of the thickness that cells are made for.
 BORDER = 2.0  # Beyond the border of the mesh it does from so many edges away.
 WITHIN_90 = 1.645  # So many deviations are a 90 % interval.
-HELD = 0.8  # At least this share of the contacts of a check is within the 90 % interval of the surface.
 AT_ONCE = 3000  # Distances are found for so many places at once.
 GRAPH_VERSION = 2  # The version of the graph as plain values.
 
@@ -65,7 +66,7 @@ def suggested_edge(patches: Sequence[Reconstruction], charts: Charts, indicator:
     stds, radii = charts.mean_stds, charts.radii
     chords = np.sqrt(4.0 * stds / np.maximum(bends, stds / radii**2))
     edge = float(np.clip(np.median(chords), FINE * indicator.size, SHARE * indicator.size))
-    return max(min(edge, WALL * indicator.thinnest), FINEST * indicator.size)
+    return max(min(edge, WALL * indicator.resolved), FINEST * indicator.size)
 
 
 def surfaced(
@@ -88,6 +89,7 @@ class Atlas:
     uncovered : places on rims beyond which the object goes on unfelt
     check : contacts from outside that the patches do not have; None if there were none
     taps : contacts between the curves of each patch, to which the joined patches are fitted, too
+    border : where a finger felt the surface end; None if there was none
     """
 
     patches: tuple[Reconstruction, ...]
@@ -97,6 +99,7 @@ class Atlas:
     uncovered: tuple[Place, ...] = ()
     check: Check | None = None
     taps: tuple[Contour, ...] = ()
+    border: Border | None = None
 
     @cached_property
     def edges(self) -> list[Edge]:
@@ -138,6 +141,13 @@ class Atlas:
                 f"The patches end at {places} where the object goes on: allow more touches or a larger "
                 "tolerance."
             )
+        inside = self.reference.indicator
+        if inside.thinnest < THIN * inside.resolved:
+            thin, resolved = (100.0 * width / inside.size for width in (inside.thinnest, inside.resolved))
+            return "uncertain", (
+                f"Walls or gaps of {thin:.2g} % of the size were felt, and what is thinner than "
+                f"{resolved:.2g} % may be bridged or pierced: touch such parts as objects of their own."
+            )
         rough, _ = self._rough
         if rough > ROUGH:
             return "uncertain", (
@@ -173,20 +183,32 @@ class Atlas:
         explained[np.isinf(std)] = BORDER * self.reference.mesh.edge
         return np.abs(distance) > explained
 
+    def widened(self) -> "Atlas":
+        """The atlas with deviations so large that 90 % of its check's contacts are in the 90 % interval.
+
+        Those that contradict the surface do not count: they are of something else.
+        """
+        distance, std = self._contacts
+        felt = np.isfinite(std) & ~self.contradicting
+        if not felt.any():
+            return self
+        stds = np.abs(distance[felt]) / np.maximum(std[felt], LEAST_DIVISOR)
+        factor = max(1.0, float(np.quantile(stds, 0.9)) / WITHIN_90)
+        mesh = self.reference.mesh
+        return replace(
+            self,
+            charts=replace(self.charts, stds=factor * self.charts.stds),
+            reference=replace(self.reference, mesh=mesh._replace(std=factor * mesh.std)),
+        )
+
     def _checked(self) -> tuple[str, str]:
         """The verdict of the check."""
-        (distance, std), missed = self._contacts, 0 if self.check is None else len(self.check.missed)
-        wrong, count = int(self.contradicting.sum()) + missed, len(distance) + missed
+        missed = 0 if self.check is None else len(self.check.missed)
+        wrong, count = int(self.contradicting.sum()) + missed, len(self._contacts[0]) + missed
         if wrong:
             return "uncertain", (
                 f"{wrong} of {count} rays from outside meet something else than the surface: allow more "
                 "touches or use a smaller tolerance."
-            )
-        held = np.mean(np.abs(distance) <= WITHIN_90 * std) if count else 1.0
-        if held < HELD:
-            return "uncertain", (
-                f"Only {100.0 * held:.0f} % of {count} contacts from outside are within the 90 % interval of "
-                "the surface: use a larger tolerance."
             )
         return "ok", "The object was felt everywhere a finger could reach."
 
@@ -251,11 +273,22 @@ class Atlas:
         }
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
-        """Makes the `mesh` in steps: yields the share that is done, and returns the mesh."""
+        """Makes the `mesh` in steps: yields the share that is done, and returns the mesh.
+
+        Raises ValueError for edges that are longer than the object, or take too much memory.
+        """
         edge, size = number("edge", edge, above=0.0), self.reference.indicator.size
         if edge > size:
             raise ValueError(f"edge: expected at most the size of what was felt, {size:.3g}, got {edge:.3g}")
-        return meshed(self.charts, self.reference.indicator, edge)
+        lattice, _ = lattice_of(self.reference.indicator, edge)
+        memory = memory_of(*self.reference.mesh[:2], edge, lattice)
+        if memory > MOST_BYTES:
+            raise ValueError(
+                f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
+                f"{edge:.3g}, which takes {1e-9 * memory:.3g} GB: use a longer one"
+            )
+        mesh = yield from meshed(self.charts, self.reference.indicator, edge)
+        return mesh if self.border is None else bordered(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:
         """The graph as JSON has it: a dict of numbers, words, lists and dicts, in the caller's unit.

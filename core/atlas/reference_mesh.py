@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..contours.contour import Vector
 from ..patch.tetrahedra import Indices
 from .charts import Charts
 from .field import Surface, surface_at
@@ -83,6 +84,10 @@ class ReferenceMesh:
         ends = (self.is_open[corners] | (weights[row, best] < ON_SIDE)).all(axis=1)
         std = np.einsum("ni,ni->n", weights[row, best], self.mesh.std[corners])
         return feet[row, best], triangle, std, ends
+
+    def away(self, point: Vector) -> float:
+        """The distance of a point from the triangles."""
+        return float(np.linalg.norm(self.feet(np.array([point]))[0] - point))
 
     def distances(self, charts: Charts, points: Array) -> tuple[Array, Array]:
         """Signed distances (n,) of places (n, 3), and deviations (n,), inf beyond where the mesh ends."""

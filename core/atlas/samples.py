@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from .charts import Charts
 from .field import facing_alike, node_weights, weights_of
-from .indicator import Indicator, solved
+from .indicator import LAYERS, Indicator, solved
 
 # python -m benchmarks.atlas judges these.
 PITCH = 1.2  # Samples of a patch are so many cells apart.
@@ -20,7 +20,6 @@ ACROSS, PARTS = 12, 8
 STEEPEST = 0.1  # Where a patch is steeper, this cosine to its own plane, it has no samples.
 FINEST, COARSEST = 1.0 / 200.0, 1.0 / 80.0  # Cells are between these shares of the size.
 TOLERANCES = 5.0  # A cell is at most so many tolerances.
-LAYERS = 3.0  # There are at least so many cells across the thinnest wall.
 OPPOSITE = -0.9  # Two patches are the sides of a wall if the cosine between their normals is less.
 THIN_SHARE = 0.01  # Walls are at least as thick as all but this share of the area is.
 CERTAIN = 5.0  # Two sides that are nearer than so many deviations are no wall.

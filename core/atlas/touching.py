@@ -4,6 +4,7 @@
 
 import math
 from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.side_by_side import exploring
 from ..exploration.touches import explore
+from .borders import bordered, felt_border
 from .charts import Charts
 from .frontier import Frontier
 from .join import Table, agreed, joined
@@ -36,6 +38,8 @@ AGAIN = 3  # Where something is missing or less certain, touches go on at most s
 CHECKS, CHECK_SEED = 256, 0  # So many rays from outside check the surface.
 HAIR = 0.01  # It is cast again this share of the tolerance aside.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
+JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
+BORDERS = 2  # So often a mesh is moved to the borders that are felt.
 ROUGH_APART = 0.5  # Touches where the surface is less certain are so many radii apart.
 LARGER = 2.0  # A touch reaches at most so many radii of the patch from which it goes on.
 
@@ -48,7 +52,7 @@ class Progress(NamedTuple):
     done : number of touches
     uncovered : number of places that are known to be uncovered
     found : the touches since the last Progress
-    joining : share of the patches that are joined; None while the object is touched
+    joining : share of joining the patches to one surface that is done; None while the object is touched
     """
 
     done: int
@@ -57,7 +61,7 @@ class Progress(NamedTuple):
     joining: float | None = None
 
 
-Steps = Generator[Progress, bool | None, Atlas]
+Steps = Generator[Progress, object, Atlas]
 
 
 def touch_all_over(
@@ -72,8 +76,8 @@ def touch_all_over(
 ) -> Steps:
     """Does what `explore_object` does in steps: yields a Progress after each, and returns the Atlas.
 
-    If it is sent False, it stops touching and joins the patches so far. Arguments and errors are those of
-    `explore_object`; errors are raised in the first step.
+    If it is sent anything false other than None, it stops touching and joins the patches so far. Arguments
+    and errors are those of `explore_object`; errors are raised in the first step.
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     tolerance, noise = number("tolerance", tolerance, above=0.0), number("noise", noise, least=0.0)
@@ -81,13 +85,13 @@ def touch_all_over(
     if tolerance < noise:
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     run = _Run(surface, tolerance, most, {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance})
-    more = (yield run.first(p, up)) is not False
+    more = _goes_on((yield run.first(p, up)))
     more = yield from _all_over(run, more)
     return (yield from _joined(run, more))
 
 
-def _all_over(run: "_Run", more: bool) -> Generator[Progress, bool | None, bool]:
-    """Touches until nothing within reach is uncovered. Returns whether to go on: False once False is sent."""
+def _all_over(run: "_Run", more: bool) -> Generator[Progress, object, bool]:
+    """Touches until nothing within reach is uncovered. Returns whether to go on."""
     while more and run.done < run.most:
         chosen, more = yield from _told(run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)), run.now)
         if not chosen or not more:
@@ -98,21 +102,26 @@ def _all_over(run: "_Run", more: bool) -> Generator[Progress, bool | None, bool]
         new, more = yield from _told(run.touch(contacts, farthest, least), run.now)
         for touch in chosen:
             run.frontier.tried(touch)
-        more = (yield run.now(new=new)) is not False and more
+        more = _goes_on((yield run.now(new=new))) and more
     return more
 
 
 def _told(
     steps: Generator[Any, None, Any], progress_of: Callable[[Any], Progress]
-) -> Generator[Progress, bool | None, tuple[Any, bool]]:
-    """Runs steps and yields a Progress for each. Returns their result, and False once False is sent."""
+) -> Generator[Progress, object, tuple[Any, bool]]:
+    """Runs steps and yields a Progress for each. Returns their result, and whether to go on."""
     more = True
     while True:
         try:
             progress = progress_of(next(steps))
         except StopIteration as end:
             return end.value, more
-        more = (yield progress) is not False and more
+        more = _goes_on((yield progress)) and more
+
+
+def _goes_on(answer: object) -> bool:
+    """Whether touches go on after an answer to a Progress: what is false stops them, except None."""
+    return answer is None or bool(answer)
 
 
 class _Run:
@@ -152,7 +161,8 @@ class _Run:
             self.wanted["noise"],
             self.wanted["rng"],
         )
-        self.frontier.add(first.result)
+        if not self.frontier.add(first.result):
+            raise ValueError("point: expected a surface within three tolerances of the first patch, got none")
         self.found, self.done = [first], 1
         return self.now(new=[first])
 
@@ -203,15 +213,13 @@ class _Run:
         yield 0.0
         return (yield from joined(contours, results, self.frontier.charts, self.wanted["noise"], known))
 
-    def going_on(
-        self, contacts: Sequence[Contact], farthest: float
-    ) -> Generator[Progress, bool | None, bool]:
+    def going_on(self, contacts: Sequence[Contact], farthest: float) -> Generator[Progress, object, bool]:
         """Touches at contacts, and all over from there. Returns whether to go on."""
         some, more = contacts[: self.most - self.done], True
         new: list[Exploration] = []
         if some:
             new, more = yield from _told(self.touch(some, farthest, [SMALL] * len(some)), self.now)
-        more = (yield self.now(new=new)) is not False and more
+        more = _goes_on((yield self.now(new=new))) and more
         return (yield from _all_over(self, more))
 
     def check(self, mesh: Mesh) -> Check:
@@ -248,6 +256,33 @@ class _Run:
         points, normals = np.array(found).reshape(-1, 2, 3).transpose(1, 0, 2)
         return Check(points, normals, np.array(missed).reshape(-1, 3))
 
+    def atlas(
+        self, known: dict[int, tuple[int, Table]]
+    ) -> Generator[float, None, tuple[Atlas, list[Contact]]]:
+        """The atlas of what was found so far, and contacts where something is missing or less certain.
+
+        These are where the joined surface ends though the object goes on, where a finger from outside meets
+        something else, and where the surface is less certain than the tolerance.
+        """
+        charts = yield from _part(self.joining(known), 0.0, JOINED)
+        charts = yield from _part(agreed(charts), 0.0, JOINED)
+        patches = tuple(e.result for e in self.found)
+        reference = yield from _part(surfaced(patches, charts, self.tolerance), JOINED, 1.0)
+        for _ in range(BORDERS):
+            steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
+            border = yield from _part(steps, 1.0, 1.0)
+            reference = replace(reference, mesh=bordered(reference.mesh, border))
+        check = self.check(reference.mesh)
+        yield 1.0
+        uncovered = self.frontier.uncovered(reference)
+        places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
+        atlas = Atlas(patches, charts, reference, self.tolerance, places, check, taps, border)
+        off, atlas = atlas.contradicting, atlas.widened()
+        yield 1.0
+        contacts: list[Contact] = [contact for _, contact in uncovered]
+        contacts += zip(check.points[off], check.normals[off], strict=True)
+        return atlas, contacts + self.rough(atlas.reference.mesh)
+
     def rough(self, mesh: Mesh) -> list[Contact]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
         left = np.flatnonzero(mesh.std > LIMIT * self.tolerance)
@@ -264,34 +299,27 @@ class _Run:
 
 
 def _joined(run: _Run, more: bool) -> Steps:
-    """The atlas of what was found, after more touches where something is missing or less certain.
-
-    These are where the joined surface ends though the object goes on, where a finger from outside meets
-    something else, and where the surface is less certain than the tolerance.
-    """
+    """The atlas of what was found, after more touches where something is missing or less certain."""
     known: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
-        charts, first = yield from _told(run.joining(known), run.now)
-        charts, second = yield from _told(agreed(charts), run.now)
-        patches = tuple(e.result for e in run.found)
-        reference, third = yield from _told(surfaced(patches, charts, run.tolerance), lambda _: run.now(1.0))
-        check = run.check(reference.mesh)
-        fourth = (yield run.now(1.0)) is not False
-        uncovered = run.frontier.uncovered(reference.mesh)
-        places, taps = tuple(place for place, _ in uncovered), tuple(run.frontier.taps)
-        atlas = Atlas(patches, charts, reference, run.tolerance, places, check, taps)
-        off = atlas.contradicting
-        fifth = (yield run.now(1.0)) is not False
-        more = all((more, first, second, third, fourth, fifth))
-        contacts: list[Contact] = [contact for _, contact in uncovered]
-        contacts += list(zip(check.points[off], check.normals[off], strict=True)) + run.rough(reference.mesh)
-        before = len(run.found)
+        (atlas, contacts), still = yield from _told(run.atlas(known), run.now)
+        before, more = len(run.found), more and still
         if not (again and more and contacts):
             break
-        more = yield from run.going_on(contacts, float(charts.radii.max()))
+        more = yield from run.going_on(contacts, float(atlas.charts.radii.max()))
         if len(run.found) == before:
             break
     return atlas
+
+
+def _part(steps: Generator[float, None, Any], start: float, end: float) -> Generator[float, None, Any]:
+    """Runs steps that yield the share that is done, which is a part of more."""
+    while True:
+        try:
+            share = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield start + (end - start) * share
 
 
 def explore_object(
@@ -312,8 +340,8 @@ def explore_object(
         possible
     noise, rng : as in `explore`
     most : the largest number of touches
-    progress : called with the numbers of touches and of places known to be uncovered; may return False to
-        stop
+    progress : called with the numbers of touches and of places known to be uncovered; what it returns stops
+        the touches if it is false, as False and 0 are, except None
 
     The surface only has to answer rays. Raises ValueError for bad arguments, for a tolerance below the noise,
     and if the first touch fails. Where a later touch fails, the Atlas has an uncovered place.
@@ -325,7 +353,7 @@ def explore_object(
             more = None
             if progress and state.joining is None and state.done > told:
                 more, told = progress(state.done, state.uncovered), state.done
-            state = steps.send(False if more is False else None)
+            state = steps.send(more)
     except StopIteration as end:
         atlas: Atlas = end.value
         return atlas

@@ -18,6 +18,7 @@ from .growth import FELT, STRETCH, Counts, Feel, Felt, Grown, grown
 from .taps import Tapped, beside
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
+FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts (benchmarks.atlas --shapes).
 SHORTER = 1.15  # Half curves beside a contradiction are shortened so much (benchmarks.real --only taps).
 
 
@@ -115,15 +116,13 @@ class Touch:
     def _grown(self) -> Steps:
         """The touch as large as it can be trusted."""
         between = max(self.step or 0.0, self.farthest / FELT)
-        fits = grown(self._feeling(between), self.farthest, between)
-        contours = next(fits)
-        while True:
-            answer = yield Ask(contours, growing=not self.is_grown)
-            try:
-                contours = fits.send(answer)
-            except StopIteration as end:
-                largest: Grown = end.value
-                break
+        try:
+            largest = yield from self._longest(between)
+        except DegenerateCurvesError:
+            if self.step is not None:
+                raise
+            # The surface may be too narrow for this step: a strip along an edge, or a fillet.
+            largest = yield from self._longest(between / FINER)
         counts = largest.counts
         found = yield from self._of_reaches(largest, counts)
         if largest.sure and found.result.status != "ok" and self.is_grown:
@@ -131,6 +130,18 @@ class Touch:
             counts = np.floor(counts / STRETCH).astype(np.intp)
             found = yield from self._of_reaches(largest, counts)
         return (yield from self._agreeing(largest, counts, found)) if self.is_tapped else found
+
+    def _longest(self, step: float) -> Generator[Ask, Answer, Grown]:
+        """The longest half curves that fits explain, of contacts this step apart."""
+        fits = grown(self._feeling(step), self.farthest, step)
+        contours = next(fits)
+        while True:
+            answer = yield Ask(contours, growing=not self.is_grown)
+            try:
+                contours = fits.send(answer)
+            except StopIteration as end:
+                largest: Grown = end.value
+                return largest
 
     def _agreeing(self, largest: Grown, counts: Counts, found: Exploration) -> Steps:
         """The touch with curves so short that no tap contradicts it, or `found` if there is none."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector, dot, vector_of
-from ..contours.finger import Surface, section
+from ..contours.finger import Surface, contact_of, section
 from ..patch.domain import GAUSS_ALONG, SAME_END, Domain
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, Taps
@@ -50,9 +50,8 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     hits = [surface.ray_cast((x, y, z), down, length) for (x, y, z), length in rays]
     met = np.array([hit is not None for hit in hits])
     offs = np.empty(len(where))
-    offs[met] = np.abs(
-        (np.array([hit[0] for hit in hits if hit is not None]).reshape(-1, 3) - feet[met]) @ up
-    )
+    felt = np.array([contact_of(hit, 1.0)[0] for hit in hits if hit is not None]).reshape(-1, 3)
+    offs[met] = np.abs((felt - feet[met]) @ up)
     offs[~met] = [_off(surface, r, vector_of(foot)) for foot in feet[~met]]
     missed, offs = np.isnan(offs), np.nan_to_num(offs)
     contradicts = (offs > TOO_FAR_OFF * stds).any() or offs.mean() > CONTRADICTING * stds.mean()

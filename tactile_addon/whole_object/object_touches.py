@@ -17,7 +17,6 @@ from .whole_surface import WholeSurface
 # These lengths are shares of the object's size.
 TOLERANCE_SHARE = 1.0 / 500.0  # The default tolerance.
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
-SHORTEST_EDGE = 1e-3  # It makes some millions of triangles.
 OFF_TOLERANCES = 3.0  # The surface is no good if it is off the mesh by more tolerances, as in core's check.
 STARTS = 20  # So many places to begin are tried if none is given.
 
@@ -79,10 +78,11 @@ class ObjectTouches:
                 f'The tolerance {length(tolerance)} is finer than the coordinates of "{name}", which are '
                 f"{length(self.surface.spacing)} apart in single precision: use a larger one"
             )
-        if 0.0 < edge < SHORTEST_EDGE * size:
+        least = core.shortest_edge(self.surface.points, self.surface.triangles)
+        if 0.0 < edge < least:
             raise ValueError(
-                f"The edge length {length(edge)} is smaller than {length(SHORTEST_EDGE * size)}, "
-                f'{SHORTEST_EDGE:g} of "{name}": use a larger one'
+                f"The edge length {length(edge)} is smaller than {length(least)}, for which the surface of "
+                f'"{name}" takes 2 GB of memory: use a larger one'
             )
 
     def steps(self):

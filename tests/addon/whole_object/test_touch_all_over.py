@@ -65,7 +65,10 @@ def test_colors_show_what_is_chosen(empty, ball):
         ({"tolerance": 1.0}, 'The tolerance 1 m is larger than 0.4 m, 0.1 of "Sphere": use a smaller one'),
         ({"noise": 1.0}, "The noise 1 m is larger than"),
         ({"edge": 5.0}, "The edge length 5 m is larger than 2 m"),
-        ({"edge": 1e-3}, 'The edge length 1 mm is smaller than 4 mm, 0.001 of "Sphere": use a larger one'),
+        (
+            {"edge": 1e-3},
+            'The edge length 1 mm is smaller than 4.75 mm, for which the surface of "Sphere" takes 2 GB',
+        ),
         (
             {"tolerance": 1e-9},
             r"The tolerance .* is finer than the coordinates of .* apart in single precision",
@@ -117,7 +120,7 @@ def test_nothing_begins_where_no_face_has_an_area(empty):
 @pytest.mark.parametrize("shape", ["cube", "plane"])
 def test_faces_without_vertices_inside_are_begun_in_their_middle(empty, shape):
     getattr(empty.ops.mesh, f"primitive_{shape}_add")(size=2.0)
-    assert touched(empty, most=5)[1]["patches"] >= 4
+    assert touched(empty, most=5)[1]["patches"] >= 1  # One touch feels a whole plane.
 
 
 def test_what_is_loose_is_no_part_of_the_object(empty, ball):

@@ -57,7 +57,7 @@ def test_contours_with_normals_need_no_direction():
 @pytest.mark.parametrize(
     ("given", "outward", "message"),
     [
-        ([np.zeros((3, 3))], (0, 0, 1), "expected 40 contacts or more, got 3"),
+        ([np.eye(3)], (0, 0, 1), "expected 40 contacts or more, got 3"),
         (raster(), None, "outward: expected a direction where contacts have no normals"),
         (
             [np.column_stack([np.linspace(0, 1, 60), np.zeros(60), np.zeros(60)])],
@@ -65,8 +65,33 @@ def test_contours_with_normals_need_no_direction():
             "all around at least one of them",
         ),
         (7, (0, 0, 1), "contours_or_strokes: expected a list"),
+        ([1e-60 * np.vstack(raster())], (0, 0, 1), "expected contacts at least 1e-50 apart, got nearer ones"),
+        ([1e-200 * np.vstack(raster())], (0, 0, 1), "use another unit of length"),
+        ([1e14 + np.vstack(raster())], (0, 0, 1), "are 0.016 apart in double precision, too coarse"),
+        ([core.Contour(row, normals=0.0 * row) for row in raster()], None, "normals: expected vectors with"),
     ],
 )
 def test_what_carries_no_atlas_gets_a_sentence(given, outward, message):
     with pytest.raises(ValueError, match=message):
         core.atlas_of(given, outward=outward)
+
+
+def ball_atlas(scale=1.0, length=1.0):
+    """The atlas of contacts on a ball, with normals of this length."""
+    z = 1.0 - (2.0 * np.arange(600) + 1.0) / 600
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(600)
+    points = np.stack([np.sqrt(1.0 - z**2) * np.cos(turn), np.sqrt(1.0 - z**2) * np.sin(turn), z], axis=1)
+    return core.atlas_of([core.Contour(scale * points, normals=length * points)])
+
+
+@pytest.mark.parametrize(("scale", "length"), [(1e-48, 1.0), (1e49, 1.0), (1.0, 1e200), (1.0, 1e-200)])
+def test_the_unit_of_contacts_and_the_length_of_normals_change_nothing(scale, length):
+    plain, other = ball_atlas().reference.mesh, ball_atlas(scale, length).reference.mesh
+    assert other.is_closed
+    assert len(other.triangles) == pytest.approx(len(plain.triangles), rel=0.01)
+    assert np.linalg.norm(other.vertices / scale, axis=1) == pytest.approx(1.0, abs=0.01)
+
+
+def test_an_empty_mesh_is_not_closed():
+    none = np.empty((0, 3))
+    assert not core.Mesh(none, none.astype(np.intp), np.empty(0), np.empty(0, dtype=np.intp)).is_closed

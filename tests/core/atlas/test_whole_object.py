@@ -51,6 +51,13 @@ def test_edges_longer_than_the_object_are_refused(ball):
         ball.mesh(1e30)
 
 
+def test_edges_that_take_gigabytes_are_refused_at_once(ball):
+    with pytest.raises(ValueError, match=r"edge: expected triangles that take 2 GB .* got 0\.001, which"):
+        ball.mesh(1e-3)
+    with pytest.raises(ValueError, match="GB: use a longer one"):
+        ball.mesh(1e-320)
+
+
 def test_triangles_face_outward_and_are_as_large_as_asked(ball):
     mesh = ball.mesh(0.08)
     a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
@@ -173,6 +180,13 @@ def test_progress_can_end_it_with_what_is_there():
     assert solids.topology(atlas.mesh(0.1).triangles).open > 0
 
 
+@pytest.mark.parametrize("answer", [False, np.False_, 0])
+def test_whatever_is_false_except_none_stops_it(answer):
+    told = []
+    explored(solids.ball(), progress=lambda done, _: (told.append(done), answer)[1])
+    assert told == [1]
+
+
 def test_a_small_budget_leaves_places_uncovered_and_says_where_to_go_on():
     solid = solids.ball()
     atlas = explored(solid, most=4)
@@ -214,7 +228,24 @@ def test_contacts_off_the_surface_put_it_in_doubt(ball):
     beside = ways * np.where(np.arange(50) < 20, 1.004, 1.0)[:, None]
     loose = replace(ball, check=Check(beside, ways, np.zeros((0, 3))))
     assert not loose.contradicting.any()
-    assert loose.message.startswith("Only 60 % of 50 contacts from outside are within the 90 % interval")
+    wide = loose.widened()
+    distance, std = wide.distance(beside)
+    assert np.mean(np.abs(distance) <= 1.645 * std * 1.001) >= 0.9
+    assert wide.charts.stds == pytest.approx(
+        loose.charts.stds * (std / loose.distance(beside)[1])[0], rel=0.01
+    )
+    assert right.widened().distance(ways)[1] == pytest.approx(right.distance(ways)[1], rel=0.5)
+    assert wrong.widened().distance(ways)[1] == pytest.approx(right.widened().distance(ways)[1], rel=0.1)
+
+
+def test_walls_that_the_cells_do_not_resolve_put_it_in_doubt(ball):
+    indicator = ball.reference.indicator
+    thin = indicator._replace(thinnest=1.5 * indicator.cell)
+    doubtful = replace(ball, reference=replace(ball.reference, indicator=thin))
+    assert doubtful.status == "uncertain"
+    assert doubtful.message.startswith(
+        f"Walls or gaps of {100 * thin.thinnest / thin.size:.2g} % of the size were felt"
+    )
 
 
 def test_far_away_the_nearest_place_counts(ball):

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender's Add menu has, touched all over with the dialog's defaults, beside the result.
+
+`python -m benchmarks.add_menu ZIP [--only NAME]`, from the root of a checkout; ZIP is the built extension.
+It prints a Markdown table and draws build/charts/add_menu.png, objects above and what was felt of them below.
+
+Deviations are those of the report, both ways between surface and object, in tolerances (1/500 of the size).
+Open edges, Euler number and pieces are of the touched surface, and in brackets of the object where these
+differ; vertices of the object in the same place count as one.
+"""
+
+import argparse
+import math
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+from tests.solids import topology
+from tools import blender, demo
+
+from . import ROOT, machine, table
+
+APART, SIZE = 1.1, 1.15  # Objects are so far apart in the picture, and their diagonal is so long.
+WIDTH, SAMPLES = 1800, 48
+
+
+def shapes():
+    """Functions that add an object to the scene, by name."""
+    import bpy
+
+    add = bpy.ops.mesh
+
+    def plate():
+        add.primitive_cube_add()
+        bpy.context.object.scale = (1.0, 0.7, 0.04)
+
+    def letter():
+        bpy.ops.object.text_add()
+        bpy.context.object.data.body, bpy.context.object.data.extrude = "B", 0.1
+        bpy.ops.object.convert(target="MESH")
+
+    def subdivided():
+        add.primitive_monkey_add()
+        bpy.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
+
+    return {
+        "cube": add.primitive_cube_add,
+        "plane": add.primitive_plane_add,
+        "circle": lambda: add.primitive_circle_add(fill_type="NGON"),
+        "UV sphere": add.primitive_uv_sphere_add,
+        "ico sphere": add.primitive_ico_sphere_add,
+        "cylinder": add.primitive_cylinder_add,
+        "cone": add.primitive_cone_add,
+        "torus": add.primitive_torus_add,
+        "plate": plate,
+        "letter": letter,
+        "Suzanne": add.primitive_monkey_add,
+        "Suzanne, subdivided": subdivided,
+    }
+
+
+def touched(add):
+    """(the object that a function adds, the touched surface, CPU seconds)."""
+    import bpy
+
+    add()
+    source = bpy.context.object
+    start = process_time()
+    bpy.ops.tactile.touch_all_over(target=source.name)
+    return source, bpy.context.view_layer.objects.active, process_time() - start
+
+
+def shape_of(obj):
+    """The topology of an evaluated object, with vertices in the same place merged."""
+    import bpy
+
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    mesh.calc_loop_triangles()
+    points = np.array([vertex.co for vertex in mesh.vertices])
+    triangles = np.array([triangle.vertices for triangle in mesh.loop_triangles])
+    merged = np.unique(points.round(6), axis=0, return_inverse=True)[1].ravel()
+    return topology(merged[triangles])
+
+
+def row(name, source, made, seconds):
+    record = made["tactile_object"].to_dict()
+    found, true = (shape_of(obj) for obj in (made, source))
+    shape = f"{found.open} / {found.euler} / {found.pieces}"
+    if (found.open > 0, found.euler, found.pieces) != (true.open > 0, true.euler, true.pieces):
+        shape += f" ({true.open} / {true.euler} / {true.pieces})"
+    off = (record[f"deviation_{key}"] / record["tolerance"] for key in ("mean", "max"))
+    touches = f"{record['touches']}"
+    return [name, touches, shape, *(f"{value:.2f}" for value in off), f"{seconds:.1f}", record["status"]]
+
+
+def placed(obj, column, line):
+    """Moves an object to its place in the picture, turned so that three of its sides show."""
+    import bpy
+    from mathutils import Matrix, Vector
+
+    bpy.context.view_layer.update()
+    corners = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
+    scale = SIZE / np.linalg.norm(np.ptp(corners, axis=0))
+    middle = Vector((corners.min(axis=0) + corners.max(axis=0)) / 2.0)
+    turn = Matrix.Rotation(math.radians(28.0), 4, "X") @ Matrix.Rotation(math.radians(-32.0), 4, "Z")
+    wide, high = np.ptp(corners, axis=0)[[0, 2]]
+    stand = Matrix.Rotation(math.radians(-90.0 if high > 0.5 * wide else -40.0), 4, "X")
+    place = Matrix.Translation((column * APART, -line * APART, 0.0))
+    obj.matrix_world = (
+        place @ turn @ stand @ Matrix.Scale(scale, 4) @ Matrix.Translation(-middle) @ obj.matrix_world
+    )
+
+
+def draw(pairs):
+    """Draws the objects above what was felt of them."""
+    import bpy
+
+    scene = bpy.context.scene
+    for column, (source, made) in enumerate(pairs):
+        made.data.materials.clear()
+        for line, obj in enumerate((source, made)):
+            demo.look(scene, obj)
+            placed(obj, column, line)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", APART * len(pairs)
+    camera.location = (0.5 * APART * (len(pairs) - 1), -0.5 * APART, 10.0)
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 1.5, (-0.6, -0.5, 0.0)
+    for obj in (camera, sun):
+        scene.collection.objects.link(obj)
+    scene.camera = camera
+    path = ROOT / "build" / "charts" / "add_menu.png"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    demo.photograph(scene, path, WIDTH, round(WIDTH * 2.1 / len(pairs)), SAMPLES)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("zip", type=Path, help="the built extension")
+    parser.add_argument("--only", default="", help="only objects with this in their names")
+    options = parser.parse_args()
+    rows, pairs = [], []
+    with blender.quiet():
+        blender.start(options.zip)
+        import bpy
+
+        bpy.ops.wm.read_homefile(use_empty=True)
+        for name, add in shapes().items():
+            if options.only in name:
+                source, made, seconds = touched(add)
+                rows.append(row(name, source, made, seconds))
+                pairs.append((source, made))
+                for obj in bpy.data.objects:
+                    obj.hide_set(True)
+        for obj in bpy.data.objects:
+            obj.hide_set(False)
+        draw(pairs)
+    table(["object", "touches", "open / Euler / pieces", "mean", "largest", "CPU s", "status"], rows)
+    print(f"{machine('bpy', 'numpy', 'scipy')}.")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,219 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Borders of open sheets: where a finger feels the surface end, the mesh ends, too.
+
+Beside the paper. A mesh without the triangles that no patch covers ends in a zigzag, some edges away from the
+border of the surface. Corners of a border are where its lines meet, as in extended marching cubes (Kobbelt et
+al. 2001) in the plane.
+"""
+
+from collections.abc import Callable, Generator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from ..contours.contour import vector_of
+from ..contours.finger import Finger
+from ..patch.tetrahedra import Indices, split_sides
+from .meshing import LEAST_DIVISOR, Mesh
+
+# python -m benchmarks.atlas judges these.
+REACH, STEP = 6.0, 0.5  # A border is looked for within so many edges of the mesh's, in such steps,
+HALVINGS = 8  # and then by so many halvings.
+TURNED = 0.87  # A border has a corner where the cosine between its directions on both sides is less,
+STRAIGHT = 0.1  # if it is straight on both sides to this share of an edge.
+INWARD = 0.1  # Corners are felt this share of the way from there to the chord across them.
+SMOOTHINGS = 3  # So often directions of a border become the means of their neighbors'.
+EARS = 2  # So often triangles with two sides on the border are left out.
+ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
+NEAREST = 12  # The nearest segment is one of so many whose middles are nearest.
+SAME = 1e-6  # Lengths that differ by a smaller share are the same.
+
+Offsets = Callable[[Array, Indices], Array]  # How far a surface is above points beside some places.
+
+
+class Border(NamedTuple):
+    """Where a surface ends: segments (k, 2, 3), ways beyond these (k, 3), and the corners (n, 3) of it."""
+
+    segments: Array
+    ways: Array
+    corners: Array
+
+
+def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, None, Border]:
+    """The border of the surface beside that of a mesh; yields 0 between its steps.
+
+    near : the finger feels the surface where that is within this length of the mesh
+    """
+    at, before, after, ways = _rim_of(mesh)
+    places, normals = mesh.vertices[at], mesh.normals[at]
+
+    def off(points: Array, which: Indices) -> Array:
+        """How far the surface is above points (k, 3) beside some of the places, (k,); NaN where it is not."""
+        each = zip(points.tolist(), normals[which].tolist(), strict=True)
+        contacts = ((p, n, finger.near(vector_of(p), vector_of(n), near)) for p, n in each)
+        return np.array([np.nan if c is None else np.dot(n, np.subtract(c[0], p)) for p, n, c in contacts])
+
+    low, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
+    high, every = low + STEP * mesh.edge, np.arange(len(at))
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        met = ~np.isnan(off(places + middle[:, None] * ways, every))
+        low, high = np.where(met, middle, low), np.where(met, high, middle)
+        yield 0.0
+    places = places + low[:, None] * ways
+    places += np.nan_to_num(off(places, every))[:, None] * normals
+    ended &= ~_goes_on(finger, places, normals, ways, STEP * mesh.edge)
+    some = ended[before] & ended[after]
+    before, after = before[some], after[some]
+    corners, sharp = _corners(places, before, after, mesh.edge)
+    a, b = places[before], places[after]
+    chords = 0.5 * (a + b)
+    above, beside = off(corners + INWARD * (chords - corners), before), off(chords, before)
+    sharp &= np.isnan(above) == np.isnan(beside)
+    corners += np.nan_to_num(above)[:, None] * normals[before]
+    yield 0.0
+    c, one, two = corners[sharp], ways[before], ways[after]
+    starts, ends = np.concatenate([a[~sharp], a[sharp], c]), np.concatenate([b[~sharp], c, b[sharp]])
+    beyond = np.concatenate([(one + two)[~sharp], one[sharp], two[sharp]])
+    return Border(np.stack([starts, ends], axis=1), beyond, c)
+
+
+def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array]:
+    """The vertices (n,) of a mesh's border, the first and last of each side (k,), and ways beyond (n, 3)."""
+    at, index = np.unique(mesh.border, return_inverse=True)
+    before, after = index.reshape(-1, 2).T
+    places = mesh.vertices[at]
+    along = np.zeros_like(places)
+    np.add.at(along, np.stack([before, after], axis=1), (places[after] - places[before])[:, None])
+    for _ in range(SMOOTHINGS):
+        mean = along.copy()
+        np.add.at(mean, before, along[after])
+        np.add.at(mean, after, along[before])
+        along = _unit(mean)
+    return at, before, after, np.cross(along, mesh.normals[at])
+
+
+def _lengths(
+    off: Offsets, places: Array, ways: Array, step: float
+) -> Generator[float, None, tuple[Array, NDArray[np.bool_]]]:
+    """Lengths (n,) of a surface along ways (n, 3) from places (n, 3), and whether it ends there, (n,)."""
+    inside, ended = ~np.isnan(off(places, np.arange(len(places)))), np.zeros(len(places), dtype=bool)
+    low = np.zeros(len(places))
+    for i in range(1, round(REACH / STEP) + 1):
+        left = np.flatnonzero(~ended)
+        trial = np.where(inside[left], i * step, -i * step)
+        left = left[np.isnan(off(places[left] + trial[:, None] * ways[left], left)) == inside[left]]
+        ended[left], low[left] = True, np.where(inside[left], i - 1, -i) * step
+        yield 0.0
+    return low, ended
+
+
+def _goes_on(finger: Finger, places: Array, normals: Array, ways: Array, step: float) -> NDArray[np.bool_]:
+    """Whether a finger that goes a step beyond places (n, 3) still feels the surface, which bends away."""
+    each = zip(places.tolist(), normals.tolist(), ways.tolist(), strict=True)
+    found = (finger.ahead(vector_of(p), vector_of(n), vector_of(t), 2.0 * step, step) for p, n, t in each)
+    return np.array([contact is not None for contact in found], dtype=bool)
+
+
+def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Where the lines of a border on both sides of its segments meet, (k, 3), and whether they do, (k,)."""
+    leading, following = (np.arange(len(places)) for _ in range(2))
+    leading[after], following[before] = before, after
+    a, b, first, last = places[before], places[after], leading[before], following[after]
+    u, v = _unit(a - places[leading[first]]), _unit(b - places[following[last]])
+    cosine, along_u, along_v = _dot(u, v), _dot(b - a, u), _dot(b - a, v)
+    area = np.maximum(1.0 - cosine**2, LEAST_DIVISOR)
+    s, t = (along_u - cosine * along_v) / area, (cosine * along_u - along_v) / area
+    meet = (
+        (np.abs(cosine) < TURNED) & (np.minimum(s, t) > -STRAIGHT * edge) & (np.maximum(s, t) < REACH * edge)
+    )
+    for at, way, middle in ((a, u, first), (b, v, last)):
+        off = at - places[middle]
+        meet &= np.linalg.norm(off - _dot(off, way)[:, None] * way, axis=1) < STRAIGHT * edge
+    corners = 0.5 * (a + s[:, None] * u + b + t[:, None] * v)
+    return np.where(meet[:, None], corners, a), meet
+
+
+def bordered(mesh: Mesh, border: Border) -> Mesh:
+    """The mesh with the vertices of its border on that of the surface.
+
+    What is beyond that is left out first, so that vertices only move outward and no triangle folds over.
+    """
+    if not len(border.segments):
+        return mesh
+    edge = mesh.edge
+    feet, ways = _feet(border, mesh.vertices)
+    off = mesh.vertices - feet
+    beyond, away = _dot(off, ways), np.linalg.norm(off, axis=1)
+    out = (beyond > np.maximum(STRAIGHT * edge, ALONG * away)) & (away < REACH * edge)
+    mesh = mesh.chosen(~out[mesh.triangles].any(axis=1))
+    for _ in range(EARS):
+        mesh = mesh.chosen(mesh.sides_on_border < 2)
+    at, _, _, toward = _rim_of(mesh)
+    vertices = mesh.vertices.copy()
+    feet, ways = _feet(border, vertices[at])
+    # Where the mesh ends though the surface goes on, the way beyond is another.
+    on = (np.linalg.norm(feet - vertices[at], axis=1) < REACH * edge) & (_dot(toward, ways) > ALONG)
+    vertices[at[on]] = feet[on]
+    return _cornered(_welded(mesh._replace(vertices=vertices)), border.corners)
+
+
+def _welded(mesh: Mesh) -> Mesh:
+    """The mesh without sides of its border that have no length, as where some vertices move into a corner."""
+    a, b = mesh.border.T
+    same = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1) < SAME * mesh.edge
+    first = np.arange(len(mesh.vertices))
+    for one, two in zip(a[same].tolist(), b[same].tolist(), strict=True):
+        first[first == first[two]] = first[one]
+    triangles = first[mesh.triangles]
+    some = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return mesh._replace(triangles=triangles).chosen(some)
+
+
+def _cornered(mesh: Mesh, corners: Array) -> Mesh:
+    """The mesh with those sides of its border split at corners (n, 3) that pass these by."""
+    ends, reach = np.sort(mesh.border, axis=1), REACH * mesh.edge
+    a, b = mesh.vertices[ends].transpose(1, 0, 2)
+    split: dict[int, tuple[float, Array]] = {}
+    for corner in corners:
+        detours = np.linalg.norm(corner - a, axis=1) + np.linalg.norm(corner - b, axis=1)
+        detours -= np.linalg.norm(b - a, axis=1)
+        best = int(np.argmin(detours))
+        if max(SAME * reach, split.get(best, (0.0,))[0]) < detours[best] < reach:
+            split[best] = float(detours[best]), corner
+    sides, points = ends[list(split)], np.array([corner for _, corner in split.values()]).reshape(-1, 3)
+    at = np.append(np.arange(len(mesh.vertices)), sides[:, 0])
+    triangles = split_sides(mesh.triangles, sides, len(mesh.vertices))
+    return Mesh(np.vstack([mesh.vertices, points]), triangles, mesh.std[at], mesh.patch[at])
+
+
+def _feet(border: Border, points: Array) -> tuple[Array, Array]:
+    """The places of a border nearest to points (n, 3), and the ways beyond it there, (n, 3) each."""
+    from scipy.spatial import cKDTree
+
+    segments = border.segments
+    near = cKDTree(segments.mean(axis=1)).query(points, min(NEAREST, len(segments)))[1]
+    near = near.reshape(len(points), -1)
+    a, along = segments[near, 0], segments[near, 1] - segments[near, 0]
+    shares = _dot(points[:, None] - a, along) / np.maximum(_dot(along, along), LEAST_DIVISOR)
+    feet = a + np.clip(shares, 0.0, 1.0)[..., None] * along
+    away = np.linalg.norm(points[:, None] - feet, axis=2)
+    best = np.argmin(away, axis=1)
+    # At a corner the ways beyond both of its segments count.
+    as_near = away <= (1.0 + SAME) * away.min(axis=1, keepdims=True)
+    ways = np.where(as_near[..., None], border.ways[near], 0.0).sum(axis=1)
+    return feet[np.arange(len(points)), best], _unit(ways)
+
+
+def _dot(u: Array, v: Array) -> Array:
+    """Products (...) of vectors (..., 3)."""
+    found: Array = np.einsum("...i,...i->...", u, v)
+    return found
+
+
+def _unit(vectors: Array) -> Array:
+    """Vectors (n, 3) over their lengths."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), LEAST_DIVISOR)
