@@ -5,7 +5,7 @@
 import bpy
 
 from ..touch import units
-from ..touch.wording import SPREAD
+from ..touch.wording import SPREAD, cell
 
 # The results of core.verify, in the order of a table.
 VERIFIED = (
@@ -42,8 +42,8 @@ def verification_columns(report):
     found = report["verification"]
     lengths = [key for key in VERIFIED if "distance" in key or "error" in key]
     return [
-        *((key, report[key]) for key in ("patch", "source", "status")),
-        ("target", found["target"]),
+        *((key, cell(report[key])) for key in ("patch", "source", "status")),
+        ("target", cell(found["target"])),
         *((f"{key} [unit of the file]" if key in lengths else key, found.get(key, "")) for key in VERIFIED),
     ]
 

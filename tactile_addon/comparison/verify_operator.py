@@ -37,12 +37,12 @@ class Verification:
     def look(self, depsgraph):
         """Lets the steps go on in the scene as it is now. Raises ValueError if patch or mesh have changed."""
         patch, target = self._objects()
+        # When Blender evaluates again, it frees what it has evaluated before.
+        self._surface = MeshSurface(target, depsgraph, sound=self._surface is not None)
         if _inputs(patch, target) != self._given:
             raise ValueError(
                 f'"{self.patch}" or "{self.target}" was changed while it was verified: start again'
             )
-        # When Blender evaluates again, it frees what it has evaluated before.
-        self._surface = MeshSurface(target, depsgraph, sound=self._surface is not None)
 
     def ray_cast(self, *ray):
         """Casts a ray at the target, as MeshSurface does."""

@@ -92,6 +92,7 @@ def write_patch(path, r):
 
 def _read_csv(name, path):
     text = _text(name, path)
+    contact_rows.require_short_lines(name, text)
     told = _told(name, text)
     found = contact_rows.header_of(text)
     if found is None:

@@ -13,7 +13,7 @@ from ...core.arguments import LARGEST
 
 POINT_COLUMNS, NORMAL_COLUMNS = ("x", "y", "z"), ("nx", "ny", "nz")
 LETTERS_AT_ONCE = 1 << 16  # So many letters are read together.
-MIX = np.array([1.0, math.pi, math.e])  # The product with a point is a number that few other points share.
+LONGEST_LINE = 1 << 20  # Lines have at most so many letters, for the words of one take 80 times its memory.
 
 
 class Contacts(NamedTuple):
@@ -35,6 +35,19 @@ def blocks(text, start=0, number=1):
             yield start, number, block
         number += block.count("\n")
         start = end
+
+
+def require_short_lines(name, text):
+    """Raises ValueError for the first line that is too long to be taken apart."""
+    for _, number, block in blocks(text):
+        above = block.rfind("\n", 0, -1) + 1  # Only the last line of a block may be long.
+        letters = len(block) - above
+        if letters > LONGEST_LINE:
+            at = f"{name}, line {number + block.count(chr(10), 0, above)}"
+            raise ValueError(
+                f"{at}: expected {LONGEST_LINE:,} letters or fewer, got {letters:,}: write each contact on a "
+                "line of its own"
+            )
 
 
 def header_of(text):
@@ -151,14 +164,12 @@ class Rows:
 
 
 def contours(name, labels, points, normals, times, titles):
-    """A contour for each label 0, 1, ..., with its contacts sorted by time, if there is one, each once.
+    """A contour for each label 0, 1, ..., with its contacts sorted by time, if there is one.
 
     normals : (n, 3), NaN along curves without any; None if there are none at all
     titles : the name of each label
     """
     order = np.argsort(labels, kind="stable") if times is None else np.lexsort((times, labels))
-    # A sensor at rest writes one contact many times, which makes it no more certain.
-    order = order[_first(labels[order], points[order])]
     found = []
     for rows in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
         some = normals is not None and not np.isnan(normals[rows[0]]).all()
@@ -168,17 +179,6 @@ def contours(name, labels, points, normals, times, titles):
             at = f'{name}, curve "{titles[labels[rows[0]]]}"'
             raise ValueError(f"{at}: {error}") from None
     return found
-
-
-def _first(labels, points):
-    """A mask of the rows that are the first with their label and point."""
-    first = np.ones(len(labels), dtype=bool)
-    mixed = np.sort(points @ MIX)
-    if (mixed[1:] == mixed[:-1]).any():  # Rows with equal numbers may have the same point.
-        keys = labels, *points.T
-        like = np.lexsort(keys)
-        first[like[1:]] = np.any([key[like[1:]] != key[like[:-1]] for key in keys], axis=0)
-    return first
 
 
 def fields_of(at, line, separator):

@@ -74,7 +74,9 @@ class MeasuredObject:
                     "Some contacts have no normals, and nothing tells their outer side: set outward, a "
                     "direction on the outer side of all contacts"
                 )
-        sign, self._origin = -1.0 if flip else 1.0, np.mean(np.vstack([c.points for c in felt]), axis=0)
+        points = np.vstack([c.points for c in felt])
+        sign, self._origin = -1.0 if flip else 1.0, np.mean(points, axis=0)
+        require_single("surface", 0.5 * float(np.ptp(points, axis=0).max()), self._origin)
         self._felt = [
             replace(
                 c, points=c.points - self._origin, normals=None if c.normals is None else sign * c.normals
@@ -171,7 +173,7 @@ def _fit(source, contacts, point, outward, flip, normal_std, options):
     unknown = outward is None and not any(c.normals is not None for c in felt)
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
-    require_single(result)
+    require_single("patch", result.radius, result.frame.origin)
     given = {"source": source, "unit": unit, "curves": len(contours), "strokes": len(strokes)}
     missed = {} if distances is None else {"misses": distances.tolist()}
     seconds = {"fit": perf_counter() - start}

@@ -7,7 +7,7 @@ import sys
 import bpy
 import numpy as np
 
-from . import ply_contacts, whole_file
+from . import mesh_numbers, ply_contacts, whole_file
 
 HEADER = 1 << 16  # The header of a .ply ends within so many bytes.
 INCOMPLETE = "Blender has not written all of it"
@@ -45,6 +45,12 @@ def add(path, empty=False):
     )
     if kind == ".ply" and not _has_header(path):
         raise OSError(unreadable)
+    wrong = mesh_numbers.unreadable(path)
+    if wrong:
+        raise OSError(
+            f'"{path.name}" has vertices whose coordinates are not finite in single precision, {wrong} of '
+            "them: correct or delete these"
+        )
     try:
         # Importers ask for a window, and after `blender -b` none is current.
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):

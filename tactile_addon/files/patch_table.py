@@ -6,7 +6,9 @@ import csv
 import io
 
 from ..probes import probe
+from ..scene import patch_record
 from ..touch import units
+from ..touch.wording import cell
 from . import whole_file
 
 # Keys of the report, and the power of length in the unit of each.
@@ -31,7 +33,8 @@ def patches_of(objects):
 def write(path, patches, scene):
     """Writes a .csv with a header that names the unit, and a row for each patch; unknown fields are empty.
 
-    Raises ValueError if there are no patches.
+    The row of a patch that was edited has only its name and a message. Raises ValueError if there are no
+    patches.
     """
     if not patches:
         raise ValueError("There is no patch to export: pick a reference point first")
@@ -39,7 +42,7 @@ def write(path, patches, scene):
     unit = units.unit_of(scene, max(record["radius"] for record in records))
     rows = [_row(*pair, unit) for pair in zip(patches, records, strict=True)]
     text = io.StringIO()
-    table = csv.DictWriter(text, rows[0], lineterminator="\n")
+    table = csv.DictWriter(text, max(rows, key=len))  # Other ends of lines leave "\r" in a name unquoted.
     table.writeheader()
     table.writerows(rows)
     whole_file.write_text(path, text.getvalue())
@@ -48,13 +51,21 @@ def write(path, patches, scene):
 def _row(patch, record, unit):
     """The row of a patch as a dict of headings and values."""
     owner = probe.probe_of(patch)
+    named = {"probe": cell(owner.name) if owner else "", "patch": cell(patch.name)}
+    try:
+        with patch_record.reading(patch):
+            return named | _numbers(record, unit) | {key: cell(record[key]) for key in WORD_COLUMNS}
+    except ValueError as error:
+        return named | {"message": cell(str(error))}
+
+
+def _numbers(record, unit):
+    """The numbers of a report in words, by headings."""
     numbers = {_heading("xyz"[i], 1, unit): x / unit[1] for i, x in enumerate(record["frame"]["origin"])}
     numbers |= dict(zip(("nx", "ny", "nz"), record["frame"]["normal"], strict=True))
     for key, power in NUMBER_POWERS.items():
         numbers[_heading(key, power, unit)] = record[key] / unit[1] ** power if key in record else None
-    named = {"probe": owner.name if owner else "", "patch": patch.name}
-    said = {key: "" if value is None else f"{value:.9g}" for key, value in numbers.items()}
-    return named | said | {key: record[key] for key in WORD_COLUMNS}
+    return {key: "" if value is None else f"{value:.9g}" for key, value in numbers.items()}
 
 
 def _heading(name, power, unit):

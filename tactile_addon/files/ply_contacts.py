@@ -45,7 +45,18 @@ def read(name, path):
 
 def _vertices(name, data):
     """The values of the vertices' properties, by name."""
-    end = data.find(b"end_header")
+    rows, fields, first = vertex_rows(name, data)
+    rows = _ply_rows(name, first, rows, fields) if first else rows
+    return {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
+
+
+def vertex_rows(name, data):
+    """The rows of the vertices, their fields, and the number of the first line.
+
+    The rows are lines of text, or an array with these fields, for which the number is 0. Raises ValueError if
+    there are none.
+    """
+    end = data.find(b"end_header", 0, contact_rows.LONGEST_LINE)
     lines = [line.split() for line in data[: max(end, 0)].decode("latin-1").splitlines()]
     order = PLY_ORDERS.get(lines[1][1]) if len(lines) > 1 and len(lines[1]) > 1 else None
     if not data.startswith(b"ply") or end < 0 or order is None:
@@ -58,10 +69,8 @@ def _vertices(name, data):
     if (len(data) - below if text is None else len(text)) < start + count * size:
         raise ValueError(f"{name}: expected {count} contacts, got a file that ends earlier: is it complete?")
     if text is None:
-        rows = np.frombuffer(data, fields, count, below + start)
-    else:
-        rows = _ply_rows(name, len(lines) + 2 + start, text[start : start + count], fields)
-    return {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
+        return np.frombuffer(data, fields, count, below + start), fields, 0
+    return text[start : start + count], fields, len(lines) + 2 + start
 
 
 def _in_order(labels):
@@ -103,7 +112,8 @@ def _ply_rows(name, first, lines, fields):
     """The values of lines of text, of which the first is line `first` of the file."""
     rows = np.empty(len(lines), [(key, "f8") for key, _ in fields])
     for start in range(0, len(lines), PLY_ROWS):
-        words = [line.decode("latin-1").split() for line in lines[start : start + PLY_ROWS]]
+        part = (line.decode("latin-1") for line in lines[start : start + PLY_ROWS])
+        words = [line.split(None, len(fields)) for line in part]  # Millions of words would take gigabytes.
         some = rows[start : start + PLY_ROWS]
         try:
             columns = list(zip(*words, strict=True))
@@ -119,6 +129,7 @@ def _refuse_ply_row(name, first, words, fields):
     for number, row in enumerate(words, first):
         at = f"{name}, line {number}"
         if len(row) != len(fields):
-            raise ValueError(f"{at}: expected {len(fields)} numbers, got {len(row)}")
+            got = len(row) if len(row) < len(fields) else "more"
+            raise ValueError(f"{at}: expected {len(fields)} numbers, got {got}")
         for (key, _), word in zip(fields, row, strict=True):
             contact_rows.number_of(f'{at}, "{key}"', word)

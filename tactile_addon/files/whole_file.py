@@ -5,8 +5,12 @@
 import os
 import secrets
 import shutil
+import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+UNFINISHED = ".unfinished"  # This is before the suffix of files that are being written.
+STALE = 3600.0  # Whoever has not written to such a file for so many seconds was killed.
 
 
 @contextmanager
@@ -14,6 +18,7 @@ def replacing(path):
     """The path of a file that replaces `path` once it is written, at the end of the block.
 
     Raises OSError, with a sentence, if that fails. The old file is then as it was, and nothing is beside it.
+    If this process is killed, the hidden file stays until `path` is written another time, an hour later.
     """
     if Path(path).exists() and not Path(path).is_file():
         raise OSError(f'"{path}" is not a file that can be replaced: choose another name')
@@ -21,7 +26,9 @@ def replacing(path):
         target = Path(path).resolve()  # A link stays, and its target is replaced.
     except RuntimeError as error:  # Links point to each other.
         raise OSError(f'cannot write "{Path(path).name}" ({error}): choose another place') from error
-    temporary = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}{target.suffix[:40]}")
+    stem, ending = f".{target.stem[:40]}-", f"{UNFINISHED}{target.suffix[:40]}"
+    _sweep(target.parent, stem, ending)
+    temporary = target.with_name(f"{stem}{secrets.token_hex(4)}{ending}")
     try:
         yield temporary
         with temporary.open("rb+") as file:
@@ -37,6 +44,15 @@ def replacing(path):
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _sweep(folder, start, end):
+    """Removes files with such names that nobody writes any more."""
+    with suppress(OSError), os.scandir(folder) as found:
+        for left in found:
+            of_mine = left.name.startswith(start) and left.name.endswith(end)
+            if of_mine and time.time() - left.stat().st_mtime > STALE:
+                os.unlink(left)
 
 
 def write_text(path, text):

@@ -113,7 +113,7 @@ def touch_at(probe, depsgraph, complete, **more):
             f'"{settings.target.name}" is not in this view layer: bring it back, or choose another target'
         )
     if anchor.is_attached(probe):  # If the target is scaled to 0, so is the probe.
-        require_invertible(settings.target.name, np.array(settings.target.matrix_world, dtype=float)[:3, :3])
+        require_invertible(settings.target.name, np.array(settings.target.matrix_world, dtype=float))
     if not anchor.can_have_children(probe):
         raise ValueError("the probe has a scale of 0 or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)

@@ -29,9 +29,9 @@ class Deviations(NamedTuple):
     words: str
 
 
-def patch_page(patch):
-    """The page of a patch object. Raises ValueError, with a sentence, if it was edited."""
-    r, record = patch_record.reconstruction_of(patch), patch[patch_record.RECORD].to_dict()
+def patch_page(patch, r):
+    """The page of a patch object and its core.Reconstruction."""
+    record = patch[patch_record.RECORD].to_dict()
     unit = units.unit_of(bpy.context.scene, r.radius)
     off = _deviations(patch, r, record)
     reaches = parts.shares_of(r.radius, "radius")

@@ -17,11 +17,14 @@ from .patch_page import patch_page
 def write(path, obj):
     """Writes the page of a patch, map or whole object as the file `path`.
 
-    Raises ValueError if the patch was edited, and OSError if the file cannot be written.
+    Raises ValueError if the object was edited, and OSError if the file cannot be written.
     """
     pages = {patch_record.MAP_RECORD: map_page, patch_record.ATLAS_RECORD: object_page}
-    make = next((pages[key] for key in pages if key in obj), patch_page)
-    whole_file.write_text(path, make(obj))
+    make = next((pages[key] for key in pages if key in obj), None)
+    given = (obj,) if make else (obj, patch_record.reconstruction_of(obj))
+    with patch_record.reading(obj):
+        text = (make or patch_page)(*given)
+    whole_file.write_text(path, text)
 
 
 class TACTILE_OT_export_report(ObjectExport, bpy.types.Operator):

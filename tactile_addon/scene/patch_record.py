@@ -3,6 +3,7 @@
 """What a patch object keeps: the report, the reconstruction in double precision, and where it was touched."""
 
 import json
+from contextlib import contextmanager
 
 import numpy as np
 from mathutils import Matrix
@@ -66,7 +67,23 @@ def extent_of(patch):
 def require_whole(patch):
     """Raises ValueError if the patch object was edited such that it is no patch any more."""
     if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
-        raise ValueError(f'"{patch.name}" was edited and is no longer a complete patch: touch again')
+        raise edited(patch)
+
+
+def edited(obj):
+    """The error to raise for a patch, a map or a whole object that was edited and is none any more."""
+    if RECORD in obj:
+        return ValueError(f'"{obj.name}" was edited and is no longer a complete patch: touch again')
+    return ValueError(f'"{obj.name}" was edited and is no longer a complete surface: touch all over again')
+
+
+@contextmanager
+def reading(obj):
+    """Within this context, whatever is wrong with the record of an object is a ValueError with a sentence."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise edited(obj) from error
 
 
 def is_colored(obj):
@@ -78,7 +95,7 @@ def is_colored(obj):
 def require_colored(obj):
     """Raises ValueError if the whole object was edited such that it cannot show its colors."""
     if not is_colored(obj):
-        raise ValueError(f'"{obj.name}" was edited and is no longer a complete surface: touch all over again')
+        raise edited(obj)
 
 
 def touched_record(obj):

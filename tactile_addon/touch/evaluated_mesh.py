@@ -54,7 +54,7 @@ def evaluated_object(obj, depsgraph):
         evaluated.to_mesh()
         evaluated.to_mesh_clear()
     matrix = np.array(evaluated.matrix_world, dtype=float)
-    require_invertible(obj.name, matrix[:3, :3])
+    require_invertible(obj.name, matrix)
     if not len(evaluated.data.polygons):
         raise ValueError(f'"{obj.name}" has no faces to touch: add some')
     return evaluated, matrix[:3, :3], matrix[:3, 3]
@@ -68,8 +68,10 @@ def coordinates(name, evaluated):
     co, matrix = _coordinates(evaluated.data), np.array(evaluated.matrix_world, dtype=float)
     largest = max(float(co.max()), -float(co.min()))  # If any is NaN, both are.
     if not math.isfinite(largest):
+        wrong = np.count_nonzero(~np.isfinite(co).all(axis=1))
         raise ValueError(
-            f'"{name}" has vertices whose coordinates are not finite: delete them, or correct its modifiers'
+            f'"{name}" has vertices whose coordinates are not finite, {wrong} of {len(co)}: delete them, or '
+            "correct its modifiers"
         )
     reach = np.max([largest, largest * np.abs(matrix[:3, :3]).max(), np.abs(matrix[:3, 3]).max()])
     if not reach <= FARTHEST_VERTEX:  # NaN fails every comparison, so it is refused, too.
@@ -94,10 +96,12 @@ def _coordinates(mesh):
     return co
 
 
-def require_invertible(name, linear):
-    """Raises ValueError, with a sentence, if the linear part (3, 3) of a transform has no inverse."""
-    lengths = np.linalg.norm(linear, axis=0)
-    if not np.isfinite(linear).all() or abs(np.linalg.det(linear)) <= 1e-9 * np.prod(lengths):
+def require_invertible(name, matrix):
+    """Raises ValueError, with a sentence, if the transform (4, 4) is not finite or has no inverse."""
+    if not np.isfinite(matrix).all():
+        raise ValueError(f'"{name}" has a location, rotation or scale that is not finite: set it again')
+    linear = matrix[:3, :3]
+    if abs(np.linalg.det(linear)) <= 1e-9 * np.prod(np.linalg.norm(linear, axis=0)):
         raise ValueError(f'"{name}" has a scale of 0 in some direction: give it another scale')
 
 

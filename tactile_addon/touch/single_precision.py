@@ -1,19 +1,29 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a patch fits into single precision, which Blender's meshes, attributes and places have."""
+"""Whether a surface fits into single precision, which Blender's meshes, attributes and places have."""
 
 import numpy as np
 
 # The squares of lengths between these, and of their inverses, are numbers in single precision.
 LARGEST_SINGLE, SMALLEST_SINGLE = 1e15, 1e-15
+PLACE_ROUNDING = 0.1  # Far from the origin rounding may move a surface by this share of its radius.
 
 
-def require_single(result):
-    """Raises ValueError for a patch too large, too small or too far away for Blender's numbers."""
-    reach = result.radius + float(np.abs(result.frame.origin).max())
-    if not (result.radius >= SMALLEST_SINGLE and reach <= LARGEST_SINGLE):
+def require_single(what, radius, place):
+    """Raises ValueError for a surface too large, too small or too far away for Blender's numbers.
+
+    what : a word for it; radius : a length; place : (3,), its middle in the world
+    """
+    far = float(np.abs(place).max())
+    if not (radius >= SMALLEST_SINGLE and radius + far <= LARGEST_SINGLE):
         raise ValueError(
-            f"The patch has a radius of {result.radius:.3g} and reaches to {reach:.3g}, and "
+            f"The {what} has a radius of {radius:.3g} and reaches to {radius + far:.3g}, and "
             f"Blender's numbers range from {SMALLEST_SINGLE:g} to {LARGEST_SINGLE:g}: use another "
             "unit of length"
+        )
+    gap = float(np.spacing(np.float32(far)))
+    if gap > PLACE_ROUNDING * radius:
+        raise ValueError(
+            f"Neighboring coordinates at the {what} are {gap:.2g} apart in single precision, too coarse for "
+            f"its radius of {radius:.3g}: move the origin of the contacts nearer to them"
         )

@@ -90,7 +90,7 @@ def touch(
     else:
         found, reaches = _explored(core.explore_nearby, surface, point, outward, planes, reaches, **given)
     clock.append(perf_counter())
-    require_single(found.result)
+    require_single("patch", found.result.radius, found.result.frame.origin)
     report = {
         "source": obj.name,
         "method": fit["method"],

@@ -11,6 +11,7 @@ from .touch_report import ENDS, FEW_VERTICES
 from .units import length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
+FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
 EARLY = ("edge", "crease", "turns away")  # These end a curve early.
 
 
@@ -175,3 +176,8 @@ def _measured(report, key, power, unit):
 def _shared(report, key, unit):
     """A length of the report in words, with its share of the radius."""
     return f"{say(report[key], 1, unit)}, {100.0 * report[key] / report['radius']:.2f} % of the radius"
+
+
+def cell(words):
+    """Words as a cell of a table that no spreadsheet takes for a formula."""
+    return f"'{words}" if words.startswith(FORMULAS) else words

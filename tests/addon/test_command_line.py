@@ -238,3 +238,56 @@ def test_help(command):
     code, out, _ = command("reconstruct", "--help")
     assert code == 0
     assert "--azimuths" in out
+
+
+VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.5], [2, 0, 0.5]]
+FACES = [[0, 1, 2], [1, 3, 2], [1, 4, 3]]
+
+
+def mesh_data(kind, word):
+    """A mesh file in which a coordinate of the last vertex is this word."""
+    rows = [[*map(str, row)] for row in VERTICES[:-1]] + [["2", word, "0.5"]]
+    if kind.endswith("obj"):
+        lines = [f"v {' '.join(row)}" for row in rows]
+        return "\n".join([*lines, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in FACES)]).encode()
+    if kind == "text.stl":
+        corners = ("\n".join(f" vertex {' '.join(rows[i])}" for i in face) for face in FACES)
+        facets = (f"facet normal 0 0 1\nouter loop\n{three}\nendloop\nendfacet\n" for three in corners)
+        return f"solid mesh\n{''.join(facets)}endsolid mesh\n".encode()
+    if kind == "binary.stl":
+        numbers = np.array(rows, dtype=float).astype("<f4")
+        return (
+            bytes(80)
+            + b"\3\0\0\0"
+            + b"".join(bytes(12) + numbers[face].tobytes() + b"\0\0" for face in FACES)
+        )
+    form, number = ("ascii", "float") if kind == "text.ply" else ("binary_little_endian", "double")
+    head = f"ply\nformat {form} 1.0\nelement vertex 5\n" + "".join(f"property {number} {x}\n" for x in "xyz")
+    head += "element face 3\nproperty list uchar int vertex_indices\nend_header\n"
+    if kind == "text.ply":
+        lines = [*(" ".join(row) for row in rows), *(f"3 {a} {b} {c}" for a, b, c in FACES)]
+        return (head + "\n".join(lines) + "\n").encode()
+    faces = b"".join(b"\3" + np.array(face, dtype="<i4").tobytes() for face in FACES)
+    return head.encode() + np.array(rows, dtype="<f8").tobytes() + faces
+
+
+@pytest.mark.parametrize("kind", ["text.ply", "binary.ply", "text.stl", "binary.stl", "mesh.obj"])
+@pytest.mark.parametrize("word", ["nan", "-inf", "1e39", "1e999"])
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast")
+def test_a_mesh_file_with_numbers_that_blender_reads_as_0_is_refused(command, empty, tmp_path, kind, word):
+    (tmp_path / kind).write_bytes(mesh_data(kind, "0.1"))
+    code, _, err = command("map", tmp_path / kind)
+    assert "not finite" not in err
+    (tmp_path / kind).write_bytes(mesh_data(kind, word))
+    code, _, err = command("map", tmp_path / kind)
+    assert code == 1
+    assert err.startswith(
+        f'tactile: "{kind}" has vertices whose coordinates are not finite in single precision, 1'
+    )
+
+
+def test_a_word_in_place_of_a_number_is_refused_too(command, empty, tmp_path):
+    (tmp_path / "mesh.obj").write_bytes(mesh_data("mesh.obj", "0,5"))
+    code, _, err = command("map", tmp_path / "mesh.obj")
+    assert code == 1
+    assert "1 of them: correct or delete these" in err

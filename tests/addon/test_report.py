@@ -143,3 +143,25 @@ def test_names_of_objects_are_no_html(empty, ball, tmp_path):
     empty.ops.tactile.export_report(filepath=str(tmp_path / "r.html"))
     page = Page((tmp_path / "r.html").read_text(encoding="utf-8"))
     assert "b" not in page.counts
+
+
+@pytest.mark.parametrize("key", ["method", "seconds", "shape_index"])
+def test_an_edited_patch_gets_a_sentence_in_place_of_a_report(empty, ball, tmp_path, key):
+    patch, _ = made(empty.ops.tactile.reconstruct, **TOUCH)
+    del patch["tactile"][key]
+    with pytest.raises(RuntimeError, match="is no longer a complete patch: touch again"):
+        empty.ops.tactile.export_report(filepath=str(tmp_path / "patch.html"))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("record", [7, "words", {}, {"message": "ok", "status": "ok"}])
+@pytest.mark.parametrize("kind", ["tactile_object", "tactile_map"])
+def test_an_edited_whole_object_or_map_gets_one_too(empty, ball, tmp_path, kind, record):
+    if kind == "tactile_map":
+        made(empty.ops.tactile.stability_map, kind, spacing=2.0)
+    else:
+        made(empty.ops.tactile.touch_all_over, kind, tolerance=0.02, edge=0.3)
+    empty.context.object[kind] = record
+    with pytest.raises(RuntimeError, match="is no longer a complete surface: touch all over again"):
+        empty.ops.tactile.export_report(filepath=str(tmp_path / "object.html"))
+    assert list(tmp_path.iterdir()) == []

@@ -158,6 +158,16 @@ def test_a_patch_of_a_file_asks_for_a_mesh_and_takes_the_one_in_its_field(empty,
     assert operator() == {"FINISHED"}
 
 
+@pytest.mark.parametrize("name", ["register", "verify"])
+def test_a_mesh_that_is_nowhere_is_named(empty, suzanne, tmp_path, name):
+    patch = imported(empty, suzanne, tmp_path)
+    suzanne.location.x = float("nan")
+    empty.context.view_layer.update()
+    with pytest.raises(RuntimeError, match='"Suzanne" has a location, rotation or scale that is not finite'):
+        getattr(empty.ops.tactile, name)(target=suzanne.name)
+    assert np.isfinite(patch.matrix_world).all()
+
+
 def test_a_search_that_is_stopped_leaves_the_patch_and_one_that_fails_says_why(
     empty, suzanne, extension, monkeypatch
 ):

@@ -387,6 +387,27 @@ def test_rows_are_read_many_at_a_time_and_take_little_memory(read, contact_file,
     assert peak < 300 * count
 
 
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (PLAIN + 2_000_000 * ",", "line 8: expected 1,048,576 letters or fewer, got 2,000,000: write each"),
+        (2_000_000 * "x," + "\n" + PLAIN, "line 1: expected 1,048,576 letters or fewer, got 4,000,001"),
+        (TITLE.format(1) + "# noise" + 2_000_000 * " 1" + "\n" + PLAIN, "line 2: expected 1,048,576 letters"),
+        (ply("ascii", 1) + 2_000_000 * b" 1", "line 10: expected 4 numbers, got more"),
+    ],
+)
+def test_a_line_of_millions_of_words_is_refused_before_it_takes_memory(read, data, words):
+    name = "contacts.ply" if isinstance(data, bytes) else "contacts.csv"
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match=words):
+            read(data, name)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 10 * len(data)
+
+
 def test_one_bad_row_costs_no_more_than_its_neighbors(read, contact_file, monkeypatch):
     count, looked = 50_000, []
     row = contact_file.contact_rows.Rows._row

@@ -155,3 +155,27 @@ def test_the_shell_joins_them_too(command, two_halves, tmp_path):
     code, _, err = command("join", *two_halves)
     assert code == 1
     assert "set outward" in err
+
+
+@pytest.mark.parametrize(
+    ("scale", "shift", "sentence"),
+    [
+        (1e39, 0.0, "The surface has a radius of 2e+39 and reaches to 2e+39, and Blender's"),
+        (1e-30, 0.0, "The surface has a radius of 2e-30 and reaches to 2e-30, and Blender's"),
+        (1.0, 1e12, "Neighboring coordinates at the surface are 6.6e+04 apart in single precision"),
+    ],
+)
+def test_contacts_that_single_precision_does_not_hold_are_refused(command, write, scale, shift, sentence):
+    points, normals = ball(400)
+    path = write("ball.csv", [Contour(scale * (points - CENTER) + shift, normals=normals)])
+    code, out, err = command("join", path, "--json", "-")
+    assert code == 1
+    assert err.startswith(f"tactile: {sentence}") or f"\ntactile: {sentence}" in err
+    assert "{" not in out
+
+
+def test_normals_without_a_direction_are_named(empty, write):
+    points, normals = ball(400)
+    path = write("ball.csv", [Contour(points, normals=0.0 * normals)])
+    with pytest.raises(RuntimeError, match=r"Normals: expected vectors with a direction, got \(0, 0, 0\)"):
+        joined(empty, [path])

@@ -75,3 +75,44 @@ def test_from_the_shell(empty, probes, command, tmp_path):
     empty.ops.wm.read_homefile(use_empty=True)
     code, _, err = command("table", "--output", path)
     assert (code, err) == (1, "tactile: There is no patch to export: pick a reference point first\n")
+
+
+@pytest.mark.parametrize("start", "=+-@\t\r")
+def test_no_spreadsheet_takes_a_name_for_a_formula(empty, probes, command, tmp_path, start):
+    name = f"{start}cmd|'/c calc'!A0"
+    empty.data.objects["Sphere"].name = name
+    empty.ops.tactile.pick(target=empty.context.scene.objects[0].name, location=(0.0, 19.0, 5.0), new=True)
+    path = tmp_path / "probes.csv"
+    empty.ops.tactile.export_table(filepath=str(path))
+    rows = rows_of(path)
+    for row in rows:
+        words = [row[key] for key in ("probe", "patch", "source", "method", "status", "message")]
+        assert not any(word.startswith(tuple("=+-@\t\r")) for word in words)
+        assert float(row["k1 [1/mm]"]) < 0.0  # numbers stay as they are
+    assert f"'{name}" in [row["source"] for row in rows]
+    blend, path = tmp_path / "named.blend", tmp_path / "verified.csv"
+    empty.ops.wm.save_as_mainfile(filepath=str(blend))
+    place = ("--location", 0, -5, 19, "--extent", 3, "--verify", path)
+    assert command("reconstruct", blend, "--target", name, *place)[0] == 0
+    (row,) = rows_of(path)
+    assert (row["source"], row["target"]) == (f"'{name}", f"'{name}")
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda record: record.__delitem__("method"),
+        lambda record: record.__setitem__("k1_std", "words"),
+        lambda record: record.__setitem__("method", 7),
+    ],
+)
+def test_an_edited_patch_is_a_sentence_in_its_row(empty, probes, tmp_path, edit):
+    patch = probes[0].children[0]
+    edit(patch["tactile"])
+    path = tmp_path / "probes.csv"
+    assert empty.ops.tactile.export_table(filepath=str(path)) == {"FINISHED"}
+    rows = {row["probe"]: row for row in rows_of(path)}
+    assert rows[probes[0].name]["message"].endswith("is no longer a complete patch: touch again")
+    assert rows[probes[0].name]["k1 [1/mm]"] == ""
+    assert float(rows[probes[1].name]["k1 [1/mm]"]) < 0.0
+    assert rows[probes[1].name]["status"] == "ok"

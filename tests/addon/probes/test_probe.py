@@ -93,6 +93,20 @@ def test_a_target_that_is_no_mesh_and_a_scale_that_is_none_are_messages(empty, b
     assert "Traceback" not in "".join(capfd.readouterr())
 
 
+@pytest.mark.parametrize("what", ["location", "scale", "rotation_euler"])
+def test_a_target_that_is_nowhere_is_named_and_comes_back(empty, ball, capfd, what):
+    probe, patch = pick(empty)
+    before = np.array(getattr(ball, what))
+    setattr(ball, what, (float("nan"), 1.0, 1.0))
+    update(empty)
+    said = '"Sphere" has a location, rotation or scale that is not finite: set it again'
+    assert probe.tactile_probe.message == said
+    setattr(ball, what, before)
+    update(empty)
+    assert_touches(probe, patch)
+    assert "Traceback" not in "".join(capfd.readouterr())
+
+
 def state_but_status(patch):
     """The state without the status and message, which a failed touch changes in an earlier patch."""
     report, *meshes = state(patch)

@@ -380,7 +380,7 @@ def make_distant(bpy, obj):
         (make_faceless, "no faces to touch"),
         (make_curve, '"Sphere" is not a mesh: select a mesh object, or convert this one'),
         (make_infinite, "not finite"),
-        (make_nowhere, "reaches farther than"),
+        (make_nowhere, "that is not finite: set it again"),
         (make_flat, "a scale of 0"),
         (make_disabled, "disabled in viewports"),
         (make_disabled_with_a_probe, "disabled in viewports"),

@@ -473,7 +473,7 @@ def nothing(bpy):
         (nothing, {"target": "Nobody"}, 'There is no object "Nobody"'),
         (camera, {"target": "Camera"}, '"Camera" is not a mesh'),
         (no_faces, {}, '"Sphere" has no faces to touch'),
-        (bad_vertex, {}, "vertices whose coordinates are not finite"),
+        (bad_vertex, {}, "vertices whose coordinates are not finite, 1 of 8066: delete them"),
         (zero_scale, {}, "a scale of 0 in some direction"),
         (huge, {}, "reaches farther than 1e+15 from the origin"),
         (one_vertex_far_away, {}, "reaches farther than 1e+15 from the origin"),

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The coordinates in mesh files that Blender's importers would read as 0: NaN, infinity, words, overflow."""
+
+import numpy as np
+
+from . import ply_contacts
+from .contact_rows import POINT_COLUMNS
+
+STL_HEAD = 84  # The head of a binary .stl has so many bytes, the last four of which number its triangles.
+STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+AFTER_WORD = (1, 2, 3)  # These words follow the one that begins the line of a vertex.
+LARGEST = float(np.finfo(np.float32).max)
+
+
+def unreadable(path):
+    """The number of vertices in a .ply, .stl or .obj file whose coordinates are no finite float32 numbers.
+
+    It is 0 for a file that is broken otherwise, which importers find.
+    """
+    data = path.read_bytes()
+    try:
+        return {".ply": _of_ply, ".stl": _of_stl, ".obj": _of_obj}[path.suffix.lower()](data)
+    except (ValueError, IndexError):
+        return 0
+
+
+def _of_ply(data):
+    rows, fields, is_text = ply_contacts.vertex_rows("", data)
+    if not is_text:
+        return _of_numbers(np.stack([rows[key] for key in POINT_COLUMNS], axis=1))
+    names = [name for name, _ in fields]
+    return _of_lines(rows, [names.index(key) for key in POINT_COLUMNS])
+
+
+def _of_stl(data):
+    triangles = int.from_bytes(data[STL_HEAD - 4 : STL_HEAD], "little")
+    if len(data) == STL_HEAD + triangles * STL_TRIANGLE.itemsize:
+        corners = np.frombuffer(data, STL_TRIANGLE, triangles, STL_HEAD)["corners"]
+        return _of_numbers(corners.reshape(-1, 3))
+    return _of_lines([line for line in data.splitlines() if line.lstrip().startswith(b"vertex")], AFTER_WORD)
+
+
+def _of_obj(data):
+    lines = data.replace(b"\\\n", b" ").splitlines()  # A backslash continues a line.
+    return _of_lines([line for line in lines if line.startswith((b"v ", b"v\t"))], AFTER_WORD)
+
+
+def _of_lines(lines, places):
+    """The number of lines without three finite numbers at these places."""
+    try:
+        return _of_numbers(np.loadtxt(lines, usecols=places, comments=None, ndmin=2)) if lines else 0
+    except ValueError:  # Some line has a word in place of a number.
+        return sum(_is_bad(line.split(None, max(places) + 1), places) for line in lines)
+
+
+def _is_bad(words, places):
+    try:
+        return _of_numbers(np.array([[float(words[place]) for place in places]])) > 0
+    except (ValueError, IndexError):
+        return True
+
+
+def _of_numbers(points):
+    return int(np.count_nonzero(~(np.abs(points) <= LARGEST).all(axis=1)))  # NaN fails every comparison.
