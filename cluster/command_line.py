@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from .data_set import manifest
 from .data_set.folder import DataSet
 from .data_set.options import Length, Options
 from .data_set.whole_options import WholeOptions
@@ -32,14 +33,17 @@ def main(words: Sequence[str] | None = None) -> int:
         parser.error("--dashboard: expected bokeh, which draws it: install bokeh")
     try:
         options = _whole_options(given) if given.command == "whole" else _options(given)
-        run = Run(DataSet(given.output, options.parts), options, files_of(given.objects))
-        with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:
-            if given.dashboard:
-                print(f"Dashboard: {client.dashboard_link}", file=sys.stderr)
-            if not client.scheduler_info(n_workers=1)["workers"]:
-                print("The scheduler has no workers yet: waiting for them", file=sys.stderr)
-            run.work(Engine(client, given.limit))
-        rows = summed_up(run.data_set)
+        data_set, files = DataSet(given.output, options.parts), files_of(given.objects)
+        manifest.begun(data_set, options)  # Nothing is written to the folder of another data set.
+        with data_set.claimed():
+            run = Run(data_set, options, files)
+            with _interruptible(), connected(given.scheduler, given.workers, given.dashboard) as client:
+                if given.dashboard:
+                    print(f"Dashboard: {client.dashboard_link}", file=sys.stderr)
+                if not client.scheduler_info(n_workers=1)["workers"]:
+                    print("The scheduler has no workers yet: waiting for them", file=sys.stderr)
+                run.work(Engine(client, given.limit))
+            rows = summed_up(data_set)
     except ValueError as error:
         print(f"cluster: {error}", file=sys.stderr)
         return WRONG_WORDS

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The files that the words of the command stand for."""
 
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -26,7 +27,7 @@ def _files(path: Path) -> Iterator[Path]:
     elif not path.is_file():
         raise ValueError(f'objects: there is no file or folder "{path}"')
     elif path.suffix.lower() == LIST:
-        for line in path.read_text(encoding="utf-8").splitlines():
+        for line in path.read_text(encoding="utf-8", errors="surrogateescape").splitlines():
             if line.strip().lower().endswith(LIST):
                 raise ValueError(f'objects: expected files or folders in the list "{path}", got a list')
             if line.strip():
@@ -35,3 +36,8 @@ def _files(path: Path) -> Iterator[Path]:
         yield path
     else:
         raise ValueError(f'objects: expected {", ".join(KINDS)} files, folders or .txt lists, got "{path}"')
+
+
+def printable(path: str) -> str:
+    """The path as text that can be stored; bytes that are not UTF-8 are escaped."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")

@@ -14,8 +14,12 @@ from .data_set.folder import DataSet, file_key
 from .data_set.options import Options
 from .data_set.whole_options import WholeOptions
 from .engine import Engine, Order, Outcome
+from .input_files import printable
 from .progress import Progress
 from .worker.process import FAILED, STOP
+
+TRIES = 2  # Blocks that are damaged once they are written are made again so often.
+MISNAMED = "The name of the file is not in UTF-8: rename it"
 
 
 class StoppedError(Exception):
@@ -27,10 +31,10 @@ class Run:
 
     def __init__(self, data_set: DataSet, options: Options | WholeOptions, files: list[str]) -> None:
         """Raises ValueError for the folder of another data set, and OSError if it cannot be written to."""
-        self.data_set, self.options, self.files = data_set, options, files
-        self.old = manifest.read(data_set)
-        if self.old is not None:
-            manifest.require_same(self.old, options)
+        self.data_set, self.options = data_set, options
+        self.files = [printable(path) for path in files]
+        self._misnamed = set(self.files) - set(files)
+        self.old = manifest.begun(data_set, options)
         data_set.create()
         if self.old is None:
             manifest.write(data_set, options, {})
@@ -38,7 +42,7 @@ class Run:
 
     def work(self, engine: Engine) -> None:
         """Makes what is missing. Raises ValueError for files that have changed, StoppedError and OSError."""
-        done = self.data_set.done()
+        done = self.data_set.done(self._log)
         objects = self._survey(engine, done)
         blocks = {
             f"{facts['hash']}-{block:05d}": (facts, block)
@@ -46,9 +50,21 @@ class Run:
             for block in self.options.blocks()
         }
         missing = [value for name, value in blocks.items() if name not in done]
-        self.progress.begin(sum(len(self.options.numbers(block)) for _, block in missing))
         if len(missing) < len(blocks):
             self._log(f"{len(blocks) - len(missing)} of {len(blocks)} blocks are there already")
+        for _ in range(TRIES):
+            self._make(engine, missing)
+            done = self.data_set.done(self._log)
+            missing = [value for name, value in blocks.items() if name not in done]
+            if not missing:
+                return
+        raise StoppedError(
+            f'files in "{self.data_set.folder}" are damaged as soon as they are written: use another disk'
+        )
+
+    def _make(self, engine: Engine, missing: list[tuple[dict[str, Any], int]]) -> None:
+        """Has these blocks of objects touched."""
+        self.progress.begin(sum(len(self.options.numbers(block)) for _, block in missing))
         orders = {self._label(*each): each for each in missing}
         for outcome in self._outcomes(engine, (self._order(*each) for each in missing)):
             facts, block = orders[outcome.order.label]
@@ -64,13 +80,17 @@ class Run:
         """The facts of all objects that are to be touched, each once, which also go into the manifest."""
         known = {path for path in self.files if f"{file_key(path, Path(path).stem)}-00000" in done}
         versions = manifest.versions()
-        orders = (Order(path, "survey", (path, versions)) for path in self.files if path not in known)
+        orders = (
+            Order(path, "survey", (path, versions))
+            for path in self.files
+            if path not in known | self._misnamed
+        )
         self.progress.note(f"{len(self.files) - len(known):,} files to look through")
         facts = {path: [] for path in self.files}
+        facts |= {path: [_broken(path, MISNAMED)] for path in self._misnamed - known}
         for outcome in self._outcomes(engine, orders):
             path = outcome.order.label
-            broken = {"name": Path(path).stem, "file": path, "hash": None, "trouble": outcome.value}
-            facts[path] = [broken] if outcome.how == FAILED else outcome.value
+            facts[path] = [_broken(path, outcome.value)] if outcome.how == FAILED else outcome.value
         hashes = {path: {each["name"]: each["hash"] for each in facts[path]} for path in self.files}
         if self.old is not None:
             manifest.require_same_objects(self.old, hashes)
@@ -132,6 +152,11 @@ def summed_up(data_set: DataSet) -> list[dict[str, Any]]:
     found = sorted(rows.values(), key=lambda row: (row["object"], row["file"], row["hash"] or ""))
     data_set.write_objects(found)
     return found
+
+
+def _broken(path: str, trouble: str) -> dict[str, Any]:
+    """The facts of a file that has no objects that can be touched."""
+    return {"name": Path(path).stem, "file": path, "hash": None, "trouble": trouble}
 
 
 def _title(facts: dict[str, Any]) -> str:

@@ -2,15 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The folder of a data set: a file for each task's rows, a manifest, and a file of objects at the end.
 
-Each is written under another name and then renamed, so that there are only complete files.
+Each is written under another name and then renamed, so that there are only complete files. Each file of rows
+has the checksum of all its bytes in its metadata.
 """
 
+import fcntl
+import itertools
 import json
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..extension import addon
@@ -18,7 +24,10 @@ from .columns import REPEATED, SCHEMAS, TOUCH_SCHEMA, table
 
 whole_file = addon("files.whole_file")
 SUMMARY = "summary"  # The key of a file's summary in its metadata.
-ERROR = "-error.parquet"  # Files of error rows end with this; if they are deleted, a run tries again.
+CHECKSUM, MARK = "checksum", b"sha256:"  # The key of its checksum, and what that begins with.
+NO_CHECKSUM = MARK + bytes(64).replace(b"\0", b"0")  # It stands for the checksum while that is computed.
+NAME = re.compile(r"[0-9a-f]{16}-\d{5,}(-error)?\.parquet")  # The names of files of rows.
+ERROR = "-error"  # Names of files of error rows end with this; if they are deleted, a run tries again.
 DIGITS = 16  # Hashes have so many digits.
 REPEATING = [field.name for field in TOUCH_SCHEMA if field.type == REPEATED] + ["stops.list.element"]
 
@@ -45,35 +54,65 @@ class DataSet:
         self.log = folder / "log.txt"
 
     def create(self) -> None:
-        """Makes the folder, and removes the unfinished files of an interrupted run.
-
-        Raises OSError, with a sentence, if nothing can be written to it.
-        """
+        """Makes the folder. Raises OSError, with a sentence, if nothing can be written to it."""
         try:
             self.parts.mkdir(parents=True, exist_ok=True)
-            self._tidy()
+            self.log.touch()
         except OSError as error:
             raise OSError(
                 f'cannot write to the folder "{self.folder}" ({error.strerror}): choose another'
             ) from error
 
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Makes the folder, and within this context no other run may work in it.
+
+        The system gives the folder free when this process ends, however it does. Raises OSError, with a
+        sentence, if another run has it, or nothing can be written to it.
+        """
+        self.create()
+        with self.log.open("ab") as log:
+            try:
+                fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                raise OSError(
+                    f'another run is at work in "{self.folder}": wait for it, or use another folder'
+                ) from error
+            self._tidy()
+            yield
+
     def _tidy(self) -> None:
-        """Removes files that were not finished because somebody was interrupted while writing."""
-        for left in self.parts.glob(".*.parquet"):
+        """Removes files that were not finished because somebody was killed while writing."""
+        hidden = self.parts.glob(".*.parquet"), self.folder.glob(f".*{whole_file.UNFINISHED}*")
+        for left in itertools.chain(*hidden):
             left.unlink(missing_ok=True)
 
     def block_path(self, key: str, block: int) -> Path:
         """The path of a block's file."""
         return self.parts / f"{key}-{block:05d}.parquet"
 
-    def done(self) -> set[str]:
-        """The names of all files of rows, up to the block's number."""
-        names = (path.name for path in self.parts.glob("[!.]*.parquet"))
-        return {name.removesuffix(ERROR).removesuffix(".parquet") for name in names}
+    def files(self) -> list[Path]:
+        """All files of rows, sorted by name. Raises ValueError, with a sentence, if there is another file."""
+        found = sorted(self.parts.glob("[!.]*.parquet"))
+        for path in found:
+            if not (NAME.fullmatch(path.name) and path.is_file()):
+                raise ValueError(f'"{path}" does not belong to this data set: move it elsewhere')
+        return found
+
+    def done(self, log: Callable[[str], None]) -> set[str]:
+        """The names of all files of rows, up to the block's number; damaged ones are removed and logged."""
+        names = set()
+        for path in self.files():
+            if is_whole(path.read_bytes()):
+                names.add(path.name.removesuffix(".parquet").removesuffix(ERROR))
+            else:
+                log(f'"{path}" is damaged, and is made again')
+                path.unlink()
+        return names
 
     def summaries(self) -> Iterator[dict[str, Any]]:
         """The summaries of all files of rows, in the order of their names."""
-        for path in sorted(self.parts.glob("[!.]*.parquet")):
+        for path in self.files():
             yield json.loads(pq.read_schema(path).metadata[SUMMARY.encode()])
 
     def write_errors(self, facts: dict[str, Any], block: int | None, numbers: range, message: str) -> None:
@@ -82,7 +121,7 @@ class DataSet:
         rows = [common | {"touch": i, "status": "error", "message": message} for i in numbers]
         key = facts.get("hash") or file_key(facts["file"], facts["name"])
         path = self.block_path(key, block or 0)
-        write_block(path.with_name(path.stem + ERROR), rows, facts, 0.0, {"error": len(rows)})
+        write_block(path.with_stem(path.stem + ERROR), rows, facts, 0.0, {"error": len(rows)})
 
     def write_objects(self, rows: Sequence[dict[str, Any]]) -> None:
         """Writes the file of objects, which is the last one."""
@@ -103,7 +142,24 @@ def write_block(
     return summary
 
 
-def _write(path: Path, content: Any) -> None:
+def _write(path: Path, content: pa.Table) -> None:
+    data = pa.BufferOutputStream()
+    # Numbers rarely repeat; as a dictionary they would take more room, and half as long again to write.
+    with pq.ParquetWriter(data, content.schema, compression="zstd", use_dictionary=REPEATING) as writer:
+        writer.write_table(content)
+        writer.add_key_value_metadata({CHECKSUM: NO_CHECKSUM.decode()})
+    blank = data.getvalue().to_pybytes()
     with whole_file.replacing(path) as temporary:
-        # Numbers rarely repeat; as a dictionary they would take more room, and half as long again to write.
-        pq.write_table(content, temporary, compression="zstd", use_dictionary=REPEATING)
+        temporary.write_bytes(blank.replace(NO_CHECKSUM, _checksum(blank)))
+
+
+def is_whole(data: bytes) -> bool:
+    """Whether a file of rows with these bytes is as it was written."""
+    at = data.rfind(MARK)
+    end = at + len(NO_CHECKSUM)
+    return at >= 0 and data[at:end] == _checksum(data[:at] + NO_CHECKSUM + data[end:])
+
+
+def _checksum(blank: bytes) -> bytes:
+    """The checksum of a file in which NO_CHECKSUM stands for it."""
+    return MARK + sha256(blank).hexdigest().encode()

@@ -10,7 +10,7 @@ from .. import extension
 from .folder import DataSet, whole_file
 from .options import Options
 
-FORMAT = 1
+FORMAT = 2
 PACKAGES = ("bpy", "numpy", "scipy")
 
 
@@ -23,21 +23,33 @@ def versions() -> dict[str, str]:
 def read(data_set: DataSet) -> dict[str, Any] | None:
     """The manifest of a data set that was begun, or None if there is none.
 
-    Raises ValueError, with a sentence, if it cannot be read.
+    Raises ValueError, with a sentence, if it cannot be read, or there are rows without one.
     """
     if not data_set.manifest.exists():
+        if data_set.files():
+            raise ValueError(
+                f'"{data_set.folder}" has rows and no manifest.json that says how they were made: put it '
+                "back, or use another folder"
+            )
         return None
     try:
         found = json.loads(data_set.manifest.read_text(encoding="utf-8"))
-        return {key: dict(found[key]) for key in ("versions", "options", "files")}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        found = {key: dict(found[key]) for key in ("versions", "options", "files")}
+        hashes = [value for objects in found["files"].values() for value in objects.values()]
+        if not all(value is None or isinstance(value, str) for value in hashes):
+            raise TypeError
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(
             f'"{data_set.manifest}" is not the manifest of a data set: use another folder'
         ) from error
+    return found
 
 
-def require_same(old: dict[str, Any], options: Options) -> None:
-    """Raises ValueError if a data set was made by other versions or with other options."""
+def begun(data_set: DataSet, options: Options) -> dict[str, Any] | None:
+    """What `read` returns. Raises ValueError if the data set was made by other versions or options."""
+    old = read(data_set)
+    if old is None:
+        return None
     for kind, now in (("versions", versions()), ("options", options.to_dict())):
         for name in sorted(now.keys() | old[kind].keys()):
             was, wanted = old[kind].get(name), now.get(name)
@@ -46,6 +58,7 @@ def require_same(old: dict[str, Any], options: Options) -> None:
                     f"{name}: this data set was begun with {_said(was)}, and it is now "
                     f"{_said(wanted)}: use the same again, or another folder"
                 )
+    return old
 
 
 def require_same_objects(old: dict[str, Any], files: dict[str, Any]) -> None:

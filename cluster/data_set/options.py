@@ -10,6 +10,8 @@ import numpy as np
 
 from ..extension import core
 
+LARGEST_SEED = 2**63 - 1  # The column of seeds has 64 bits.
+
 
 @dataclass(frozen=True)
 class Length:
@@ -49,6 +51,13 @@ class Lengths:
         return None if words is None else Length.of(words).on(size)
 
 
+def require_seed(seed: int) -> None:
+    """Raises ValueError, with a sentence, for a seed that the column of seeds does not hold."""
+    if not 0 <= seed <= LARGEST_SEED:
+        bound = "of 0 or more" if seed < 0 else f"up to {LARGEST_SEED}"
+        raise ValueError(f"seed: expected a number {bound}, got {seed}")
+
+
 @dataclass(frozen=True)
 class Options(Lengths):
     """Everything besides the object on which rows depend; lengths are words, see Length, None to be chosen.
@@ -77,9 +86,10 @@ class Options(Lengths):
 
     def __post_init__(self) -> None:
         """Raises ValueError, with a sentence, for options that no touch can have."""
-        for name, least in (("touches", 1), ("block", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name}: expected a number of {least} or more, got {getattr(self, name)}")
+        require_seed(self.seed)
+        for name in ("touches", "block"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name}: expected a number of 1 or more, got {getattr(self, name)}")
         if len(self.tilts) != len(self.azimuths):
             raise ValueError(
                 f"tilts: expected as many as there are planes, {len(self.azimuths)}, got {len(self.tilts)}"

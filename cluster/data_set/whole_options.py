@@ -5,7 +5,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from .options import Length, Lengths
+from .options import Length, Lengths, require_seed
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,7 @@ class WholeOptions(Lengths):
 
     def __post_init__(self) -> None:
         """Raises ValueError, with a sentence, for options that no object can be touched with."""
-        if self.seed < 0:
-            raise ValueError(f"seed: expected a number of 0 or more, got {self.seed}")
+        require_seed(self.seed)
         if self.tolerance is None:
             return
         tolerance, noise = Length.of(self.tolerance), Length.of(self.noise)

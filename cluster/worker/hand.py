@@ -26,6 +26,8 @@ from ..data_set.whole_options import WholeOptions
 from . import objects, surfaces, touches
 from .process import DONE, FAILED, STOP
 
+_writing = threading.Lock()  # Whoever has it may write a file: none is left unfinished where it ends.
+
 
 class HopelessError(Exception):
     """Nothing can be done on this machine, whatever the object."""
@@ -77,7 +79,8 @@ class Hand:
 
 def _written(path: str, *content: Any) -> dict[str, Any]:
     try:
-        return write_block(Path(path), *content)
+        with _writing:
+            return write_block(Path(path), *content)
     except OSError as error:
         raise HopelessError(str(error)) from error
 
@@ -113,6 +116,7 @@ def _listen(connection: Connection, orders: "queue.SimpleQueue[Any]") -> None:
         try:
             orders.put(connection.recv())
         except (EOFError, OSError):
+            _writing.acquire()
             os._exit(0)  # Nobody waits for the order any more.
 
 

@@ -159,6 +159,7 @@ def test_a_list_that_names_itself_is_refused(command, tmp_path):
         ([__file__], "objects: expected .ply, .stl, .obj, .blend files, folders or .txt lists, got"),
         ([".ci"], "objects: expected .ply, .stl, .obj, .blend files, got folders or lists without any"),
         (["pebble", "--seed", "-1"], "seed: expected a number of 0 or more, got -1"),
+        (["pebble", "--seed", "9" * 30], "seed: expected a number up to 9223372036854775807, got 99999999"),
         (["pebble", "--touches", "0"], "expected a number of 1 or more, got 0"),
         (["pebble", "--limit", "nan"], "expected a number above 0, got nan"),
         (

@@ -314,6 +314,132 @@ def test_a_full_disk_ends_the_run_and_loses_nothing(command, objects, plain, tmp
     assert rows_of(tmp_path) == rows_of(plain)
 
 
+def cut(path):
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def flip(path):
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def flip_footer(path):
+    data = path.read_bytes()
+    at = data.index(b'"seconds": ') + 11
+    path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+
+
+def foreign(path):
+    import pyarrow as pa
+
+    pq.write_table(pa.table({"a": [1]}), path)
+
+
+@pytest.mark.parametrize("damage", [Path.touch, cut, flip, flip_footer, foreign])
+def test_a_damaged_block_is_named_and_made_again(command, objects, plain, tmp_path, damage):
+    for path in (plain / "manifest.json", *blocks_of(plain)):
+        target = tmp_path / path.relative_to(plain)
+        target.parent.mkdir(exist_ok=True)
+        target.write_bytes(path.read_bytes())
+    broken = blocks_of(tmp_path)[4]
+    if damage is Path.touch:
+        broken.unlink()
+    damage(broken)
+    code, _, error = command(objects, *FEW, "--output", tmp_path)
+    assert code == 0, error
+    assert f'"{broken}" is damaged, and is made again' in error and "8 of 9 blocks are there already" in error
+    assert rows_of(tmp_path) == rows_of(plain)
+    assert f'"{broken}" is damaged' in (tmp_path / "log.txt").read_text()
+
+
+def test_a_block_that_is_damaged_during_the_run_is_made_again(
+    command, objects, plain, tmp_path, in_the_middle
+):
+    in_the_middle(tmp_path, lambda: cut(blocks_of(tmp_path)[0]))
+    code, _, error = command(objects, *FEW, "--output", tmp_path)
+    assert code == 0 and "is damaged, and is made again" in error
+    assert rows_of(tmp_path) == rows_of(plain)
+
+
+def test_rows_of_something_else_are_refused_by_name(command, objects, tmp_path):
+    words = (objects / "pebble.ply", "--touches", "3", "--output", tmp_path)
+    assert command(*words)[0] == 0
+    other = tmp_path / "touches" / "mine.parquet"
+    foreign(other)
+    code, _, error = command(*words)
+    assert code == 2 and f'"{other}" does not belong to this data set: move it elsewhere' in error
+    other.unlink()
+    (tmp_path / "manifest.json").unlink()
+    code, _, error = command(*words, "--seed", "1")
+    assert code == 2 and "has rows and no manifest.json that says how they were made: put it back" in error
+    assert len(blocks_of(tmp_path)) == 1
+
+
+@pytest.mark.parametrize("files", [{"a.ply": 7}, {"a.ply": {"a": 7}}, [["a.ply", "hash"]]])
+def test_a_manifest_of_something_else_is_refused(command, objects, tmp_path, files):
+    import json
+
+    words = (objects / "pebble.ply", "--touches", "3", "--output", tmp_path)
+    assert command(*words)[0] == 0
+    kept = json.loads((tmp_path / "manifest.json").read_text())
+    (tmp_path / "manifest.json").write_text(json.dumps(kept | {"files": files}))
+    code, _, error = command(*words)
+    assert code == 2 and "is not the manifest of a data set: use another folder" in error
+    assert "Traceback" not in error
+
+
+def test_a_second_run_in_the_same_folder_is_refused_until_the_first_has_ended(
+    command, objects, plain, tmp_path
+):
+    run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")
+    wait_for(lambda: blocks_of(tmp_path))
+    os.killpg(run.pid, signal.SIGSTOP)
+    before = sorted(tmp_path.rglob("*"))
+    code, _, error = command(objects, *FEW, "--output", tmp_path)
+    assert code == 1 and f'another run is at work in "{tmp_path}": wait for it, or use another' in error
+    assert sorted(tmp_path.rglob("*")) == before
+    os.killpg(run.pid, signal.SIGKILL)
+    run.communicate()
+    assert command(objects, *FEW, "--output", tmp_path)[0] == 0
+    assert rows_of(tmp_path) == rows_of(plain) and nothing_is_aside(tmp_path)
+
+
+def test_a_name_that_is_not_utf_8_costs_its_file_alone(command, objects, tmp_path):
+    (tmp_path / "objects").mkdir()
+    for name in (b"good.ply", b"caf\xe9.ply"):
+        with open(os.fsencode(tmp_path / "objects") + b"/" + name, "wb") as file:
+            file.write((objects / "pebble.ply").read_bytes())
+    words = (tmp_path / "objects", "--touches", "3", "--output", tmp_path / "set")
+    for _ in range(2):
+        code, output, error = command(*words)
+        assert code == 3 and "Traceback" not in error
+        assert "3 errors: The name of the file is not in UTF-8: rename it" in output
+        bad, good = pq.read_table(tmp_path / "set" / "objects.parquet").to_pylist()
+        assert (good["ok"], bad["error"], bad["object"]) == (3, 3, r"caf\xe9")
+
+
+def test_a_worker_whose_run_is_gone_finishes_the_file_that_it_writes(objects, plain, tmp_path):
+    import json
+
+    from cluster.data_set import manifest
+    from cluster.worker.process import HandProcess
+
+    asked = json.loads((plain / "manifest.json").read_text())["options"]
+    for tenth in range(4):
+        hand = HandProcess()
+        _, (facts,) = hand.ask(100.0, "survey", str(objects / "pebble.ply"), manifest.versions())
+        folder = tmp_path / str(tenth) / "touches"
+        folder.mkdir(parents=True)
+        order = (100.0, "touch", (facts, asked, 0, str(folder / "block.parquet")))
+        hand._connection.send(order)
+        wait_for(lambda folder=folder: list(folder.iterdir()))  # It has begun to write.
+        hand._connection.close()
+        hand._process.wait(10.0)
+        assert [path.name for path in folder.iterdir()] == ["block.parquet"]
+        hand._said.close()
+
+
 @pytest.mark.parametrize("ended", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_ends_cleanly_and_goes_on_later(command, objects, plain, tmp_path, ended):
     run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")

@@ -160,6 +160,7 @@ def test_touches_are_not_mixed_with_surfaces(command, surfaces):
     [
         (["--noise", "1%"], "tolerance: expected the noise 1% or more, got 0.4%"),
         (["--seed", "-1"], "seed: expected a number of 0 or more, got -1"),
+        (["--seed", "9" * 30], "seed: expected a number up to 9223372036854775807, got 99999999"),
     ],
 )
 def test_wrong_words_are_refused_before_anything_is_made(tmp_path, capfd, words, sentence):
