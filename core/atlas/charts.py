@@ -24,6 +24,7 @@ REACH = 0.5  # A patch is asked about places up to this share of its radius abov
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius beside the normal at its foot has no foot.
+STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
 CHUNK = 24_000  # So many pairs of a place and a patch fit into the processor's cache at once.
 
 
@@ -155,7 +156,7 @@ class Charts:
         std = self.stds_at(foot_x, foot_y, node) * steep
         normal = self._turned(node, np.array([-hx * steep, -hy * steep, steep]))
         pairs = Pairs(place, node, share, distance * radius, normal, std * radius)
-        return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[node]))
+        return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[node]) & (steep > STEEPEST))
 
     def _turned(self, node: NDArray[np.intp], local: Array) -> Array:
         """Directions (3, m) in the frames of patches, as the caller sees them, (m, 3)."""

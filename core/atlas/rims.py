@@ -3,7 +3,8 @@
 """Where a patch ends, as a finger feels it that taps along rays from the middle of the patch.
 
 Between the ends of curves a domain may bulge beyond a crease or across a hole, and at a crease curves end a
-step early. On a flat wall the patch goes on beyond its domain until the wall ends.
+step early. On a flat wall the patch goes on beyond its domain until the wall ends. Where a patch turns away
+from its own plane, its heights are no longer those of the surface, and other patches are better.
 """
 
 import math
@@ -22,16 +23,17 @@ from .join import FARTHEST_RIM
 TAPS = 48  # The finger taps along so many rays,
 INNER = (0.25, 0.5, 0.75, 1.0, FARTHEST_RIM)  # at these shares of the domain's radius,
 OUTER = FARTHEST_RIM * 1.12 ** np.arange(1, 7)  # and at these where the wall is flat.
-FLAT = 6.0  # It is flat where the finger is nearer to the continued patch by this factor than it has to be.
+FLAT = 3.0  # It is flat where the finger is nearer to the continued patch by this factor than it has to be.
 HALVINGS = 5  # So many halvings find where a patch ends,
 LEAST_RIM = 0.02  # which is at least this share of its largest radius away.
+STEEP = 0.7  # A patch ends where it is steeper, this cosine to its own plane.
 INWARD = 0.98  # A corner is felt at this share of its radius.
 NARROWEST = 5.0  # A patch reaches at most so many times as far as it is wide.
 SLOPE = 1e-3  # Slopes are differences over this share of the radius.
 
 
 def felt_rim(r: Reconstruction, finger: Finger, near: float) -> Array:
-    """The radii (AZIMUTHS,) of a patch, in unit radius, up to where the surface turns away from it.
+    """The radii (AZIMUTHS,) of a patch, in unit radius, up to where the surface or the patch turns away.
 
     near : the finger feels the patch where the surface is within this length of it
     """
@@ -105,8 +107,9 @@ def _offsets(r: Reconstruction, finger: Finger, near: float, xy: Array) -> Array
     z, right, ahead = r.height(np.append(x, [x + step, x]), np.append(y, [y, y + step])).reshape(3, -1)
     up = np.stack([z - right, z - ahead, np.full(len(z), step)], axis=1) @ r.frame.axes.T
     up /= np.linalg.norm(up, axis=1, keepdims=True)
-    found = []
-    for p, n in zip(r.frame.to_world(np.stack([x, y, z], axis=1)).tolist(), up.tolist(), strict=True):
-        contact = finger.near(vector_of(p), vector_of(n), near)
-        found.append(math.inf if contact is None else math.dist(p, contact[0]))
-    return np.array(found)
+    found = np.full(len(z), np.inf)
+    places = r.frame.to_world(np.stack([x, y, z], axis=1)).tolist()
+    for i in np.flatnonzero(up @ r.frame.axes[:, 2] > STEEP):
+        contact = finger.near(vector_of(places[i]), vector_of(up[i]), near)
+        found[i] = math.inf if contact is None else math.dist(places[i], contact[0])
+    return found

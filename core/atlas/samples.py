@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from .charts import Charts
+from .charts import STEEPEST, Charts
 from .field import facing_alike, node_weights, weights_of
 from .indicator import LAYERS, Indicator, solved
 
@@ -17,7 +17,6 @@ from .indicator import LAYERS, Indicator, solved
 PITCH = 1.2  # Samples of a patch are so many cells apart.
 # Weights of other patches are those of one sample for at most PARTS^2 around, ACROSS^2 or more a patch.
 ACROSS, PARTS = 12, 8
-STEEPEST = 0.1  # Where a patch is steeper, this cosine to its own plane, it has no samples.
 FINEST, COARSEST = 1.0 / 200.0, 1.0 / 80.0  # Cells are between these shares of the size.
 TOLERANCES = 5.0  # A cell is at most so many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall if the cosine between their normals is less.

@@ -75,10 +75,10 @@ def test_of_places_that_bring_as_much_but_for_rounding_the_first_is_next(frontie
 
 def test_nothing_goes_on_from_a_narrow_patch_and_a_narrower_one_is_left_out(first):
     found, radius = Frontier(Finger(BALL, 1.0), NEAR), first.radius
-    assert found.add(first, goes_on=1.2 * radius)
+    assert found.add(first, goes_on=2.0 * radius)
     assert not found.queue
     assert len(found.charts.radii) == len(found.taps) == 1
-    assert not found.add(first, least=1.2 * radius)
+    assert not found.add(first, least=2.0 * radius)
     assert len(found.charts.radii) == len(found.taps) == 1
 
 
