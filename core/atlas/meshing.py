@@ -24,7 +24,8 @@ CELL = 2.1  # A cube of the lattice is as long as so many edges of the mesh.
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
 SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
 BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator are bridged.
-FAR, STEPS = 0.05, 4  # Vertices that were off by more cells are moved onto the surface again, so often.
+# Vertices that were off by more cells, or are of folded triangles, are moved onto the surface again, so often.
+FAR, STEPS = 0.05, 4
 WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none is lost between them.
 ROOM = 5.0  # The surface is within so many cells of the level of the indicator.
 HALVINGS = 5  # So many halvings of an edge of the lattice find the level.
@@ -202,12 +203,25 @@ def _settled(
         yield 0.5
     surface = yield from _onto(charts, indicator, vertices, up, room)
     for _ in range(STEPS):
-        far = np.flatnonzero(np.abs(surface.distance) > FAR * indicator.cell)
-        moved = vertices[far]
-        again = yield from _onto(charts, indicator, moved, up[far], room)
+        far = np.abs(surface.distance) > FAR * indicator.cell
+        folded = _folded(vertices, surface.normal, triangles)
+        if folded.any():
+            vertices[folded] = evened(vertices, surface.normal, triangles)[folded]
+        some = np.flatnonzero(far | folded)
+        moved = vertices[some]
+        again = yield from _onto(charts, indicator, moved, up[some], room)
         for old, new in zip((vertices, *surface), (moved, *again), strict=True):
-            old[far] = new
+            old[some] = new
     return vertices, surface
+
+
+def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.bool_]:
+    """Which vertices (n,) are of triangles that face against the normals (n, 3) of the surface."""
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    against = np.einsum("mi,mi->m", np.cross(b - a, c - a), normals[triangles].sum(axis=1)) < 0.0
+    folded = np.zeros(len(vertices), dtype=bool)
+    folded[triangles[against]] = True
+    return folded
 
 
 def _onto(

@@ -122,8 +122,8 @@ def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered,
 
 @pytest.fixture
 def cylinder(empty):
-    """A cylinder, whose first join misses something, so that it is touched again."""
-    empty.ops.mesh.primitive_cylinder_add()
+    """A cylinder of eight sides, whose first join misses something, so that it is touched again."""
+    empty.ops.mesh.primitive_cylinder_add(vertices=8)
     return empty.context.object
 
 
