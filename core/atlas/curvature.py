@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curvatures of the joined surface, by quadrics that are as wide as its deviation asks for.
+
+Beside the paper. The gradient of a quadric is linear, so its normals are n0 - W x along the tangent plane
+near a place, where W is the Weingarten map. It is fitted to the normals of the mesh there by weighted least
+squares. For a ball that is exact at any width; heights would need terms beyond those of a quadric.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import Array
+from .meshing import LEAST_DIVISOR, Mesh
+
+# python -m benchmarks.atlas --curvatures chose these.
+SAGITTA = 80.0  # A quadric is so wide that its sagitta is so many deviations of the surface.
+LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
+EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nearest 128 at most, 6 at least.
+SHARP = 0.966  # Beside a crease normals turn by 15 degrees along an edge, which is half of what it turns.
+ALIKE = 0.5  # Places are on one sheet if the cosine between their normals is more, and the sum of both
+ACROSS = 0.5  # has less of the way between them, which is 0 on a ball.
+BY_STD, BY_MISFIT = 1.15, 0.4  # The shares of the surface's deviation and of the misfit in that of H.
+LEAST_SQUARE = 1e-9  # Places in a row, which determine no quadric, have smaller squares beside it.
+
+
+class Sheets(NamedTuple):
+    """The mesh of a surface as places to which quadrics are fitted.
+
+    tree : the KD-tree of n places
+    normals, stds : (n, 3) and (n,), the normals there and the deviations of the surface
+    ends : the KD-tree of the vertices beside creases and rims
+    edge : the length of the mesh's edges
+    """
+
+    tree: Any
+    normals: Array
+    stds: Array
+    ends: Any
+    edge: float
+
+
+class Curvatures(NamedTuple):
+    """Gaussian and mean curvature, and their standard deviations, (n,) each; 0 and inf where unknown."""
+
+    gauss: Array
+    mean: Array
+    gauss_std: Array
+    mean_std: Array
+
+
+class _Fit(NamedTuple):
+    """Gaussian and mean curvature, and the misfit of the normals as a root mean square, (n,) each."""
+
+    gauss: Array
+    mean: Array
+    misfit: Array
+
+
+def sheets_of(mesh: Mesh) -> Sheets:
+    """The places and the ends of a mesh."""
+    from scipy.spatial import cKDTree
+
+    normals, sides = mesh.normals, mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    sharp = np.einsum("ni,ni->n", normals[sides[:, 0]], normals[sides[:, 1]]) < SHARP
+    ends = np.unique(np.concatenate([sides[sharp], mesh.border]))
+    trees = cKDTree(mesh.vertices[::EVERY]), cKDTree(mesh.vertices[ends])
+    return Sheets(trees[0], normals[::EVERY], mesh.std[::EVERY], trees[1], mesh.edge)
+
+
+def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
+    """The curvatures at points (n, 3) of the surface with unit normals (n, 3).
+
+    They are unknown where a crease, a rim or the end of the surface is nearer than the least radius.
+    """
+    distance, at = sheets.tree.query(points, min(PLACES, sheets.tree.n))
+    least, ends = LEAST * sheets.edge, sheets.ends.query(points)[0]
+    most = np.maximum(np.minimum(ends, distance[:, -1]), least)
+    distance, local = _around(sheets, points, normals, distance, at)
+    std = sheets.stds[at[:, 0]]
+    first = _fitted(distance, local, np.minimum(2.0 * least, most))
+    largest = np.abs(first.mean) + np.sqrt(np.maximum(first.mean**2 - first.gauss, 0.0))
+    radius = np.sqrt(2.0 * SAGITTA * std / np.maximum(largest, LEAST_DIVISOR)).clip(least, most)
+    fit = _fitted(distance, local, radius)
+    known = (ends >= least) & ((distance < radius[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
+    gauss, mean, misfit = (np.where(known, values, 0.0) for values in fit)
+    mean_std = np.where(known, np.hypot(BY_STD * std / radius, BY_MISFIT * misfit) / radius, np.inf)
+    # For errors of heights that are alike in all directions, the variances of z_xx, z_yy and z_xy are as
+    # 3 : 3 : 1 and the covariance of the first two as 1, so that of H is as 2.
+    gauss_std = mean_std * np.sqrt(6.0 * mean**2 - 2.0 * gauss + 3.0 * mean_std**2)
+    return Curvatures(gauss, mean, gauss_std, mean_std)
+
+
+def _around(sheets: Sheets, points: Array, normals: Array, distance: Array, at: Array) -> tuple[Array, Array]:
+    """Distances (n, k) of the places `at` (n, k), inf on other sheets, and these places in local terms.
+
+    Those are (n, k, 4): two coordinates along the tangent plane, and two components of the normal.
+    """
+    off, ups = sheets.tree.data[at] - points[:, None], sheets.normals[at]
+    alike = np.einsum("nki,ni->nk", ups, normals) > ALIKE
+    across = np.abs(np.einsum("nki,nki->nk", off, ups + normals[:, None]))
+    x = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), LEAST_DIVISOR)
+    plane = np.stack([x, np.cross(normals, x)], axis=2)
+    same = alike & (across <= ACROSS * distance)
+    return np.where(same, distance, np.inf), np.concatenate([off @ plane, ups @ plane], axis=2)
+
+
+def _fitted(distance: Array, local: Array, radius: Array) -> _Fit:
+    """Quadrics of the radii (n,) fitted to places at distances (n, k) with local terms (n, k, 4)."""
+    weights = np.maximum(1.0 - (distance / radius[:, None]) ** 2, 0.0) ** 2
+    weights /= np.maximum(weights.sum(axis=1, keepdims=True), LEAST_DIVISOR)
+    terms = local - np.einsum("nk,nki->ni", weights, local)[:, None]
+    terms[:, :, :2] /= radius[:, None, None]
+    moments = np.swapaxes(weights[:, :, None] * terms, 1, 2) @ terms
+    square, mixed = moments[:, :2, :2] + LEAST_SQUARE * np.eye(2), moments[:, :2, 2:]
+    slopes = np.linalg.solve(square, mixed)
+    left = np.einsum("nii->n", moments[:, 2:, 2:]) - np.einsum("nij,nij->n", slopes, mixed)
+    (a, b), (c, d) = -np.moveaxis(slopes, 0, -1) / radius
+    return _Fit(a * d - 0.25 * (b + c) ** 2, 0.5 * (a + d), np.sqrt(np.maximum(left, 0.0)))
