@@ -14,7 +14,7 @@ import numpy as np
 from ..arguments import Array
 from .meshing import LEAST_DIVISOR, Mesh
 
-# python -m benchmarks.atlas --curvatures chose these.
+# python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is so many deviations of the surface.
 LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
 EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nearest 128 at most, 6 at least.
@@ -22,7 +22,7 @@ SHARP = 0.966  # Beside a crease normals turn by 15 degrees along an edge, which
 ALIKE = 0.5  # Places are on one sheet if the cosine between their normals is more, and the sum of both
 ACROSS = 0.5  # has less of the way between them, which is 0 on a ball.
 BY_STD, BY_MISFIT = 1.15, 0.4  # The shares of the surface's deviation and of the misfit in that of H.
-LEAST_SQUARE = 1e-9  # Places in a row, which determine no quadric, have smaller squares beside it.
+LEAST_SQUARE = 1e-9  # So much, in unit radius, is added to the squares, because places may be in a row.
 
 
 class Sheets(NamedTuple):
@@ -72,18 +72,19 @@ def sheets_of(mesh: Mesh) -> Sheets:
 def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
     """The curvatures at points (n, 3) of the surface with unit normals (n, 3).
 
-    They are unknown where a crease, a rim or the end of the surface is nearer than the least radius.
+    They are unknown where a crease or a rim is nearer than the least radius, and where no surface is near.
     """
     distance, at = sheets.tree.query(points, min(PLACES, sheets.tree.n))
     least, ends = LEAST * sheets.edge, sheets.ends.query(points)[0]
     most = np.maximum(np.minimum(ends, distance[:, -1]), least)
     distance, local = _around(sheets, points, normals, distance, at)
     std = sheets.stds[at[:, 0]]
-    first = _fitted(distance, local, np.minimum(2.0 * least, most))
+    near = np.minimum(2.0 * least, most)
+    first = _fitted(distance, local, near)
     largest = np.abs(first.mean) + np.sqrt(np.maximum(first.mean**2 - first.gauss, 0.0))
     radius = np.sqrt(2.0 * SAGITTA * std / np.maximum(largest, LEAST_DIVISOR)).clip(least, most)
     fit = _fitted(distance, local, radius)
-    known = (ends >= least) & ((distance < radius[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
+    known = (ends >= least) & ((distance < near[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
     gauss, mean, misfit = (np.where(known, values, 0.0) for values in fit)
     mean_std = np.where(known, np.hypot(BY_STD * std / radius, BY_MISFIT * misfit) / radius, np.inf)
     # For errors of heights that are alike in all directions, the variances of z_xx, z_yy and z_xy are as
