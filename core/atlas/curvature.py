@@ -12,13 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import Array
+from ..patch.tetrahedra import Indices
+from .creases import SHARP
 from .meshing import LEAST_DIVISOR, Mesh
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is so many deviations of the surface.
 LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
 EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nearest 128 at most, 6 at least.
-SHARP = 0.966  # Beside a crease normals turn by 15 degrees along an edge, which is half of what it turns.
+TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.
 ALIKE = 0.5  # Places are on one sheet if the cosine between their normals is more, and the sum of both
 ACROSS = 0.5  # has less of the way between them, which is 0 on a ball.
 BY_STD, BY_MISFIT = 1.15, 0.4  # The shares of the surface's deviation and of the misfit in that of H.
@@ -62,11 +64,30 @@ def sheets_of(mesh: Mesh) -> Sheets:
     """The places and the ends of a mesh."""
     from scipy.spatial import cKDTree
 
-    normals, sides = mesh.normals, mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    sharp = np.einsum("ni,ni->n", normals[sides[:, 0]], normals[sides[:, 1]]) < SHARP
-    ends = np.unique(np.concatenate([sides[sharp], mesh.border]))
-    trees = cKDTree(mesh.vertices[::EVERY]), cKDTree(mesh.vertices[ends])
+    normals = mesh.normals
+    trees = cKDTree(mesh.vertices[::EVERY]), cKDTree(mesh.vertices[np.unique(_ends(mesh, normals))])
     return Sheets(trees[0], normals[::EVERY], mesh.std[::EVERY], trees[1], mesh.edge)
+
+
+def _ends(mesh: Mesh, normals: Array) -> Indices:
+    """The edges (k, 2) of a mesh on its rims, and those where its triangles and the normals (n, 3) turn.
+
+    A folded triangle does not turn the normals beside it, which are those of larger triangles, too.
+    """
+    sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    keys = np.minimum(*sides.T) * len(mesh.vertices) + np.maximum(*sides.T)
+    order = np.argsort(keys, kind="stable")  # It is the fastest here.
+    first = np.flatnonzero(np.diff(keys[order]) == 0)
+    pairs = np.stack([order[first], order[first + 1]])
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    across = np.cross(b - a, c - a)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), LEAST_DIVISOR)
+    beside = np.roll(mesh.triangles, -2, axis=1).ravel()[pairs]  # The corners that are not on the side.
+    is_end = np.ones(len(sides), dtype=bool)
+    is_end[pairs] = (np.einsum("ni,ni->n", *across[pairs // 3]) < SHARP) & (
+        np.einsum("ni,ni->n", *normals[beside]) < TURNED
+    )
+    return sides[is_end]
 
 
 def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
