@@ -32,7 +32,7 @@ class Sheets(NamedTuple):
 
     tree : the KD-tree of n places
     normals, stds : (n, 3) and (n,), the normals there and the deviations of the surface
-    ends : the KD-tree of the vertices beside creases and rims
+    ends : the KD-tree of the vertices on creases and rims
     edge : the length of the mesh's edges
     """
 
