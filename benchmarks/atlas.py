@@ -17,7 +17,10 @@ Markdown tables:
     (explore_many with its defaults) at the same places in one batch;
 (c) peers on the contacts of tolerance .001 with the same normals, each at the best of its settings, and the
     atlas and Poisson where normals are off by ten degrees;
-(d) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of touching.
+(d) as many touches at random places and at evenly spaced ones, in one batch, with the seconds of touching;
+(e) on the ring and the egg, whose curvatures are known, the mean |K| and |H| at the vertices of the mesh, by
+    how much the atlas's are off on average, and the angle defects of the same mesh, which are K as Gauss and
+    Bonnet have it; the share of vertices within the 90 % intervals, and of those where both are unknown.
 
 `--shapes [--starts N] [--first START] [--places N]` prints one other table instead: objects with creases,
 thin walls and several pieces, each from several starts (benchmarks.atlas_shapes).
@@ -92,8 +95,9 @@ class Exact:
     """A ring or an ellipsoid of revolution, and points on it."""
 
     def __init__(self, name):
-        self.name = name
-        self.solid = solids.ring(0.35, 0.15) if name == "ring" else solids.egg(0.3, 0.5)
+        sizes = {"ring": (0.35, 0.15), "egg": (0.3, 0.5)}[name]
+        self.name, self.solid = name, getattr(solids, name)(*sizes)
+        self.curvatures = lambda points: getattr(solids, f"{name}_curvatures")(points, *sizes)
         self.start, self.outward, self.ray_cast = self.solid.start, self.solid.outward, self.solid.ray_cast
         rng = np.random.default_rng(1)
         points = []
@@ -184,8 +188,33 @@ def agreeing(thing, atlas):
     return angles.mean(), angles[smooth].mean(), smooth.mean(), across, np.mean(alike)
 
 
+def angle_defects(mesh):
+    """K at the vertices (n,) of a mesh: what their angles lack of a whole turn, over a third of the area."""
+    turns, areas = np.full(len(mesh.vertices), 2.0 * np.pi), np.zeros(len(mesh.vertices))
+    for i in range(3):
+        a, b, c = mesh.vertices[np.roll(mesh.triangles, i, axis=1)].transpose(1, 0, 2)
+        twice, along = np.linalg.norm(np.cross(b - a, c - a), axis=1), np.einsum("ni,ni->n", b - a, c - a)
+        corner = np.roll(mesh.triangles, i, axis=1)[:, 0]
+        turns -= np.bincount(corner, np.arctan2(twice, along), len(turns))
+        areas += np.bincount(corner, twice / 6.0, len(turns))
+    return turns / areas
+
+
+def curved(thing, tolerance, atlas, mesh):
+    """A row of the fifth table."""
+    found, true = atlas.curvatures(mesh), thing.curvatures(mesh.vertices)
+    known = np.isfinite(found["gaussian_curvature_std"])
+    cells = [thing.name, f"{1e3 * tolerance:g}"]
+    for name, values in zip(("gaussian_curvature", "mean_curvature"), true, strict=True):
+        off = np.abs(found[name] - values)[known]
+        cells += [f"{np.abs(values).mean():.2f}", f"{off.mean():.3f}"]
+        cells.append(f"{np.mean(off <= 1.645 * found[f'{name}_std'][known]):.2f}")
+    defects = np.abs(angle_defects(mesh) - true[0])[known].mean()
+    return [*cells, f"{defects:.2f}", f"{100.0 * np.mean(~known):.1f}"]
+
+
 def row(thing, tolerance):
-    """A row of the first table, the numbers of it that are drawn, and the explorations behind it."""
+    """A row of the first table and of the fifth, the numbers that are drawn, and the explorations behind."""
     atlas, found, touching, meshing, mesh = explored(thing, tolerance)
     distance, std = atlas.distance(thing.points)
     felt = np.isfinite(std)
@@ -208,6 +237,7 @@ def row(thing, tolerance):
         (thing.name, tolerance, len(atlas.patches), touching + meshing, off.mean()),
         found,
         atlas.taps,
+        [curved(thing, tolerance, atlas, mesh)] if isinstance(thing, Exact) else [],
     )
 
 
@@ -312,7 +342,7 @@ def compared(thing, found, taps, cells, tolerance, some):
     if some:
         return others, []
     badly = Blurred(thing)
-    cells, _, again, more = row(badly, tolerance)
+    cells, _, again, more, _ = row(badly, tolerance)
     others.append(
         [thing.name, "this atlas, normals 10° off", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]
     )
@@ -388,13 +418,14 @@ def main():
         print_shapes(options.only, (options.finest, options.coarsest), starts, options.places)
         return
     names = [name for name in (*SCANS, "ring", "egg") if options.only in name]
-    rows, hundreds, others, random, numbers = [], [], [], [], []
+    rows, hundreds, others, random, numbers, bends = [], [], [], [], [], []
     for name in names:
         with blender.quiet():
             thing = Scanned(name) if name in SCANS else Exact(name)
         for tolerance in (t for t in TOLERANCES if options.finest <= t <= options.coarsest):
-            cells, number, found, taps = row(thing, tolerance)
+            cells, number, found, taps, curvatures = row(thing, tolerance)
             rows.append(cells)
+            bends += curvatures
             numbers.append(number)
             if tolerance == COMPARED:
                 hundreds.append(by_hundred(thing, found, number[3]))
@@ -410,6 +441,9 @@ def main():
     table(["object", "method", "setting", "mean / median / 95 %", "s"], others, left=3)
     if random:
         table(["object", "places", "touches", "% covered", "mean / median / 95 %", "s touch"], random, left=2)
+    if bends:
+        head = "object|tolerance|K|off|within 90 %|H|off|within 90 %|K of angle defects off|% unknown"
+        table(head.split("|"), bends)
     draw(numbers)
     print(f"Lengths are in permille of the size, times in CPU seconds; {machine('bpy', 'numpy', 'scipy')}.")
 

@@ -109,6 +109,22 @@ def egg(across=0.6, along=1.0):
     return Solid(distance, (0.0, 0.0, along), (0.0, 0.0, 1.0))
 
 
+def ring_curvatures(points, big=1.0, small=0.4):
+    """Gaussian and mean curvature (n,) of a ring at points (n, 3)."""
+    out = np.hypot(points[:, 0], points[:, 1]) - big
+    cosine = out / np.hypot(out, points[:, 2])
+    k1, k2 = -1.0 / small, -cosine / (big + small * cosine)
+    return k1 * k2, 0.5 * (k1 + k2)
+
+
+def egg_curvatures(points, across=0.6, along=1.0):
+    """Gaussian and mean curvature (n,) of an egg at points (n, 3)."""
+    squares = np.array([across, across, along]) ** 2
+    steep, product = (points**2 / squares**2).sum(axis=1), squares.prod()
+    mean = ((points**2).sum(axis=1) - squares.sum()) / (2.0 * product * steep**1.5)
+    return 1.0 / (product * steep**2), mean
+
+
 @dataclass(frozen=True)
 class Topology:
     """Edges with one triangle, edges with more than two, Euler's number, and the pieces."""

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The graph (paper, VI): its nodes as data, and its edges, the curves where two patches weigh the same.
 
-The curvatures along edges and all over the surface are those of the patches' polynomials.
+The curvatures along edges are those of the patches' polynomials.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..patch.monge import TERMS, derived_monomials
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts
-from .field import AGREE, LAYER, least_of, node_weights
+from .field import LAYER, least_of, node_weights
 
 # Boundaries are looked for on so many rays from each patch's middle, at so many places.
 RAYS, RAY_PLACES = 32, 16
@@ -109,27 +109,6 @@ def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Arra
     curvature = r.patch.derivatives(x, y).gaussian_curvature
     wider = np.exp(OUTWARD_STD * (x**2 + y**2) / r.radius**2)
     return curvature, wider * np.sqrt(np.maximum(variance, 0.0)) / r.radius**2
-
-
-def blended_curvatures(
-    patches: Sequence[Reconstruction], charts: Charts, points: Array, normals: Array
-) -> tuple[Array, Array]:
-    """Means of K and of H, (n,) each, at points (n, 3), over the patches that face their normals (n, 3)."""
-    pairs = charts.pairs(points)
-    facing = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
-    weights = node_weights(charts, pairs) * np.clip((facing - FACING) / (AGREE - FACING), 0.0, 1.0)
-    radii = charts.radii[pairs.node]
-    weights *= np.abs(pairs.distance) < LAYER * radii
-    x, y = charts.local(points, pairs.place, pairs.node)[:2] * radii
-    curvatures, order = np.zeros((2, len(x))), np.argsort(pairs.node, kind="stable")
-    for at in np.split(order, np.flatnonzero(np.diff(pairs.node[order])) + 1):
-        if len(at):
-            d = patches[pairs.node[at[0]]].patch.derivatives(x[at], y[at])
-            curvatures[:, at] = d.gaussian_curvature, d.mean_curvature
-    count = len(points)
-    total = np.maximum(np.bincount(pairs.place, weights, count), np.finfo(np.float64).tiny)
-    gauss, mean = (np.bincount(pairs.place, weights * each, count) / total for each in curvatures)
-    return gauss, mean
 
 
 def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:

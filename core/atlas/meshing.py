@@ -52,8 +52,8 @@ class Mesh(NamedTuple):
     def normals(self) -> Array:
         """Outward unit normals of the vertices, (n, 3): means of the triangles' normals, weighted by area."""
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
-        normals = np.zeros_like(self.vertices)
-        np.add.at(normals, self.triangles, np.cross(b - a, c - a)[:, None])
+        across, count = np.repeat(np.cross(b - a, c - a), 3, axis=0), len(self.vertices)
+        normals = np.stack([np.bincount(self.triangles.ravel(), way, count) for way in across.T], axis=1)
         return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), LEAST_DIVISOR)
 
     @property

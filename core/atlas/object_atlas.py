@@ -16,8 +16,9 @@ from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from .borders import Border, bordered
-from .boundaries import Edge, blended_curvatures, edges_of, gaussian_curvature_of, node_dict
+from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
+from .curvature import Sheets, curvatures_of, sheets_of
 from .frontier import Place
 from .indicator import Indicator
 from .meshing import LEAST_DIVISOR, MOST_BYTES, WALL, Mesh, lattice_of, memory_of, meshed
@@ -33,7 +34,8 @@ THIN = 0.9  # Walls are resolved from this share of the thickness that cells are
 BORDER = 2.0  # Beyond the border of the mesh it does from so many edges away.
 WITHIN_90 = 1.645  # So many deviations are a 90 % interval.
 WIDENINGS = 4  # Deviations grow so often until 90 % of the check's contacts are within.
-AT_ONCE = 3000  # Distances are found for so many places at once.
+AT_ONCE = 3000  # Distances are found for so many places at once,
+CURVED_AT_ONCE = 1000  # and curvatures at so many.
 GRAPH_VERSION = 2  # The version of the graph as plain values.
 
 
@@ -260,22 +262,28 @@ class Atlas:
         return self.curvatures_at(mesh.vertices, mesh.normals)
 
     def curvatures_at(self, points: Array, normals: Array) -> dict[str, Array]:
-        """Gaussian and mean curvature, shape index and curvedness (n,) at points of the surface, by name.
+        """Curvatures (n,) at points of the surface (n, 3) with outward unit normals (n, 3), by name.
 
-        points, normals : (n, 3)
-
-        K and H are means over the polynomials (1) of the touches there, each with its patch's weight in the
-        blended surface; the others follow from these. Where there is no patch, all are 0. Joined patches are
-        not asked, because they follow facets, which makes their second derivatives rougher.
+        They are Gaussian and mean curvature, each with its standard deviation under its name and "_std",
+        shape index and curvedness. Where they are unknown, which is beside creases and rims and where there
+        is no surface, these are 0 and the deviations inf.
         """
-        gauss, mean = blended_curvatures(self.patches, self.charts, points, normals)
+        parts = np.array_split(np.arange(len(points)), len(points) // CURVED_AT_ONCE + 1)
+        found = [curvatures_of(self._sheets, points[some], normals[some]) for some in parts]
+        gauss, mean, *stds = (np.concatenate(values) for values in zip(*found, strict=True))
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # half the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,
+            "gaussian_curvature_std": stds[0],
             "mean_curvature": mean,
+            "mean_curvature_std": stds[1],
             "shape_index": np.arctan2(mean, half) * (-2.0 / np.pi),
             "curvedness": np.sqrt(mean**2 + half**2),
         }
+
+    @cached_property
+    def _sheets(self) -> Sheets:
+        return sheets_of(self.reference.mesh)
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
         """Makes the `mesh` in steps: yields the share that is done, and returns the mesh.

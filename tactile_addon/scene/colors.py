@@ -10,9 +10,13 @@ COLOR_STOPS = np.array([
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
 
+UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
+
 
 def symmetric_range(values, floor):
     """The r of a scale -r..r: the 98th percentile of |values|, so a few wild ones do not bleach the rest."""
+    if not len(values):
+        return floor
     sizes, at = np.abs(values), 0.98 * (len(values) - 1)  # np.percentile would take five times as long.
     before = int(at)
     sizes.partition([before, min(before + 1, len(sizes) - 1)])
@@ -29,9 +33,11 @@ def shades(values, limit):
     return np.column_stack([srgb, np.ones(len(srgb))])
 
 
-def diverging(values, limit):
-    """Colors of shades() as linear RGBA, as Blender stores them."""
-    return linear(shades(values, limit))
+def diverging(values, limit, unknown=()):
+    """Colors of shades() as linear RGBA, as Blender stores them, gray at the indices that are unknown."""
+    rgba = shades(values, limit)
+    rgba[np.asarray(unknown, dtype=int)] = UNKNOWN
+    return linear(rgba)
 
 
 def linear(rgba):

@@ -17,6 +17,8 @@ from .patch_record import (
     ATLAS_RECORD,
     COLOR,
     CONTOURS,
+    CURVATURE_STD,
+    CURVATURES,
     POWERS,
     QUANTITIES_OF_A_FIT,
     RANGE,
@@ -108,17 +110,27 @@ def meshes(patch):
 
 
 def recolor(patch):
-    """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record."""
+    """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record.
+
+    What is unknown of a whole object is gray, and does not count in the range.
+    """
     own_mesh(patch)
     shown, mesh = patch.tactile_colors, patch.data
     shades, record = values(mesh, shown), patch[RECORD if RECORD in patch else ATLAS_RECORD]
     floor = WHITE_RANGE * record["radius"] ** POWERS[shown]
-    limit = patch.get(RANGE) or colors.symmetric_range(shades, floor)
-    mesh.attributes[COLOR].data.foreach_set("color", colors.diverging(shades, limit).ravel())
+    unknown = _unknown(mesh) if shown in CURVATURES else []
+    limit = patch.get(RANGE) or colors.symmetric_range(np.delete(shades, unknown), floor)
+    rgba = colors.diverging(shades, limit, unknown)
+    mesh.attributes[COLOR].data.foreach_set("color", rgba.ravel())
     if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
         mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
     mesh.update()
     record["color_limit"] = limit
+
+
+def _unknown(mesh):
+    """The indices of the vertices whose curvatures are unknown; a patch has none."""
+    return np.flatnonzero(np.isinf(values(mesh, CURVATURE_STD))) if CURVATURE_STD in mesh.attributes else []
 
 
 def collection(scene):

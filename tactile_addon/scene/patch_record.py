@@ -36,8 +36,9 @@ QUANTITIES = [
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
 ]
 POWERS = {name: power for name, _, _, power in QUANTITIES}
-# These need no mesh to compare with.
-QUANTITIES_OF_A_FIT = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness", "height_std")
+CURVATURES = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness")
+CURVATURE_STD = "mean_curvature_std"  # It is infinite where a whole object's curvatures are unknown.
+QUANTITIES_OF_A_FIT = (*CURVATURES, "height_std")  # These need no mesh to compare with.
 POSITIVE = ("curvedness", "height_std")  # These are never below zero, so they need half a scale.
 
 

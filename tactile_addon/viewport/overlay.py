@@ -102,7 +102,8 @@ def draw_legend():
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["radius"], patch_record.POWERS[shown], low)
-        _draw_box(context, *bar)
+        unknown = record.get("unknown_curvatures") if shown in patch_record.CURVATURES else None
+        _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if unknown else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name

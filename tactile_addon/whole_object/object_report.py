@@ -36,6 +36,7 @@ def object_table_rows(record):
         ("off the mesh", off and f"mean {off}; max {_off(record, 'max')}"),
         ("farthest at", _place(record)),
         ("mesh", f"{record['vertices']} vertices, {record['triangles']} triangles"),
+        ("curvatures", _unknown(record)),
     )
 
 
@@ -62,6 +63,7 @@ def object_rows(record):
         ("Patches", record["patches"]),
         ("… in Doubt", record["in_doubt"]),
         ("Vertices", record["vertices"]),
+        ("… without K", record.get("unknown_curvatures") or None),
     )
 
 
@@ -81,6 +83,12 @@ def _surface(record):
 def _ends(record):
     """In a word, whether the surface that is shown has no rim; never "Closed" where touches could go on."""
     return "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"
+
+
+def _unknown(record):
+    """Where the curvatures are unknown, in words, or None if they are known all over."""
+    count = record.get("unknown_curvatures")
+    return f"unknown at {many(count, 'vertex', 'vertices')} beside edges and rims" if count else None
 
 
 def _tolerance(record):

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-CURVED_AT_ONCE = 3000  # A step computes the curvatures at so many vertices.
+CURVED_AT_ONCE = 1000  # A step computes the curvatures at so many vertices.
 
 
 class WholeSurface:
@@ -84,6 +84,7 @@ class WholeSurface:
             "is_closed": mesh.is_closed and not atlas.uncovered,
             "vertices": len(mesh.vertices),
             "triangles": len(mesh.triangles),
+            "unknown_curvatures": int(np.isinf(self.curvatures["mean_curvature_std"]).sum()),
             "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # It is inf where nothing was felt.
             "radius": float(np.median([r.radius for r in atlas.patches])),
         }

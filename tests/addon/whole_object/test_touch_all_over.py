@@ -36,8 +36,11 @@ def test_a_ball_is_closed_and_where_the_ball_is(empty, ball):
     for name, true in (("gaussian_curvature", 0.25), ("mean_curvature", -0.5)):
         curvatures = values(surface.data, name)
         assert np.median(curvatures) == pytest.approx(true, abs=0.005)
-        # At few places a patch counts at its rim.
-        assert np.percentile(np.abs(curvatures - true), 99.5) < 0.05
+        assert np.abs(curvatures - true).max() < 0.05
+        stds = values(surface.data, f"{name}_std")
+        assert np.mean(np.abs(curvatures - true) <= 1.645 * stds) > 0.8
+        assert np.median(stds) < 0.02
+    assert record["unknown_curvatures"] == 0
     assert np.abs(values(surface.data, "deviation")).max() <= record["deviation_max"] * (1.0 + 1e-6)
     assert record["deviation_mean"] < record["deviation_max"] < 0.01
     assert math.dist(record["deviation_place"], (5.0, 6.0, 7.0)) == pytest.approx(2.0, abs=0.01)
@@ -51,6 +54,28 @@ def test_colors_show_what_is_chosen(empty, ball):
         wild = np.percentile(np.abs(values(surface.data, shown)), 98.0)
         least = 1e-3 * record["radius"] ** (-2 if shown == "gaussian_curvature" else 1)
         assert surface["tactile_object"]["color_limit"] == pytest.approx(max(wild, least), rel=1e-5)
+
+
+def test_beside_the_edges_of_a_cube_curvatures_are_unknown_and_gray(empty, extension):
+    empty.ops.mesh.primitive_cube_add(size=2.0)
+    surface, record = touched(empty)
+    mesh, gray = surface.data, extension.tactile_addon.scene.colors.linear([(0.5, 0.5, 0.5, 1.0)])[0]
+    from_edge = np.sort(1.0 - np.abs(positions(mesh)), axis=1)[:, 1]
+    unknown = np.isinf(values(mesh, "mean_curvature_std"))
+    assert unknown[from_edge < 0.05].all()
+    assert not unknown[from_edge > 0.15].any()
+    assert (np.isinf(values(mesh, "gaussian_curvature_std")) == unknown).all()
+    assert np.abs(values(mesh, "mean_curvature")).max() < 0.01
+    assert record["unknown_curvatures"] == unknown.sum() > 0
+    assert dict(extension.tactile_addon.whole_object.object_report.object_rows(record))["… without K"] == str(
+        unknown.sum()
+    )
+    for shown in ("mean_curvature", "curvedness", "height_std"):
+        surface.tactile_colors = shown
+        shades = np.empty((len(mesh.vertices), 4))
+        mesh.attributes["curvature_color"].data.foreach_get("color", shades.ravel())
+        is_gray = np.isclose(shades, gray, atol=1e-6).all(axis=1)
+        assert (is_gray == (unknown if shown != "height_std" else False)).all()
 
 
 @pytest.mark.parametrize(

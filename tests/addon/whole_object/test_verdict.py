@@ -110,14 +110,15 @@ def test_closed_is_the_mesh_that_is_shown(extension, left_out, shown, uncovered,
         edges=[],
     )
     whole = extension.tactile_addon.whole_object.whole_surface.WholeSurface(atlas, np.zeros(3))
-    whole.mesh = mesh(shown)
+    whole.mesh, whole.curvatures = mesh(shown), {"mean_curvature_std": np.array([0.1, np.inf, 0.1, 0.1])}
     report = whole.report()
     assert (report["status"], report["is_closed"]) == (status, is_closed)
     told = OK if status == "ok" else "Triangles of this edge length leave holes: use a shorter edge length."
     assert report["message"] == told
     rows = extension.tactile_addon.whole_object.object_report.object_rows
-    told = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))["Surface"]
-    assert told == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
+    told = dict(rows(report | {"tolerance": 0.1, "uncovered": len(uncovered)}))
+    assert told["… without K"] == "1"
+    assert told["Surface"] == ("Closed" if is_closed else "Incomplete" if uncovered else "Open")
 
 
 @pytest.fixture

@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curvatures of the joined surface, by quadrics that are as wide as its deviation asks for.
+
+Beside the paper. The gradient of a quadric is linear, so its normals are n0 - W x along the tangent plane
+near a place, where W is the Weingarten map. It is fitted to the normals of the mesh there by weighted least
+squares. For a ball that is exact at any width; heights would need terms beyond those of a quadric.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import Array
+from ..patch.tetrahedra import Indices
+from .creases import SHARP
+from .meshing import LEAST_DIVISOR, Mesh
+
+# python -m benchmarks.atlas --only ring and --only egg chose these.
+SAGITTA = 80.0  # A quadric is so wide that its sagitta is so many deviations of the surface.
+LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
+EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nearest 128 at most, 6 at least.
+TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.
+ALIKE = 0.5  # Places are on one sheet if the cosine between their normals is more, and the sum of both
+ACROSS = 0.5  # has less of the way between them, which is 0 on a ball.
+BY_STD, BY_MISFIT = 1.15, 0.4  # The shares of the surface's deviation and of the misfit in that of H.
+LEAST_SQUARE = 1e-9  # So much, in unit radius, is added to the squares, because places may be in a row.
+
+
+class Sheets(NamedTuple):
+    """The mesh of a surface as places to which quadrics are fitted.
+
+    tree : the KD-tree of n places
+    normals, stds : (n, 3) and (n,), the normals there and the deviations of the surface
+    ends : the KD-tree of the vertices on creases and rims
+    edge : the length of the mesh's edges
+    """
+
+    tree: Any
+    normals: Array
+    stds: Array
+    ends: Any
+    edge: float
+
+
+class Curvatures(NamedTuple):
+    """Gaussian and mean curvature, and their standard deviations, (n,) each; 0 and inf where unknown."""
+
+    gauss: Array
+    mean: Array
+    gauss_std: Array
+    mean_std: Array
+
+
+class _Fit(NamedTuple):
+    """Gaussian and mean curvature, and the misfit of the normals as a root mean square, (n,) each."""
+
+    gauss: Array
+    mean: Array
+    misfit: Array
+
+
+def sheets_of(mesh: Mesh) -> Sheets:
+    """The places and the ends of a mesh."""
+    from scipy.spatial import cKDTree
+
+    normals = mesh.normals
+    trees = cKDTree(mesh.vertices[::EVERY]), cKDTree(mesh.vertices[np.unique(_ends(mesh, normals))])
+    return Sheets(trees[0], normals[::EVERY], mesh.std[::EVERY], trees[1], mesh.edge)
+
+
+def _ends(mesh: Mesh, normals: Array) -> Indices:
+    """The edges (k, 2) of a mesh on its rims, and those where its triangles and the normals (n, 3) turn.
+
+    A folded triangle does not turn the normals beside it, which are those of larger triangles, too.
+    """
+    sides = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    keys = np.minimum(*sides.T) * len(mesh.vertices) + np.maximum(*sides.T)
+    order = np.argsort(keys, kind="stable")  # It is the fastest here.
+    first = np.flatnonzero(np.diff(keys[order]) == 0)
+    pairs = np.stack([order[first], order[first + 1]])
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    across = np.cross(b - a, c - a)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), LEAST_DIVISOR)
+    beside = np.roll(mesh.triangles, -2, axis=1).ravel()[pairs]  # The corners that are not on the side.
+    is_end = np.ones(len(sides), dtype=bool)
+    is_end[pairs] = (np.einsum("ni,ni->n", *across[pairs // 3]) < SHARP) & (
+        np.einsum("ni,ni->n", *normals[beside]) < TURNED
+    )
+    return sides[is_end]
+
+
+def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
+    """The curvatures at points (n, 3) of the surface with unit normals (n, 3).
+
+    They are unknown where a crease or a rim is nearer than the least radius, and where no surface is near.
+    """
+    distance, at = sheets.tree.query(points, min(PLACES, sheets.tree.n))
+    least, ends = LEAST * sheets.edge, sheets.ends.query(points)[0]
+    most = np.maximum(np.minimum(ends, distance[:, -1]), least)
+    distance, local = _around(sheets, points, normals, distance, at)
+    std = sheets.stds[at[:, 0]]
+    near = np.minimum(2.0 * least, most)
+    first = _fitted(distance, local, near)
+    largest = np.abs(first.mean) + np.sqrt(np.maximum(first.mean**2 - first.gauss, 0.0))
+    radius = np.sqrt(2.0 * SAGITTA * std / np.maximum(largest, LEAST_DIVISOR)).clip(least, most)
+    fit = _fitted(distance, local, radius)
+    known = (ends >= least) & ((distance < near[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
+    gauss, mean, misfit = (np.where(known, values, 0.0) for values in fit)
+    mean_std = np.where(known, np.hypot(BY_STD * std / radius, BY_MISFIT * misfit) / radius, np.inf)
+    # For errors of heights that are alike in all directions, the variances of z_xx, z_yy and z_xy are as
+    # 3 : 3 : 1 and the covariance of the first two as 1, so that of H is as 2.
+    gauss_std = mean_std * np.sqrt(6.0 * mean**2 - 2.0 * gauss + 3.0 * mean_std**2)
+    return Curvatures(gauss, mean, gauss_std, mean_std)
+
+
+def _around(sheets: Sheets, points: Array, normals: Array, distance: Array, at: Array) -> tuple[Array, Array]:
+    """Distances (n, k) of the places `at` (n, k), inf on other sheets, and these places in local terms.
+
+    Those are (n, k, 4): two coordinates along the tangent plane, and two components of the normal.
+    """
+    off, ups = sheets.tree.data[at] - points[:, None], sheets.normals[at]
+    alike = np.einsum("nki,ni->nk", ups, normals) > ALIKE
+    across = np.abs(np.einsum("nki,nki->nk", off, ups + normals[:, None]))
+    x = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), LEAST_DIVISOR)
+    plane = np.stack([x, np.cross(normals, x)], axis=2)
+    same = alike & (across <= ACROSS * distance)
+    return np.where(same, distance, np.inf), np.concatenate([off @ plane, ups @ plane], axis=2)
+
+
+def _fitted(distance: Array, local: Array, radius: Array) -> _Fit:
+    """Quadrics of the radii (n,) fitted to places at distances (n, k) with local terms (n, k, 4)."""
+    weights = np.maximum(1.0 - (distance / radius[:, None]) ** 2, 0.0) ** 2
+    weights /= np.maximum(weights.sum(axis=1, keepdims=True), LEAST_DIVISOR)
+    terms = local - np.einsum("nk,nki->ni", weights, local)[:, None]
+    terms[:, :, :2] /= radius[:, None, None]
+    moments = np.swapaxes(weights[:, :, None] * terms, 1, 2) @ terms
+    square, mixed = moments[:, :2, :2] + LEAST_SQUARE * np.eye(2), moments[:, :2, 2:]
+    slopes = np.linalg.solve(square, mixed)
+    left = np.einsum("nii->n", moments[:, 2:, 2:]) - np.einsum("nij,nij->n", slopes, mixed)
+    (a, b), (c, d) = -np.moveaxis(slopes, 0, -1) / radius
+    return _Fit(a * d - 0.25 * (b + c) ** 2, 0.5 * (a + d), np.sqrt(np.maximum(left, 0.0)))
