@@ -24,7 +24,7 @@ CELL = 2.1  # A cube of the lattice is as long as so many edges of the mesh.
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
 SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
 BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator are bridged.
-# Vertices that were off by more cells, or are of folded triangles, are moved onto the surface again, so often.
+# Vertices that were off by more cells, or are of folded triangles, are moved again, so often.
 FAR, STEPS = 0.05, 4
 WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none is lost between them.
 ROOM = 5.0  # The surface is within so many cells of the level of the indicator.
