@@ -56,16 +56,10 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
         contacts = ((p, n, finger.near(vector_of(p), vector_of(n), near)) for p, n in each)
         return np.array([np.nan if c is None else np.dot(n, np.subtract(c[0], p)) for p, n, c in contacts])
 
-    low, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
-    high, every = low + STEP * mesh.edge, np.arange(len(at))
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        met = ~np.isnan(off(places + middle[:, None] * ways, every))
-        low, high = np.where(met, middle, low), np.where(met, high, middle)
-        yield 0.0
-    places = places + low[:, None] * ways
-    places += np.nan_to_num(off(places, every))[:, None] * normals
-    ended &= ~_goes_on(finger, places, normals, ways, STEP * mesh.edge)
+    lengths, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
+    places = places + lengths[:, None] * ways
+    places += np.nan_to_num(off(places, np.arange(len(at))))[:, None] * normals
+    ended &= ~_bends_away(finger, places, normals, ways, STEP * mesh.edge)
     some = ended[before] & ended[after]
     before, after = before[some], after[some]
     corners, sharp = _corners(places, before, after, mesh.edge)
@@ -100,18 +94,24 @@ def _lengths(
     off: Offsets, places: Array, ways: Array, step: float
 ) -> Generator[float, None, tuple[Array, NDArray[np.bool_]]]:
     """Lengths (n,) of a surface along ways (n, 3) from places (n, 3), and whether it ends there, (n,)."""
-    inside, ended = ~np.isnan(off(places, np.arange(len(places)))), np.zeros(len(places), dtype=bool)
-    low = np.zeros(len(places))
+    every, low = np.arange(len(places)), np.zeros(len(places))
+    inside, ended = ~np.isnan(off(places, every)), np.zeros(len(places), dtype=bool)
     for i in range(1, round(REACH / STEP) + 1):
         left = np.flatnonzero(~ended)
         trial = np.where(inside[left], i * step, -i * step)
         left = left[np.isnan(off(places[left] + trial[:, None] * ways[left], left)) == inside[left]]
         ended[left], low[left] = True, np.where(inside[left], i - 1, -i) * step
         yield 0.0
+    high = low + step
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        met = ~np.isnan(off(places + middle[:, None] * ways, every))
+        low, high = np.where(met, middle, low), np.where(met, high, middle)
+        yield 0.0
     return low, ended
 
 
-def _goes_on(finger: Finger, places: Array, normals: Array, ways: Array, step: float) -> NDArray[np.bool_]:
+def _bends_away(finger: Finger, places: Array, normals: Array, ways: Array, step: float) -> NDArray[np.bool_]:
     """Whether a finger that goes a step beyond places (n, 3) still feels the surface, which bends away."""
     each = zip(places.tolist(), normals.tolist(), ways.tolist(), strict=True)
     found = (finger.ahead(vector_of(p), vector_of(n), vector_of(t), 2.0 * step, step) for p, n, t in each)
