@@ -172,6 +172,18 @@ def test_bad_arguments_are_named(change, message):
         )
 
 
+@pytest.mark.parametrize("kind", [str, np.float32, np.array])
+def test_lengths_of_any_kind_count_as_numbers(kind):
+    surface = surfaces.plane()
+    given = {name: kind(value) for name, value in {"extent": 2.0, "step": 0.5, "noise": 0.25}.items()}
+    found, expected = (
+        track(surface, (0, 0, 0), (0, 0, 1), PLANES, rng=1, **lengths)
+        for lengths in (given, {"extent": 2.0, "step": 0.5, "noise": 0.25})
+    )
+    for one, other in zip(found, expected, strict=True):
+        assert np.array_equal(one.points, other.points)
+
+
 def test_contours_take_lists_and_refuse_nonsense():
     contour = Contour([[0, 0, 0], [1, 2, 3]], plane_normal=[0, 0, 4])
     assert contour.points.dtype == np.float64
