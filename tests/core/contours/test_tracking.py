@@ -156,6 +156,8 @@ def test_a_ball_ends_where_one_height_no_longer_describes_it():
         ({"planes": None}, "planes: expected a list, got None"),
         ({"planes": [0.5]}, "planes: expected a list of SamplingPlane, got 0.5 in it"),
         ({"step": 1e-7}, "step: expected at least a 10000th of the extent 10, got 1e-07"),
+        ({"step": 5e-324}, "step: expected a number of 1e-50 or more, got 4.94066e-324"),
+        ({"extent": 1e-60}, "extent: expected a number of 1e-50 or more, got 1e-60"),
         ({"rng": "dice"}, "rng: expected a Generator or a whole number of 0 or more, got 'dice'"),
         ({"rng": -1}, "rng: expected a Generator or a whole number of 0 or more, got -1"),
     ],
