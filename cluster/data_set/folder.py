@@ -75,7 +75,7 @@ class DataSet:
         with self.log.open("ab") as log:
             try:
                 fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
+            except BlockingIOError as error:
                 raise OSError(
                     f'another run is at work in "{self.folder}": wait for it, or use another folder'
                 ) from error
