@@ -19,8 +19,14 @@ from distributed.scheduler import KilledWorker
 from .worker import task
 from .worker.process import FAILED
 
-# Ctrl+C reaches all processes of a terminal, but only one should end the others.
-DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+# What workers run first. Ctrl+C reaches all processes of a terminal, but only one should end the others. And
+# a worker must not print that its scheduler ended during a heartbeat, as may happen at the end of each run.
+PRELOAD = """
+import logging
+import signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+logging.getLogger("distributed").setLevel(logging.CRITICAL)
+"""
 # Dask's measurements of itself would take some hundredths of a processor for each process.
 CALM = {
     "distributed.worker.profile.enabled": False,
@@ -67,7 +73,7 @@ def connected(scheduler: str | None, workers: int, dashboard: str | None) -> Ite
                 processes=True,
                 memory_limit=0,
                 silence_logs=logging.ERROR,
-                preload=[DEAF],
+                preload=[PRELOAD],
                 dashboard_address=dashboard or "127.0.0.1:0",
             ) as cluster,
             Client(cluster) as client,

@@ -96,7 +96,10 @@ def unit_vectors(name: str, vectors: Array) -> Array:
 
 
 def number(name: str, value: float, *, above: float | None = None, least: float | None = None) -> float:
-    """`value` as a float that is above one bound, or at least the other. Raises ValueError if it is not."""
+    """`value` as a float that is above one bound, or at least the other. Raises ValueError if it is not.
+
+    What is to be above 0 is SMALLEST or more, so that its shares are above 0, too.
+    """
     try:
         if getattr(value, "ndim", 0) or isinstance(value, np.complexfloating):
             raise TypeError
@@ -108,6 +111,8 @@ def number(name: str, value: float, *, above: float | None = None, least: float 
         raise ValueError(f"{name}: expected {_number_text(above, least)}, got {result:g}")
     if abs(result) > LARGEST:
         raise ValueError(f"{name}: expected a number up to {LARGEST:g}, got {result:g}")
+    if above == 0.0 and result < SMALLEST:
+        raise ValueError(f"{name}: expected a number of {SMALLEST:g} or more, got {result:g}")
     return result
 
 

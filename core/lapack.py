@@ -29,6 +29,7 @@ def on_one_thread(run: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(run)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+        """Calls the function. The last call to end puts the number of threads back."""
         threads = _threads()
         if threads is None:
             return run(*args, **kwargs)

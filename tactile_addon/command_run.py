@@ -85,6 +85,8 @@ def _arguments(options):
             if "point" in given:
                 raise Misuse("--location: expected this or --point, got both")
             given |= {"point": given.pop("location"), "strokes": True}
+        if "point" in given:
+            given["exact_point"] = json.dumps(given.pop("point"))
         return given | _open_contacts(options)
     given["target"] = options.target or _default_target()
     if options.azimuths is not None:

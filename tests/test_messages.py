@@ -36,6 +36,8 @@ def sentences(node):
         return node.args[:1] if name in ERRORS else node.args[1:2] if name == "report" else []
     if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
         return node.value.elts[1:] if isinstance(node.value.elts[0], ast.Constant) else []
+    if isinstance(node, ast.Yield):
+        return [node.value]
     if isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", None) == "message":
         return [node.value]
     if isinstance(node, ast.AugAssign) and getattr(node.target, "id", None) == "message":

@@ -3,7 +3,7 @@
 """The folder of a data set: a file for each task's rows, a manifest, and a file of objects at the end.
 
 Each is written under another name and then renamed, so that there are only complete files. Each file of rows
-has the checksum of all its bytes in its metadata.
+has the checksum of its name and of all its bytes in its metadata.
 """
 
 import fcntl
@@ -24,8 +24,9 @@ from .columns import REPEATED, SCHEMAS, TOUCH_SCHEMA, table
 
 whole_file = addon("files.whole_file")
 SUMMARY = "summary"  # The key of a file's summary in its metadata.
-CHECKSUM, MARK = "checksum", b"sha256:"  # The key of its checksum, and what that begins with.
-NO_CHECKSUM = MARK + bytes(64).replace(b"\0", b"0")  # It stands for the checksum while that is computed.
+# The key of its checksum, and what that begins with: the summary follows, and as JSON it has no line ends.
+CHECKSUM, MARK = "checksum", b"\nsha256:"
+NO_CHECKSUM = MARK + 64 * b"0"  # It stands for the checksum while that is computed.
 NAME = re.compile(r"[0-9a-f]{16}-\d{5,}(-error)?\.parquet")  # The names of files of rows.
 ERROR = "-error"  # Names of files of error rows end with this; if they are deleted, a run tries again.
 DIGITS = 16  # Hashes have so many digits.
@@ -57,7 +58,7 @@ class DataSet:
         """Makes the folder. Raises OSError, with a sentence, if nothing can be written to it."""
         try:
             self.parts.mkdir(parents=True, exist_ok=True)
-            self.log.touch()
+            self.log.open("ab").close()
         except OSError as error:
             raise OSError(
                 f'cannot write to the folder "{self.folder}" ({error.strerror}): choose another'
@@ -74,7 +75,7 @@ class DataSet:
         with self.log.open("ab") as log:
             try:
                 fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
+            except BlockingIOError as error:
                 raise OSError(
                     f'another run is at work in "{self.folder}": wait for it, or use another folder'
                 ) from error
@@ -103,7 +104,7 @@ class DataSet:
         """The names of all files of rows, up to the block's number; damaged ones are removed and logged."""
         names = set()
         for path in self.files():
-            if is_whole(path.read_bytes()):
+            if is_whole(path):
                 names.add(path.name.removesuffix(".parquet").removesuffix(ERROR))
             else:
                 log(f'"{path}" is damaged, and is made again')
@@ -150,16 +151,21 @@ def _write(path: Path, content: pa.Table) -> None:
         writer.add_key_value_metadata({CHECKSUM: NO_CHECKSUM.decode()})
     blank = data.getvalue().to_pybytes()
     with whole_file.replacing(path) as temporary:
-        temporary.write_bytes(blank.replace(NO_CHECKSUM, _checksum(blank)))
+        temporary.write_bytes(_with(blank, _checksum(path, blank)))
 
 
-def is_whole(data: bytes) -> bool:
-    """Whether a file of rows with these bytes is as it was written."""
+def is_whole(path: Path) -> bool:
+    """Whether a file of rows is as it was written, under the name that it was given."""
+    data = path.read_bytes()
+    return data == _with(data, _checksum(path, _with(data, NO_CHECKSUM)))
+
+
+def _with(data: bytes, checksum: bytes) -> bytes:
+    """The bytes of a file with this checksum in place of its own."""
     at = data.rfind(MARK)
-    end = at + len(NO_CHECKSUM)
-    return at >= 0 and data[at:end] == _checksum(data[:at] + NO_CHECKSUM + data[end:])
+    return data[:at] + checksum + data[at + len(checksum) :]
 
 
-def _checksum(blank: bytes) -> bytes:
-    """The checksum of a file in which NO_CHECKSUM stands for it."""
-    return MARK + sha256(blank).hexdigest().encode()
+def _checksum(path: Path, blank: bytes) -> bytes:
+    """The checksum of a file's name and of its bytes, in which NO_CHECKSUM stands for the checksum."""
+    return MARK + sha256(path.name.encode() + blank).hexdigest().encode()

@@ -58,7 +58,9 @@ class Mesh(NamedTuple):
 
     @property
     def edge(self) -> float:
-        """The median length of the edges."""
+        """The median length of the edges; 0 without triangles."""
+        if not len(self.triangles):
+            return 0.0
         a, b = self.vertices[self.triangles[:, :2]].transpose(1, 0, 2)
         return float(np.median(np.linalg.norm(b - a, axis=1)))
 

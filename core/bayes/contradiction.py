@@ -54,10 +54,10 @@ def contradiction(contacts: Array, normals: Array, posterior: Posterior) -> tupl
     # The free terms of the normals less those of the contacts.
     apart = np.linalg.lstsq(free, off, rcond=None)[0]
     told = free @ apart
-    scatter = max(1.0, float(np.sum((off - told) ** 2)) / (len(off) - FREE))
+    spread = max(1.0, float(np.sum((off - told) ** 2)) / (len(off) - FREE))
     certainty = np.minimum(np.linalg.norm(normals, axis=1), 1.0 / SLOPE_MISFIT)
     angles = slopes[:, :FREE] @ apart / np.tile(certainty, 2)
-    return math.sqrt(float(told @ told) / scatter), math.sqrt(2.0 * float(np.mean(angles**2)))
+    return math.sqrt(float(told @ told) / spread), math.sqrt(2.0 * float(np.mean(angles**2)))
 
 
 def scatter(contacts: Array, normals: Array, slopes: Array) -> tuple[float, float]:

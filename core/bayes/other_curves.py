@@ -34,10 +34,9 @@ def contradicting_curve(
     if len(numbers) < ENOUGH:
         return 0.0, 0.0
     others = (curve != numbers[numbers >= 0][:, None]).astype(float)
-    k1, k2 = (2.0 * float(posterior.mean[i]) for i in (2, 4))
-    found = _most_off(
-        contacts, others, posteriors_of(k1, k2, contacts, others, float(posterior.noise), False)
-    )
+    k1, k2 = (2.0 * float(posterior.mean[i]) for i in (2, 4))  # The terms x^2 and y^2.
+    told = posteriors_of(k1, k2, contacts, others, float(posterior.noise), by_evidence=False)
+    found = _most_off(contacts, others, told)
     if found[0] <= NOTICED:
         return found
     return _most_off(contacts, others, posteriors_of(k1, k2, contacts, others, noise))

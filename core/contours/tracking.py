@@ -38,8 +38,8 @@ def track(
     Returns one Contour for each plane, from azimuth + 180 degrees to azimuth, which contains the exact point.
     Raises ValueError for bad numbers, and if there is no surface at the point.
     """
-    step = number("step", step, above=0.0)
-    _count(number("extent", extent, above=0.0), step)
+    step, extent = number("step", step, above=0.0), number("extent", extent, above=0.0)
+    _count(extent, step)
     return following(surface, point, outward, planes, step=step, noise=noise, rng=rng, tangent=tangent)(
         extent
     )

@@ -3,6 +3,7 @@
 """Whether a reconstruction can be trusted: what gives reason to doubt it, and what to do about that."""
 
 import math
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +30,6 @@ CONTRADICTING_CURVE = 7.0  # Deviations by which half of a curve is off what the
 DOUBTFUL_FIT = 0.01  # Share of the radius by which half of the contacts are off, beyond their noise.
 CONTRADICTING = 3.0  # Mean number of deviations by which the surface is off the patch between the curves.
 DOUBTFUL_GAP = 0.1  # Share of the taps between the curves that feel no surface.
-
 
 Judged = Any  # A Reconstruction, whose module imports this one.
 
@@ -59,7 +59,8 @@ def doubt(r: Judged) -> tuple[str, str] | None:
             "The contacts alone do not determine the surface between the curves (condition number "
             f"{r.condition_number:.1e}): use another method or add sampling planes."
         )
-    return _about_data(r) or _about_heights(r) or _about_frame(r) or _about_curves(r) or _about_waves(r)
+    message = next(_doubts(r), None)
+    return None if message is None else ("uncertain", message)
 
 
 def contradicted(taps: Taps | None) -> tuple[str, str] | None:
@@ -93,79 +94,79 @@ def notes(r: Judged) -> str:
     return message
 
 
-def _about_data(r: Judged) -> tuple[str, str] | None:
+def _doubts(r: Judged) -> Iterator[str]:
+    """Every sentence of advice where there is doubt, the gravest first."""
+    yield from _about_data(r)
+    yield from _about_heights(r)
+    yield from _about_frame(r)
+    yield from _about_curves(r)
+
+
+def _about_data(r: Judged) -> Iterator[str]:
     deviations, angle = r.contradiction
     if deviations > SIGNIFICANT and angle > CONTRADICTED:
-        return "uncertain", (
+        yield (
             f"The measured normals contradict the contacts by {math.degrees(angle):.1f} degrees on "
             "average, more than their deviation explains: check the frame they were measured in, or "
             "leave them out."
         )
     deviations, angle = r.normal_scatter
     if deviations > SCATTERED_DEVIATIONS and angle > SCATTERED:
-        return "uncertain", (
+        yield (
             f"The measured normals are off the curves by {math.degrees(angle):.0f} degrees, which is "
             f"{deviations:.0f} times their deviation: check which contact each belongs to, give their "
             "deviation, or leave them out."
         )
     missed = r.typical_miss / r.radius
     if missed > DOUBTFUL_FIT + r.noise:
-        return "uncertain", (
+        yield (
             f"Half of the contacts are off the patch by more than {100.0 * missed:.1f} % of the radius, "
             "which their noise does not explain: use a shorter extent or give their noise."
         )
-    return None
 
 
-def _about_heights(r: Judged) -> tuple[str, str] | None:
+def _about_heights(r: Judged) -> Iterator[str]:
     share = r.mean_height_std / r.radius
     if share > DOUBTFUL_STD:
-        return "uncertain", (
+        yield (
             f"Heights are accurate to {100.0 * share:.1f} % of the radius on average: use a shorter "
             "extent or add sampling planes."
         )
-    return None
 
 
-def _about_frame(r: Judged) -> tuple[str, str] | None:
+def _about_frame(r: Judged) -> Iterator[str]:
     distances, stds = r.misses.T / r.radius
     stds = np.maximum(stds, LEAST_SCATTER * r.noise)
     apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))
     if len(apart):
-        return "uncertain", (
+        yield (
             f"Curve {apart[0] + 1} passes the reference point at {r.radius * distances[apart[0]]:.3g}"
             ", more than its scatter explains: set the point where the curves meet."
         )
     turn = r.posterior.turn() if r.residual is None else r.posterior.turn(LIKELY)
     if turn > DOUBTFUL_TURN and not r.posterior.is_round:
-        return "uncertain", (
+        yield (
             f"The principal directions may be {math.degrees(turn):.0f} degrees off: use a longer "
             "extent or add sampling planes."
         )
     std = r.posterior.curvature_std()
     if std > DOUBTFUL_CURVATURE:
-        return "uncertain", (
+        yield (
             f"Curvatures are accurate to only {std / r.radius:.2g} in the least known direction: "
             "use a longer extent or add sampling planes."
         )
-    return None
 
 
-def _about_curves(r: Judged) -> tuple[str, str] | None:
+def _about_curves(r: Judged) -> Iterator[str]:
     deviations, off = r.curve_contradiction
     if deviations > CONTRADICTING_CURVE:
-        return "uncertain", (
+        yield (
             f"A curve is {100.0 * off:.2g} % of the radius off what the others show, {deviations:.0f} times "
             "the deviation, as if it were upside down or its plane were another: check each curve."
         )
-    return None
-
-
-def _about_waves(r: Judged) -> tuple[str, str] | None:
     waves = r.waves / r.radius
     if waves > DOUBTFUL_WAVES and not len(r.strokes):
-        return "uncertain", (
+        yield (
             f"Waves of {100.0 * waves:.1f} % of the radius run along the curves, which do not show where "
             "they go on between them: use a shorter extent or add sampling planes."
         )
-    return None

@@ -40,7 +40,7 @@ class FirstFrame(NamedTuple):
     k1, k2 : curvatures in unit radius
     radius : the largest distance of a contact from the place in the tangent plane
     contacts : (n, 3), relative to the place, in these axes and in unit radius
-    used : (m,), which of the contacts given these are
+    used : (m,), whether each of the m given contacts is among these
     """
 
     axes: Array
@@ -99,7 +99,7 @@ def means(
     rows = np.count_nonzero((np.diff(when[order]) != 1) | (np.diff(groups[order]) != 0)) + 1
     if strips > LEAST_STRIPS and rows < ROWS * len(starts):
         return means(contacts, along, when, strips - 2)
-    order = np.argsort(groups, kind="stable")
+    order = np.argsort(groups, kind="stable")  # Sums are the same whenever each contact was felt.
     counts = np.diff(starts, append=n)[:, None]
     over = contacts[order]
     basis = _basis(over)
@@ -169,9 +169,9 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
     axes, k1, k2, _ = turned(plane, quadric[1:], tangent)
     local = r @ axes
     flat = np.hypot(local[:, 0], local[:, 1])
-    near = np.abs(local[:, 2] - quadric[0] * share * reach) <= flat.max()
-    local = local[near]
-    used[used] = near
+    on_this_side = np.abs(local[:, 2] - quadric[0] * share * reach) <= flat.max()
+    local = local[on_this_side]
+    used[used] = on_this_side
     if len(local) < len(QUADRIC):
         return _too_few(len(local))
     radius = float(np.hypot(local[:, 0], local[:, 1]).max())

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The import of measured contours: File > Import, and files that are dropped into a viewport."""
 
+import json
 from pathlib import Path
 
 import bpy
@@ -65,6 +66,11 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         "file's, or the point nearest to all curves",
         options={"SKIP_SAVE", "SKIP_PRESET"},
     )
+    exact_point: StringProperty(
+        description="The reference point as text, in place of the other, because Blender's numbers have "
+        "single precision",
+        options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
+    )
     strokes: BoolProperty(
         name="Strokes",
         description="No curve passes through the reference point, which is only a place among them",
@@ -120,7 +126,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         touched = measured.fit(
             Path(self._paths[0]).name,
             self._contacts,
-            point=self._given("point"),
+            point=json.loads(self.exact_point) if self.exact_point else self._given("point"),
             outward=self._given("outward"),
             flip=self.flip,
             all_strokes=self.strokes,

@@ -76,7 +76,9 @@ class MeasuredObject:
                 )
         points = np.vstack([c.points for c in felt])
         sign, self._origin = -1.0 if flip else 1.0, np.mean(points, axis=0)
-        require_single("surface", 0.5 * float(np.ptp(points, axis=0).max()), self._origin)
+        reach = 0.5 * float(np.ptp(points, axis=0).max())
+        if reach:  # If all contacts are in one place, core says that there are too few.
+            require_single("surface", reach, self._origin)
         self._felt = [
             replace(
                 c, points=c.points - self._origin, normals=None if c.normals is None else sign * c.normals

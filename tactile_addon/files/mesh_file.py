@@ -11,6 +11,12 @@ from . import mesh_numbers, ply_contacts, whole_file
 
 HEADER = 1 << 16  # The header of a .ply ends within so many bytes.
 INCOMPLETE = "Blender has not written all of it"
+# The operators that import files with these endings, and their options.
+IMPORTS = {
+    ".ply": ("ply_import", {}),
+    ".stl": ("stl_import", {}),
+    ".obj": ("obj_import", {"forward_axis": "Y", "up_axis": "Z"}),
+}
 
 
 def open_file(path):
@@ -29,38 +35,39 @@ def add(path, empty=False):
     """
     if not path.is_file():
         raise OSError(f'there is no file "{path}"')
-    full, kind = str(path.absolute()), path.suffix.lower()
-    imports = {
-        ".ply": lambda: bpy.ops.wm.ply_import(filepath=full),
-        ".stl": lambda: bpy.ops.wm.stl_import(filepath=full),
-        ".obj": lambda: bpy.ops.wm.obj_import(filepath=full, forward_axis="Y", up_axis="Z"),
-    }
-    if kind not in imports:
+    if path.suffix.lower() not in IMPORTS:
         raise OSError(f'cannot read "{path.name}": expected a .blend, .ply, .stl or .obj file')
     if empty:
         bpy.ops.wm.read_homefile(use_empty=True)
-    unreadable, there = (
-        f'no mesh could be read from "{path.name}": is the file complete?',
-        set(bpy.data.objects),
-    )
-    if kind == ".ply" and not _has_header(path):
-        raise OSError(unreadable)
+    _require_readable(path)
+    there = set(bpy.data.objects)
+    operator, options = IMPORTS[path.suffix.lower()]
+    try:
+        # Importers ask for a window, and after `blender -b` none is current.
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            getattr(bpy.ops.wm, operator)(filepath=str(path.absolute()), **options)
+    except RuntimeError as error:
+        raise _unreadable(path) from error
+    for obj in set(bpy.data.objects) - there:
+        if obj.type == "MESH" and len(obj.data.polygons):
+            return obj
+    raise _unreadable(path)
+
+
+def _require_readable(path):
+    """Raises OSError for a file that would end Blender, or of which Blender would read something else."""
+    if path.suffix.lower() == ".ply" and not _has_header(path):
+        raise _unreadable(path)
     wrong = mesh_numbers.unreadable(path)
     if wrong:
         raise OSError(
             f'"{path.name}" has vertices whose coordinates are not finite in single precision, {wrong} of '
             "them: correct or delete these"
         )
-    try:
-        # Importers ask for a window, and after `blender -b` none is current.
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            imports[kind]()
-    except RuntimeError as error:
-        raise OSError(unreadable) from error
-    for obj in set(bpy.data.objects) - there:
-        if obj.type == "MESH" and len(obj.data.polygons):
-            return obj
-    raise OSError(unreadable)
+
+
+def _unreadable(path):
+    return OSError(f'no mesh could be read from "{path.name}": is the file complete?')
 
 
 def _has_header(path):

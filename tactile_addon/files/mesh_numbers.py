@@ -42,7 +42,7 @@ def _of_stl(data):
 
 
 def _of_obj(data):
-    lines = data.replace(b"\\\n", b" ").splitlines()  # A backslash continues a line.
+    lines = map(bytes.lstrip, data.replace(b"\\\n", b" ").splitlines())  # A backslash continues a line.
     return _of_lines([line for line in lines if line.startswith((b"v ", b"v\t"))], AFTER_WORD)
 
 
@@ -56,7 +56,9 @@ def _of_lines(lines, places):
 
 def _is_bad(words, places):
     try:
-        return _of_numbers(np.array([[float(words[place]) for place in places]])) > 0
+        row = [words[place] for place in places]
+        # Python alone takes 1_0 for 10.
+        return any(b"_" in word for word in row) or _of_numbers(np.array([list(map(float, row))])) > 0
     except (ValueError, IndexError):
         return True
 

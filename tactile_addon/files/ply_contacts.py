@@ -97,7 +97,9 @@ def _ply_vertices(name, lines, order):
             raise ValueError(f'{name}: expected an element or a property, got "{" ".join(line)}"') from None
     before = []
     for element, count, properties in elements:
-        if count < 0 or any(kind == "list" for _, kind in properties):
+        has_list = any(kind == "list" for _, kind in properties)
+        is_line = order == PLY_ORDERS["ascii"] and element != "vertex"  # However long its lists are.
+        if count < 0 or (has_list and not is_line):
             break
         fields = [(key, order + kind) for key, kind in properties]
         if element == "vertex":

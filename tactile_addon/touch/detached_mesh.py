@@ -31,27 +31,16 @@ class DetachedMesh(PlacedMesh):
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
         co = coordinates(obj.name, evaluated)
-        mesh = evaluated.data
         # It keeps no reference to the object, which somebody may delete.
         self.name, self._uid = obj.name, obj.session_uid
         self._checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
         self._compared_until = 0.0
         farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
         self.spacing = farthest * np.finfo(np.float32).eps
-        normals = np.empty_like(co)
-        mesh.vertex_normals.foreach_get("vector", normals.ravel())
-        corners = np.empty(len(mesh.loops), dtype=np.int32)
-        mesh.loops.foreach_get("vertex_index", corners)
-        starts = np.empty(len(mesh.polygons), dtype=np.int32)
-        mesh.polygons.foreach_get("loop_start", starts)
-        self.faces = corners[starts[:, None] + np.arange(3)]
-        mesh.calc_loop_triangles()
-        self.triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-        mesh.loop_triangles.foreach_get("vertices", self.triangles.ravel())
+        normals, corners, self.faces, self.triangles = _arrays_of(evaluated.data)
         if np.linalg.det(linear) < 0.0:
             self.triangles = self.triangles[:, ::-1]
-        self.has_face = np.zeros(len(co), dtype=bool)
-        self.has_face[corners] = True
+        self.has_face = np.bincount(corners, minlength=len(co)) > 0
         # Loose vertices cannot be touched and may be far away.
         self.size = float((np.ptp(co[self.has_face], axis=0) * np.linalg.norm(linear, axis=0)).max())
         self.points, self.normals = co @ linear.T, normals @ np.linalg.inv(linear)
@@ -100,3 +89,17 @@ class DetachedMesh(PlacedMesh):
 
     def _nearest(self, local):
         return self._tree.find_nearest(local)[:2]
+
+
+def _arrays_of(mesh):
+    """Normals (n, 3) of a mesh's vertices, and the vertices of its corners, faces and triangles."""
+    normals = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertex_normals.foreach_get("vector", normals.ravel())
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    starts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    mesh.calc_loop_triangles()
+    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    return normals, corners, corners[starts[:, None] + np.arange(3)], triangles

@@ -286,8 +286,41 @@ def test_a_mesh_file_with_numbers_that_blender_reads_as_0_is_refused(command, em
     )
 
 
-def test_a_word_in_place_of_a_number_is_refused_too(command, empty, tmp_path):
-    (tmp_path / "mesh.obj").write_bytes(mesh_data("mesh.obj", "0,5"))
+@pytest.mark.parametrize("word", ["0,5", "1_0"])
+def test_a_word_in_place_of_a_number_is_refused_too(command, empty, tmp_path, word):
+    (tmp_path / "mesh.obj").write_bytes(mesh_data("mesh.obj", word))
     code, _, err = command("map", tmp_path / "mesh.obj")
     assert code == 1
     assert "1 of them: correct or delete these" in err
+
+
+def test_numbers_that_blender_reads_as_0_are_found_wherever_vertices_are(command, empty, tmp_path):
+    indented = mesh_data("mesh.obj", "nan").replace(b"v ", b"  v ")
+    (tmp_path / "mesh.obj").write_bytes(indented)
+    assert "1 of them: correct or delete these" in command("map", tmp_path / "mesh.obj")[2]
+    head, rows = mesh_data("text.ply", "nan").decode().split("end_header\n")
+    vertices, faces = head.index("element vertex"), head.index("element face")
+    lines = rows.splitlines()
+    (tmp_path / "text.ply").write_text(
+        head[:vertices]
+        + head[faces:]
+        + head[vertices:faces]
+        + "\n".join(["end_header", *lines[-len(FACES) :], *lines[: -len(FACES)], ""])
+    )
+    assert "1 of them: correct or delete these" in command("map", tmp_path / "text.ply")[2]
+
+
+def test_where_curves_meet_is_told_in_double_precision(command, empty, tmp_path):
+    point, t = np.array([1000.00012, 700.0004, -300.0]), np.linspace(-0.01, 0.01, 41)
+    rows = ["curve,x,y,z"]
+    for azimuth in (0, 1, 2):
+        x, y = t * np.cos(azimuth), t * np.sin(azimuth)
+        for place in point + np.column_stack([x, y, -30.0 * x**2 - 10.0 * y**2]):
+            rows.append(f"{azimuth},{','.join(map(repr, place.tolist()))}")
+    path = tmp_path / "curves.csv"
+    path.write_text("\n".join(rows))
+    told = ["--point", *map(repr, point.tolist())]
+    code, out, _ = command("fit", path, *told, "--outward", 0, 0, 1, "--json", "-")
+    assert code == 0
+    report = json.loads(next(line for line in out.splitlines() if line.startswith("{")))
+    assert report["frame"]["origin"] == point.tolist()

@@ -201,3 +201,17 @@ def test_each_object_of_a_scene_is_one(command, tmp_path):
     assert [row["object"] for row in objects] == ["Far", "Near"]
     for row in rows(tmp_path / "set"):
         assert row["location"][2] == pytest.approx({"Near": 0.0, "Far": 3.0}[row["object"]])
+
+
+@pytest.mark.parametrize("name", ["sha256:x", "sha256:" + 64 * "0", "a\nsha256:" + 64 * "0"])
+def test_no_name_is_taken_for_a_checksum(tmp_path, name):
+    from cluster.data_set import folder
+
+    data_set = folder.DataSet(tmp_path, "touches")
+    data_set.create()
+    facts = {"name": name, "file": f"/{name}.ply", "hash": None}
+    data_set.write_errors(facts, 0, range(3), f"{name} is broken")
+    (path,) = data_set.files()
+    assert folder.is_whole(path)
+    assert pq.read_table(path)["object"].to_pylist() == [name] * 3
+    assert not folder.is_whole(path.rename(data_set.block_path("0" * 16, 7)))

@@ -290,9 +290,10 @@ def test_a_block_that_fails_twice_is_error_rows(cluster, objects, tmp_path, plai
     assert (tmp_path / "log.txt").read_text().count("pebble.ply) block 1: It hung") == 2
 
 
-@pytest.mark.parametrize("place", ["/proc/nothing", "{file}/below"])
+@pytest.mark.parametrize("place", ["/proc/nothing", "{file}/below", "{file}s"])
 def test_a_folder_that_takes_nothing_is_said_at_once(command, objects, tmp_path, place):
     (tmp_path / "file").touch()
+    (tmp_path / "files" / "log.txt").mkdir(parents=True)
     folder = place.format(file=tmp_path / "file")
     code, _, error = command(objects, *FEW, "--output", folder)
     assert code == 1
@@ -336,7 +337,11 @@ def foreign(path):
     pq.write_table(pa.table({"a": [1]}), path)
 
 
-@pytest.mark.parametrize("damage", [Path.touch, cut, flip, flip_footer, foreign])
+def replace_by_another(path):
+    path.write_bytes(blocks_of(path.parent.parent)[0].read_bytes())
+
+
+@pytest.mark.parametrize("damage", [Path.touch, cut, flip, flip_footer, foreign, replace_by_another])
 def test_a_damaged_block_is_named_and_made_again(command, objects, plain, tmp_path, damage):
     for path in (plain / "manifest.json", *blocks_of(plain)):
         target = tmp_path / path.relative_to(plain)
@@ -459,6 +464,15 @@ def test_an_interrupted_run_ends_cleanly_and_goes_on_later(command, objects, pla
     code, _, error = command(objects, *FEW, "--output", tmp_path)
     assert code == 0 and f"{made} of 9 blocks are there already" in error
     assert rows_of(tmp_path) == rows_of(plain)
+
+
+def test_workers_do_not_print_that_a_heartbeat_met_the_end_of_their_scheduler(cluster):
+    def prints(dask_worker):
+        import logging
+
+        return logging.getLogger(type(dask_worker).__module__).isEnabledFor(logging.ERROR)
+
+    assert not any(cluster.run(prints).values())
 
 
 def test_a_worker_of_another_environment_is_refused(command, objects, tmp_path, monkeypatch):

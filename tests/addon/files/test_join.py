@@ -174,6 +174,12 @@ def test_contacts_that_single_precision_does_not_hold_are_refused(command, write
     assert "{" not in out
 
 
+def test_contacts_in_one_place_are_too_few(empty, write):
+    path = write("one.csv", [Contour([[1.0, 2.0, 3.0]], normals=[[0.0, 0.0, 1.0]])])
+    with pytest.raises(RuntimeError, match="expected 40 contacts or more, got 1"):
+        joined(empty, [path])
+
+
 def test_normals_without_a_direction_are_named(empty, write):
     points, normals = ball(400)
     path = write("ball.csv", [Contour(points, normals=0.0 * normals)])

@@ -92,6 +92,9 @@ def test_the_unit_of_contacts_and_the_length_of_normals_change_nothing(scale, le
     assert np.linalg.norm(other.vertices / scale, axis=1) == pytest.approx(1.0, abs=0.01)
 
 
-def test_an_empty_mesh_is_not_closed():
+def test_an_empty_mesh_is_not_closed_and_has_edges_of_no_length():
     none = np.empty((0, 3))
-    assert not core.Mesh(none, none.astype(np.intp), np.empty(0), np.empty(0, dtype=np.intp)).is_closed
+    mesh = core.Mesh(none, none.astype(np.intp), np.empty(0), np.empty(0, dtype=np.intp))
+    assert not mesh.is_closed
+    assert mesh.edge == 0.0
+    assert core.shortest_edge(mesh.vertices, mesh.triangles) == 0.0

