@@ -72,29 +72,49 @@ def block(a=1.0, b=0.7, c=0.5):
         u, v, w = abs(x) - a, abs(y) - b, abs(z) - c
         return math.hypot(max(u, 0.0), max(v, 0.0), max(w, 0.0)) + min(max(u, v, w), 0.0)
 
-    return Block(distance, (0.05, 0.03, c), (0.0, 0.0, 1.0), (a, b, c))
+    walls = tuple(
+        (tuple(side * row), size) for row, size in zip(np.eye(3), (a, b, c), strict=True) for side in (1, -1)
+    )
+    return Convex(distance, (0.05, 0.03, c), (0.0, 0.0, 1.0), walls)
+
+
+def prism(sides, radius=1.0, half=0.6):
+    """A regular prism around z; its distance is that of the planes of its walls."""
+    turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+    walls = [((math.cos(t), math.sin(t), 0.0), radius * math.cos(math.pi / sides)) for t in turns]
+    walls += [((0.0, 0.0, 1.0), half), ((0.0, 0.0, -1.0), half)]
+    normals, sizes = (np.array(values) for values in zip(*walls, strict=True))
+    return Convex(
+        lambda x, y, z: float((normals @ (x, y, z) - sizes).max()),
+        (0.05, 0.03, half),
+        (0.0, 0.0, 1.0),
+        tuple(walls),
+    )
 
 
 @dataclass(frozen=True)
-class Block(Solid):
-    """A block, whose faces answer rays at once: walking along a face takes many steps."""
+class Convex(Solid):
+    """A solid of flat walls, which answer rays at once: walking along a wall takes many steps.
 
-    half: tuple
+    walls : outward unit normals n and lengths d; inside, n x < d for all of them
+    """
+
+    walls: tuple
 
     def ray_cast(self, origin, direction, distance):
-        enters, leaves = (-math.inf, 0), (math.inf, 0)
-        for axis, (o, d, half) in enumerate(zip(origin, direction, self.half, strict=True)):
-            if d == 0.0:
-                if abs(o) > half:
-                    return None
-                continue
-            enters = max(enters, ((-math.copysign(half, d) - o) / d, axis))
-            leaves = min(leaves, ((math.copysign(half, d) - o) / d, axis))
-        gone, axis = enters if enters[0] > 0.0 else leaves
+        enters, leaves = (-math.inf, None), (math.inf, None)
+        for normal, size in self.walls:
+            room = size - sum(n * o for n, o in zip(normal, origin, strict=True))
+            slope = sum(n * d for n, d in zip(normal, direction, strict=True))
+            if slope == 0.0 and room < 0.0:
+                return None
+            if slope < 0.0:
+                enters = max(enters, (room / slope, normal), key=lambda at: at[0])
+            elif slope > 0.0:
+                leaves = min(leaves, (room / slope, normal), key=lambda at: at[0])
+        gone, normal = enters if enters[0] > 0.0 else leaves
         if enters[0] > leaves[0] or not 0.0 < gone <= distance:
             return None
-        side = direction[axis] if enters[0] <= 0.0 else -direction[axis]
-        normal = tuple(math.copysign(1.0, side) if i == axis else 0.0 for i in range(3))
         return tuple(o + gone * d for o, d in zip(origin, direction, strict=True)), normal
 
 

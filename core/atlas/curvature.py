@@ -23,7 +23,7 @@ EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nea
 TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.
 ALIKE = 0.5  # Places are on one sheet if the cosine between their normals is more, and the sum of both
 ACROSS = 0.5  # has less of the way between them, which is 0 on a ball.
-BY_STD, BY_MISFIT = 1.15, 0.4  # The shares of the surface's deviation and of the misfit in that of H.
+BY_STD, BY_MISFIT = 0.9, 0.4  # The shares of the surface's deviation and of the misfit in that of H.
 LEAST_SQUARE = 1e-9  # So much, in unit radius, is added to the squares, because places may be in a row.
 
 

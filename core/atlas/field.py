@@ -14,22 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.finger import FACING
 from .charts import MARGIN, Charts, Pairs
 from .indicator import Indicator
 
 # python -m benchmarks.atlas judges these.
 OUTERMOST = 0.999  # Weights beyond this share of MARGIN are those there, so that none is 0.
 FLOOR = 1e-3  # No deviation below this share of the radius counts in a weight.
-# The cosine of 50 degrees: from there to FACING a patch fades out of a blend.
-AGREE = 0.64
+# The cosines of 37 and of 53 degrees: patches that turn by less are one wall, from there on they fade out of
+# it, and those that turn by more are another wall.
+AGREE, APART = 0.8, 0.6
 # Patches of one wall differ in distance by at most this share of the radius, and this share of the distance
 # more.
 LAYER, SLANT = 0.15, 0.5
 INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
 SIDEWAYS = 0.15  # A patch faces as the indicator does if the cosine between their normals is more.
 CONTINUED = 1.6  # Where no patch is, those count that can be continued by this factor of their radius.
-FARTHEST = 5.0  # A crease is looked for within so many cells along the normals of its walls.
+FARTHEST = 10.0  # A crease is looked for within so many cells along the normals of its walls.
 LEAST_SINE = 0.1  # Walls of a crease count as turned by this much at least.
 WALLS = 3  # At most so many walls meet at a place.
 
@@ -106,7 +106,7 @@ def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius:
 def _facing(pairs: Pairs, up: Array) -> Array:
     """From 1 to 0, (m,), how much patches face the way of normals (m, 3)."""
     cosine: Array = np.einsum("mi,mi->m", pairs.normal, up)
-    agree: Array = np.clip((cosine - FACING) / (AGREE - FACING), 0.0, 1.0)
+    agree: Array = np.clip((cosine - APART) / (AGREE - APART), 0.0, 1.0)
     agree *= agree * (3.0 - 2.0 * agree)
     return agree
 
@@ -202,7 +202,7 @@ def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
     pairs = charts.pairs(points)
     on = pairs.share < INSIDE
     on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
-    on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > FACING
+    on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > APART
     found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
     return found
 

@@ -17,7 +17,7 @@ NEAR, TURNS = 0.02, 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
 RAYS = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
 
 
-class Pierced(solids.Block):
+class Pierced(solids.Convex):
     """A block with a hole of a radius of .15 along z, whose walls answer no ray."""
 
     def ray_cast(self, origin, direction, distance):
@@ -46,7 +46,7 @@ def test_a_touch_of_a_flat_face_goes_on_to_its_edges_and_corners():
 
 
 def test_where_there_is_a_hole_a_patch_ends_before_it():
-    block = Pierced(solids.block().distance, (-0.1, 0.0, 0.5), (0.0, 0.0, 1.0), solids.block().half)
+    block = Pierced(solids.block().distance, (-0.1, 0.0, 0.5), (0.0, 0.0, 1.0), solids.block().walls)
     r, rim = rim_of(block, extent=0.42)
     points = r.frame.to_world(np.column_stack([rim, np.zeros(AZIMUTHS)]))
     toward = np.abs(points[:, 1]) < 0.1 * (points[:, 0] + 0.1)

@@ -14,12 +14,12 @@ from core.exploration.side_by_side import result_of
 from tests import solids
 
 BLOCK = solids.block()
-HALF = np.array(BLOCK.half)
+HALF = np.array([1.0, 0.7, 0.5])
 CORNERS = HALF * (np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3))
 TOLERANCE = 8e-3
 
 
-class Room(solids.Block):
+class Room(solids.Convex):
     """The inside of the block: air with six walls around it, whose edges are all concave."""
 
     def ray_cast(self, origin, direction, distance):
@@ -27,7 +27,7 @@ class Room(solids.Block):
         return hit and (hit[0], tuple(-n for n in hit[1]))
 
 
-ROOM = Room(BLOCK.distance, (0.05, 0.03, -0.5), (0.0, 0.0, 1.0), BLOCK.half)
+ROOM = Room(BLOCK.distance, (0.05, 0.03, -0.5), (0.0, 0.0, 1.0), BLOCK.walls)
 
 
 def explored(solid, **options):
