@@ -23,7 +23,7 @@ from tools import blender, demo
 from . import ROOT, machine, table
 
 APART, SIZE = 1.1, 1.15  # Objects are so far apart in the picture, and their diagonal is so long.
-WIDTH, SAMPLES = 1800, 48
+COLUMNS, WIDTH, SAMPLES = 6, 1800, 48
 
 
 def shapes():
@@ -118,14 +118,15 @@ def draw(pairs):
     import bpy
 
     scene = bpy.context.scene
-    for column, (source, made) in enumerate(pairs):
+    for i, (source, made) in enumerate(pairs):
         made.data.materials.clear()
         for line, obj in enumerate((source, made)):
             demo.look(scene, obj)
-            placed(obj, column, line)
+            placed(obj, i % COLUMNS, 2 * (i // COLUMNS) + line)
+    columns, lines = min(len(pairs), COLUMNS), 2 * math.ceil(len(pairs) / COLUMNS)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.type, camera.data.ortho_scale = "ORTHO", APART * len(pairs)
-    camera.location = (0.5 * APART * (len(pairs) - 1), -0.5 * APART, 10.0)
+    camera.data.type, camera.data.ortho_scale = "ORTHO", APART * max(columns, lines)
+    camera.location = (0.5 * APART * (columns - 1), -0.5 * APART * (lines - 1), 10.0)
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 1.5, (-0.6, -0.5, 0.0)
     for obj in (camera, sun):
@@ -133,7 +134,7 @@ def draw(pairs):
     scene.camera = camera
     path = ROOT / "build" / "charts" / "add_menu.png"
     path.parent.mkdir(parents=True, exist_ok=True)
-    demo.photograph(scene, path, WIDTH, round(WIDTH * 2.1 / len(pairs)), SAMPLES)
+    demo.photograph(scene, path, WIDTH, round(WIDTH * lines / columns), SAMPLES)
 
 
 def main():
