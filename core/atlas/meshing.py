@@ -254,9 +254,10 @@ def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) ->
     beyond = triangles[~inside[triangles].all(axis=1)]
     links = np.ones(2 * len(beyond)), (beyond[:, :2].ravel(), beyond[:, 1:].ravel())
     count, piece = connected_components(coo_matrix(links, (len(vertices),) * 2))
-    far = beyond[~near[beyond].any(axis=1)]
-    a, b, c = vertices[far].transpose(1, 0, 2)
-    areas = np.bincount(piece[far[:, 0]], 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), count)
+    a, b, c = vertices[beyond].transpose(1, 0, 2)
+    # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
+    far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
+    areas = np.bincount(piece[beyond[:, 0]], far, count)
     beside = np.bincount(piece[inside], minlength=count) > 0
     gone = ~inside & ((areas > BRIDGED * cell**2) | ~beside)[piece]
     std = np.where(surface.node < 0, cell, surface.std)
