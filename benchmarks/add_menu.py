@@ -22,7 +22,7 @@ from tools import blender, demo
 
 from . import ROOT, machine, table
 
-APART, SIZE = 1.1, 1.15  # Objects are so far apart in the picture, and their diagonal is so long.
+APART, SIZE = 1.1, 1.05  # Objects are so far apart in the picture, and their diagonal is so long.
 COLUMNS, WIDTH, SAMPLES = 6, 1800, 48
 
 
@@ -128,7 +128,7 @@ def draw(pairs):
     camera.data.type, camera.data.ortho_scale = "ORTHO", APART * max(columns, lines)
     camera.location = (0.5 * APART * (columns - 1), -0.5 * APART * (lines - 1), 10.0)
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.data.energy, sun.rotation_euler = 1.5, (-0.6, -0.5, 0.0)
+    sun.data.energy, sun.rotation_euler = 3.0, (-0.9, -0.6, 0.0)
     for obj in (camera, sun):
         scene.collection.objects.link(obj)
     scene.camera = camera
