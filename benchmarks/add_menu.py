@@ -128,7 +128,7 @@ def draw(pairs):
     camera.data.type, camera.data.ortho_scale = "ORTHO", APART * max(columns, lines)
     camera.location = (0.5 * APART * (columns - 1), -0.5 * APART * (lines - 1), 10.0)
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.data.energy, sun.rotation_euler = 3.0, (-0.9, -0.6, 0.0)
+    sun.data.energy, sun.data.use_shadow, sun.rotation_euler = 3.0, False, (-0.9, -0.6, 0.0)
     for obj in (camera, sun):
         scene.collection.objects.link(obj)
     scene.camera = camera
