@@ -131,7 +131,8 @@ def _around(sheets: Sheets, points: Array, normals: Array, distance: Array, at: 
 
 def _fitted(distance: Array, local: Array, radius: Array) -> _Fit:
     """Quadrics of the radii (n,) fitted to places at distances (n, k) with local terms (n, k, 4)."""
-    weights: Array = np.maximum(1.0 - (distance / radius[:, None]) ** 2, 0.0) ** 2
+    inside: Array = np.maximum(1.0 - (distance / radius[:, None]) ** 2, 0.0)
+    weights = inside * inside
     weights /= np.maximum(weights.sum(axis=1, keepdims=True), LEAST_DIVISOR)
     terms = local - np.einsum("nk,nki->ni", weights, local)[:, None]
     terms[:, :, :2] /= radius[:, None, None]
