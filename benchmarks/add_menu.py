@@ -7,7 +7,7 @@ It prints a Markdown table and draws build/charts/add_menu.png, objects above an
 
 Deviations are those of the report, both ways between surface and object, in tolerances (1/500 of the size).
 Open edges, Euler number and pieces are of the touched surface, and in brackets of the object where these
-differ; vertices of the object in the same place count as one.
+differ; vertices of the object in the same place, as those of a converted text, count as one.
 """
 
 import argparse
@@ -72,21 +72,22 @@ def touched(add):
     return source, bpy.context.view_layer.objects.active, process_time() - start
 
 
-def shape_of(obj):
-    """The topology of an evaluated object, with vertices in the same place merged."""
+def shape_of(obj, *, merged):
+    """The topology of an evaluated object; vertices in the same place may count as one."""
     import bpy
 
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     mesh.calc_loop_triangles()
     points = np.array([vertex.co for vertex in mesh.vertices])
     triangles = np.array([triangle.vertices for triangle in mesh.loop_triangles])
-    merged = np.unique(points.round(6), axis=0, return_inverse=True)[1].ravel()
-    return topology(merged[triangles])
+    if merged:
+        triangles = np.unique(points.round(6), axis=0, return_inverse=True)[1].ravel()[triangles]
+    return topology(triangles)
 
 
 def row(name, source, made, seconds):
     record = made["tactile_object"].to_dict()
-    found, true = (shape_of(obj) for obj in (made, source))
+    found, true = shape_of(made, merged=False), shape_of(source, merged=True)
     shape = f"{found.open} / {found.euler} / {found.pieces}"
     if (found.open > 0, found.euler, found.pieces) != (true.open > 0, true.euler, true.pieces):
         shape += f" ({true.open} / {true.euler} / {true.pieces})"
