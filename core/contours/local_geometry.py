@@ -122,7 +122,8 @@ def degeneracy(
         )
     in_plane = tangents - heights[:, None] * normal
     lengths = np.sqrt(np.einsum("ci,ci->c", in_plane, in_plane))
-    if not lengths.min() > 0.0:
+    # Tangents have length 1, but that of a curve which goes round again is 0, but for rounding.
+    if not lengths.min() > 0.5:
         return DegenerateCurvesError(
             f"curve {np.argmin(lengths) + 1} has no direction at the point: split it where it passes the "
             "point again, or sort its contacts"

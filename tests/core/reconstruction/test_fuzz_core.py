@@ -370,9 +370,8 @@ def test_many_touches_with_one_of_them_broken(touch):
     found, other = many
     examine(other)
     if alone is None:
-        # A curve that goes round twice has no direction but by rounding, which leaves a fit in doubt.
-        assert isinstance(found, DegenerateCurvesError) or found.status == "uncertain"
-        assert not isinstance(found, DegenerateCurvesError) or is_sentence(found), found
+        assert isinstance(found, DegenerateCurvesError)
+        assert is_sentence(found), found
         return
     examine(found)
     # Where a fit is in doubt, rounding may decide between two surfaces.
