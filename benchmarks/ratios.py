@@ -43,7 +43,7 @@ def compare(base, cases, tasks):
             seconds = np.array([_asked(ask, i, rounds) for i in range(len(cases[kind]))])
             groups = {task: np.full(len(seconds), True)}
             if task == "fit":
-                groups = {"fit, no residual": smooth, "fit, residual": ~smooth}
+                groups = {"fit, no process": smooth, "fit, process": ~smooth}
             rows += [_row(title, seconds[which], cases, task) for title, which in groups.items()]
     table(["medians, ms", "this", "base", "this / base", "thin plate", "this / thin plate", "cases"], rows)
 
@@ -80,7 +80,7 @@ def answer(worker, task):
 
 
 def cases():
-    """The cases that speed_worker.py reads, and which of its fits have no residual, booleans (n,)."""
+    """The cases that speed_worker.py reads, and which of its fits have no process, booleans (n,)."""
     scans = [Scan(path) for path in sorted(SCANS_FOLDER.glob("*.*"))]
     places = [list(scan.places(POINTS, 1)) for scan in scans]
     together = [[np.array(part) for part in zip(*scan.places(BATCH, 2), strict=True)] for scan in scans]
@@ -94,7 +94,7 @@ def cases():
         "touches": [(i, *place) for i, of in enumerate(places) for place in of],
         "batches": [(i, *of) for i, of in enumerate(together)],
     }
-    return found, np.array([r.residual is None for r in results])
+    return found, np.array([not r.posterior.amplitude for r in results])
 
 
 def _exact():

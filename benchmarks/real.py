@@ -16,7 +16,7 @@ prints Markdown tables:
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
 `--chart`, without `--only`, also draws build/charts/real_surfaces.png. `--only choose` chooses the constants
-of the residual for each scan on all others, and judges them on that one; `--only taps` does so with the
+of the process for each scan on all others, and judges them on that one; `--only taps` does so with the
 constants of the taps.
 """
 
@@ -33,11 +33,10 @@ from typing import NamedTuple
 import numpy as np
 
 from core import SamplingPlane, explore, reconstruct, track
-from core.bayes import residual_evidence, rough_fit
+from core.bayes import evidence, kernel, process_fit
 from core.exploration import one_touch, taps
-from core.patch import geometry, residual
 from core.patch.monge import exponents, monomials
-from core.reconstruction import status
+from core.reconstruction import result, status
 from tools import blender
 
 from . import SCANS_FOLDER, machine, table
@@ -131,10 +130,10 @@ class Score(NamedTuple):
 
 @contextmanager
 def constants(**values):
-    """Sets constants of the residual, the taps or the status within this context."""
+    """Sets constants of the process, the taps or the status within this context."""
     modules = [
         m
-        for m in (geometry, residual, residual_evidence, rough_fit, one_touch, taps, status)
+        for m in (kernel, evidence, process_fit, result, one_touch, taps, status)
         if any(hasattr(m, name) for name in values)
     ]
     if unknown := [name for name in values if not any(hasattr(m, name) for m in modules)]:
@@ -164,7 +163,7 @@ def ours(touch, **values):
     return Fit(r.frame.axes, within(r.height), (r.patch.k1, r.patch.k2), within(r.height_std))
 
 
-OURS, ALONE, PROCESS = "bayes", "without residual", "Matérn process on a quadric"
+OURS, ALONE, PROCESS = "bayes", "without process", "Matérn process on a quadric"
 # These settings were the best ones on the scans.
 METHODS = {
     OURS: ours,

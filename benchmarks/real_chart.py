@@ -10,7 +10,7 @@ from . import machine, plot
 
 STYLES = (  # These are in the order of benchmarks.real's methods.
     ("bayes", plot.BLUE, "o"),
-    ("without residual", plot.SKY, "s"),
+    ("without process", plot.SKY, "s"),
     ("RBF thin plate", plot.GREEN, "^"),
     ("RBF cubic", plot.VERMILION, "v"),
     ("Matérn process", plot.PURPLE, "D"),

@@ -154,10 +154,9 @@ def _departure(one, other):
 PARTS = {
     "curves through the point": (start, "curves_through"),
     "Darboux frame": (start, "darboux_frames"),
-    "equations of the contacts": (joint_fit, "linear_system"),
-    "their QR": (joint_fit, "restricted"),
+    "equations of the contacts": (joint_fit, "sextics"),
     "waviness and noise": (joint_fit, "hyperparameters"),
-    "posterior": (joint_fit, "posterior"),
+    "posterior": (joint_fit, "posterior_given"),
     "patch and domain": (stacks, "_result"),
 }
 

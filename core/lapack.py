@@ -95,14 +95,12 @@ def solved_definite(matrix: Array, right: Array) -> Array:
 
 
 @on_one_thread
-def inverse_definite(matrix: Array) -> Array:
-    """The inverse of a positive definite matrix (m, m), whose lower triangle is used up."""
-    from scipy.linalg.lapack import dpotri
+def inverse_lower(factor: Array) -> Array:
+    """The inverse of a lower triangular matrix (m, m), which is used up."""
+    from scipy.linalg.lapack import dtrtri
 
-    upper: Array = dpotri(cholesky(matrix).T, lower=0, overwrite_c=1)[0]
-    upper += upper.T
-    upper.flat[:: len(upper) + 1] *= 0.5
-    return upper
+    inverse: Array = dtrtri(factor.T, lower=0, overwrite_c=1)[0]
+    return inverse.T
 
 
 @on_one_thread

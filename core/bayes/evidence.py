@@ -1,53 +1,50 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How wavy a surface is, and how noisy its contacts are: by marginal likelihood, for joint_fit.py."""
+"""The hyperparameters by the marginal likelihood of the contacts: waviness, amplitude of the process, noise.
 
+They are averages over a grid. Where the amplitude is 0 the heights are those of a polynomial, and their
+likelihood follows from 27 x 27 matrices, in stacks of touches. Where it is not, a matrix has a row for each
+contact, and the waviness is USUAL_WAVINESS, because the process explains the rest.
+"""
+
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arguments import Array
-from ..patch.monge import TERMS
-from .posterior import FREE, ORDERS
+from ..lapack import cholesky_in_place
+from .prior import FREE, USUAL_WAVINESS, prior_variances
 
-WAVINESS_POWERS = ORDERS[FREE:] - 1.0  # The prior deviation of each term is this power of the waviness.
 # Chosen with benchmarks.accuracy.
-PRIOR_SCALE = 0.1
 WAVINESS = np.geomspace(0.15, 1.3, 6)
-USUAL_WAVINESS, WAVINESS_SPREAD = 0.6, 0.5  # Median and sigma of the waviness's log-normal prior.
+WAVINESS_SPREAD = 0.5  # The waviness has a log-normal prior with the median USUAL_WAVINESS and this sigma.
 NOISES = 5  # The grid of the noise has so many points, from the floor up.
-UPWARD = np.arange(NOISES) / (NOISES - 1.0)
 FREE_PRECISION = 1e-4  # Prior precision of the five free terms: nearly none, it keeps the matrix invertible.
 ROUNDING = 1e-13  # Rounding takes at most this share of a system's trace.
 UNLIKELY = 1400.0  # The exponential of half this difference of -2 log likelihood is still a number.
 GROUP = 4  # The likelihoods of so many touches are computed at once (benchmarks.speed).
+# Chosen with benchmarks.real.
+AMPLITUDES = np.array([0.003, 0.01, 0.04, 0.14, 0.5])  # Grid of the process's deviation, in unit radius.
+SEXTIC_WAVINESS = np.array([0.3, 0.6, 1.2])  # The waviness of the polynomials that a process competes with.
+PROCESS_NOISES, MIDDLE = 3, 1  # Grid points of the noise, up to what the sextic leaves; the middle one.
+ODDS = 0.2  # There is a process from these odds on: it costs a smooth surface little.
+NEGLIGIBLE = 160.0  # If -2 log likelihood exceeds the best by more, no other noise is tried.
+# Prior variance of slopes and second derivatives beside a process: with 100 they run away if curves end
+# early.
+FREE_VARIANCE = 0.06
+# The log likelihood counts by this share: neighbors on a curve do not tell of waves between curves.
+TEMPER = 0.1
 
-
-class Restricted(NamedTuple):
-    """What b touches say of the terms of degree 3 to 6, whatever the free terms are.
-
-    triangle (b, 22, 22) @ coefficients ~ target (b, 22) in the sense of least squares, which leaves the sum
-    of squares `square` (b,); each touch has `contacts` (b,) contacts.
-    """
-
-    triangle: Array
-    target: Array
-    square: Array
-    contacts: Array
-
-
-class Hyperparameters(NamedTuple):
-    """Prior variances (b, 22), typical for the waviness and averaged over it, and the noise (b,)."""
-
-    typical: Array
-    variances: Array
-    noise: Array
+VARIANCES = prior_variances(WAVINESS)
+LOG_VARIANCES = np.log(VARIANCES)
+UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior.
 
 
 class NormalEquations(NamedTuple):
-    """The normal equations gram @ coefficients = seen of b touches with `contacts` (b,), as one matrix each.
+    """The normal equations gram @ coefficients = rhs of b touches with `contacts` (b,), as one matrix each.
 
-    bordered : (b, 28, 28), [[gram, seen], [seen', square]]
+    bordered : (b, 28, 28), [[gram, rhs], [rhs', square]]; square is the sum of the squares of the heights
     """
 
     bordered: Array
@@ -59,84 +56,89 @@ class NormalEquations(NamedTuple):
         return self.bordered[:, :-1, :-1]
 
     @property
-    def seen(self) -> Array:
-        """The right side of the normal equations, (b, 27)."""
+    def rhs(self) -> Array:
+        """The right-hand side of the normal equations, (b, 27)."""
         return self.bordered[:, :-1, -1]
 
-    @property
-    def square(self) -> Array:
-        """The sum of the squares of the heights, (b,)."""
-        return self.bordered[:, -1, -1]
+
+class Hyperparameters(NamedTuple):
+    """Prior variances (b, 22), typical for the waviness and averaged over it, and the noise (b,)."""
+
+    typical: Array
+    variances: Array
+    noise: Array
 
 
-def prior_variances(waviness: Array) -> Array:
-    """Prior variances of the coefficients of degree 3 to 6, (..., 22), for waviness (...)."""
-    return (PRIOR_SCALE * waviness[..., None] ** WAVINESS_POWERS) ** 2
+class ProcessHyperparameters(NamedTuple):
+    """Variances (2,) of the process, for each of LENGTHS, the noise, and whether contacts ask for it."""
+
+    variances: Array
+    noise: float
+    use_gp: bool
 
 
-VARIANCES = prior_variances(WAVINESS)
-LOG_VARIANCES = np.log(VARIANCES)
-UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior.
+def precision_of(waviness: Array, free: float) -> Array:
+    """Prior precisions of the coefficients, (..., 27), for waviness (...) and the precision of free terms."""
+    higher = 1.0 / prior_variances(waviness)
+    return np.concatenate([np.full((*higher.shape[:-1], FREE), free), higher], axis=-1)
 
 
-def restricted(data: NormalEquations) -> Restricted:
-    """What contacts say of the higher terms, by a Cholesky factor of their system bordered by the heights."""
-    bordered = data.bordered.copy()
-    diagonal = np.einsum("bii->bi", bordered)  # a view
-    # What is added exceeds what rounding takes from directions that no contact shows, and is far below noise.
-    whole = diagonal.cumsum(axis=1)
-    diagonal[:, :-1] += ROUNDING * whole[:, -2:-1]
-    diagonal[:, -1] += ROUNDING * whole[:, -1]
-    triangle: Array = np.linalg.cholesky(bordered).transpose(0, 2, 1)
-    target, square = triangle[:, FREE:-1, -1], triangle[:, -1, -1] ** 2
-    return Restricted(triangle[:, FREE:-1, FREE:-1], target, square, data.contacts)
+def neg2_log_evidence(
+    heights: NormalEquations, slopes: NormalEquations | None, precision: Array, noises: Array
+) -> Array:
+    """-2 log marginal likelihood of b touches without a process, (b, w, n), up to a constant.
 
+    heights : of the contacts; slopes : of measured normals, in units of their deviations
+    precision : (w, 27), of the prior; noises : (b, n)
 
-def noises(data: Restricted, floor: Array) -> Array:
-    """A grid of the noise, (b, NOISES), from the floor to beyond what a quadric leaves of the contacts."""
-    left = np.einsum("bi,bi->b", data.target, data.target) + data.square
-    largest = 2.0 + 3.0 / floor * np.sqrt(left / data.contacts)
-    return floor[:, None] * largest[:, None] ** UPWARD
-
-
-def evidence(data: Restricted, noises: Array) -> Hyperparameters:
-    """Waviness and noise by their marginal likelihood, in groups that fit into a processor's cache."""
-    if len(noises) <= GROUP:
-        return _evidence_of(data, noises)
-    groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
-    found = [_evidence_of(Restricted(*(part[group] for part in data)), noises[group]) for group in groups]
-    return Hyperparameters(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
-
-
-def _evidence_of(data: Restricted, noises: Array) -> Hyperparameters:
-    """Waviness and noise by the marginal likelihood of the restricted data (REML).
-
-    target ~ N(0, K), K = triangle prior triangle' + noise^2. One Cholesky factor of K bordered by the
-    target, [[K, t], [t', c]], has log |K| in its diagonal and t' K^-1 t in the last of it.
+    With the precision A = gram / noise^2 + slopes' gram + prior^-1 (Rasmussen and Williams 2006, equation
+    2.11) and rhs likewise, it is log |A| + log |prior| + n log noise^2 + y'y / noise^2 - rhs' A^-1 rhs. The
+    Cholesky factor of [[A, rhs], [rhs', y'y / noise^2]] has log |A| in its diagonal, and the last two terms
+    in the last of it.
     """
-    triangle, target, squares = data.triangle, data.target, noises**2
-    b, size = target.shape
-    explained = (triangle[:, None] * VARIANCES[:, None]) @ triangle.transpose(0, 2, 1)[:, None]
-    corner = 2.0 * np.einsum("bi,bi->b", target, target) / squares[:, 0] + 1.0  # c exceeds t' K^-1 t
-    bordered = np.empty((b, len(WAVINESS), noises.shape[1], size + 1, size + 1))
-    bordered[..., :size, :size] = explained[:, :, None]
-    bordered[..., :size, size] = bordered[..., size, :size] = target[:, None, None]
-    # Rounding counts as noise, lest contacts that are no surface leave a matrix without a factor.
-    rounding = ROUNDING * np.einsum("bwii->bw", explained)
-    diagonal = np.einsum("...ii->...i", bordered)  # a view
-    diagonal[..., :size] += (squares[:, None] + rounding[..., None])[..., None]
-    diagonal[..., size] = corner[:, None, None]
-    factors = np.einsum("...ii->...i", np.linalg.cholesky(bordered))
-    others = (data.contacts - len(TERMS))[:, None]  # the number of directions that no term explains
-    whole = others * np.log(squares) + data.square[:, None] / squares + corner[:, None]
-    surprise = 2.0 * np.log(factors[..., :size]).sum(axis=3) - factors[..., size] ** 2 + whole[:, None]
-    return _averaged(surprise, noises)
+    bordered = heights.bordered[:, None] / (noises**2)[..., None, None]
+    if slopes is not None:
+        bordered += slopes.bordered[:, None]
+    bordered = bordered[:, None].repeat(len(precision), axis=1)
+    diagonal = np.einsum("bwnii->bwni", bordered)  # a view
+    diagonal[..., :-1] += precision[:, None]
+    # Adding 1 changes no ratio of likelihoods and keeps rounding from leaving less than 0 over.
+    diagonal[..., -1] += 1.0 + ROUNDING * diagonal.sum(axis=-1)
+    pivots = np.einsum("bwnii->bwni", np.linalg.cholesky(bordered))
+    found: Array = 2.0 * np.log(pivots[..., :-1]).sum(axis=-1) + pivots[..., -1] ** 2
+    found += (heights.contacts[:, None] * np.log(noises**2))[:, None]
+    return found - np.log(precision).sum(axis=1)[:, None]
 
 
-def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
+def noise_grid(heights: NormalEquations, floor: Array) -> Array:
+    """A grid of the noise, (b, NOISES), from the floor (b,) to beyond what a quadric leaves of contacts."""
+    free, rhs = heights.gram[:, :FREE, :FREE].copy(), heights.rhs[:, :FREE]
+    np.einsum("bii->bi", free)[:] += ROUNDING * np.einsum("bii->b", free)[:, None]
+    explained = np.einsum("bi,bi->b", rhs, np.linalg.solve(free, rhs[..., None])[..., 0])
+    left = np.maximum(heights.bordered[:, -1, -1] - explained, 0.0)
+    largest = 2.0 + 3.0 / floor * np.sqrt(left / heights.contacts)
+    found: Array = floor[:, None] * largest[:, None] ** np.linspace(0.0, 1.0, NOISES)
+    return found
+
+
+def hyperparameters(
+    heights: NormalEquations, slopes: NormalEquations | None, floor: Array
+) -> Hyperparameters:
+    """Waviness and noise of b touches without a process, in groups that fit into a processor's cache."""
+    noises, precision = noise_grid(heights, floor), precision_of(WAVINESS, FREE_PRECISION)
+    groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
+    found = []
+    for group in groups:
+        some = [e and NormalEquations(*(part[group] for part in e)) for e in (heights, slopes)]
+        assert some[0] is not None
+        found.append(neg2_log_evidence(some[0], some[1], precision, noises[group]))
+    return averaged(np.concatenate(found), noises)
+
+
+def averaged(neg2_log: Array, noises: Array) -> Hyperparameters:
     """Averages over the grid of waviness and noise, given -2 log likelihood (b, 6, 5) at its points."""
-    surprise = (surprise + UNUSUAL[:, None]).reshape(len(noises), -1)
-    weights = np.exp(0.5 * np.maximum(surprise.min(axis=1)[:, None] - surprise, -UNLIKELY))
+    neg2_log = (neg2_log + UNUSUAL[:, None]).reshape(len(noises), -1)
+    weights = np.exp(0.5 * np.maximum(neg2_log.min(axis=1)[:, None] - neg2_log, -UNLIKELY))
     weights = (weights / weights.sum(axis=1)[:, None]).reshape(len(noises), len(WAVINESS), -1)
     by_waviness, by_noise = weights.sum(axis=2), weights.sum(axis=1)
     return Hyperparameters(
@@ -146,31 +148,76 @@ def _averaged(surprise: Array, noises: Array) -> Hyperparameters:
     )
 
 
-def evidence_with_slopes(heights: NormalEquations, slopes: NormalEquations, noises: Array) -> Hyperparameters:
-    """The evidence where measured slopes, in units of their deviations, tell of the waviness too.
+def process_hyperparameters(
+    rows: Array, kernels: list[Array], least: float, most: float
+) -> ProcessHyperparameters:
+    """Variances and noise of a touch with a process, and whether its contacts ask for one.
 
-    Slopes leave no term free, so all coefficients are integrated out, by the determinant lemma. With the
-    precision A = gram / noise^2 + slopes' gram + prior^-1 and v = A @ the likeliest coefficients, the
-    Cholesky factor of [[A, v], [v', square]] has log |A| in its diagonal, and what is left over in the last
-    of it.
+    rows : (28, m), the terms and the heights of contacts, each times the root of its weight
+    kernels : (m, m) each, of unit variance, likewise; least, most : bounds of the noise
     """
-    size, at_noise = len(TERMS), noises[:, None, :, None]
-    bordered = np.zeros((*(len(noises), len(WAVINESS), noises.shape[1]), size + 1, size + 1))
-    diagonal = np.einsum("...ii->...i", bordered)  # a view
-    bordered[..., :size, :size] = heights.gram[:, None, None] / at_noise[..., None] ** 2
-    bordered[..., :size, :size] += slopes.gram[:, None, None]
-    diagonal[..., :FREE] += FREE_PRECISION
-    diagonal[..., FREE:size] += 1.0 / VARIANCES[:, None]
-    seen = heights.seen[:, None, None] / at_noise**2 + slopes.seen[:, None, None]
-    bordered[..., :size, size] = bordered[..., size, :size] = seen
-    # Adding 1 changes no ratio of likelihoods and keeps rounding from leaving less than 0 over.
-    square = (heights.square[:, None] / noises**2 + slopes.square[:, None])[:, None] + 1.0
-    bordered[..., size, size] = square
-    factors = np.diagonal(np.linalg.cholesky(bordered), axis1=3, axis2=4)
-    surprise = (
-        2.0 * np.log(factors[..., :size]).sum(axis=3)
-        + np.log(VARIANCES).sum(axis=1)[:, None]
-        + factors[..., size] ** 2
-        + heights.contacts[:, None, None] * np.log(noises[:, None] ** 2)
-    )
-    return _averaged(surprise, noises)
+    noises = least * (most / least) ** np.linspace(0.0, 1.0, PROCESS_NOISES)
+    with_it = process_neg2_log_evidence(rows, kernels, noises)
+    equations = NormalEquations((rows @ rows.T)[None], np.array([float(rows.shape[1])]))
+    sextics, precision = np.array([[most]]), precision_of(SEXTIC_WAVINESS, 1.0 / FREE_VARIANCE)
+    # What is added there to -2 log likelihood is taken off again.
+    without = neg2_log_evidence(equations, None, precision, sextics)[0, :, 0] - 1.0
+    lowest = min(with_it.min(), without.min())
+    p, p_sextic = np.exp(-0.5 * (with_it - lowest)), np.exp(-0.5 * (without - lowest))
+    shares = p**TEMPER / (p**TEMPER).sum()
+    noise = float(np.sqrt(shares.sum(axis=(0, 1)) @ noises**2))
+    use_gp = bool(p.mean() > ODDS * p_sextic.mean())
+    return ProcessHyperparameters(shares.sum(axis=2) @ AMPLITUDES**2, noise, use_gp)
+
+
+@cache
+def process_prior() -> Array:
+    """Prior variances (27,) of the coefficients beside a process."""
+    return 1.0 / precision_of(np.array(USUAL_WAVINESS), 1.0 / FREE_VARIANCE)
+
+
+def process_neg2_log_evidence(rows: Array, kernels: list[Array], noises: Array) -> Array:
+    """-2 log likelihood for each length, amplitude and noise, (2, 5, 3); inf where it was not computed.
+
+    Heights ~ N(0, K) with K = basis prior basis' + v k + noise^2 (Rasmussen and Williams 2006, equation
+    2.40). The middle noise comes first, from the middle amplitude on to where others only become worse. Other
+    noises are tried where the likelihood of a length and an amplitude is not NEGLIGIBLE.
+    """
+    basis, heights = rows[:-1].T, rows[-1]
+    m, size = len(heights), len(AMPLITUDES)
+    terms, work, *kernels_of = np.zeros((2 + len(kernels), m + 1, m + 1))
+    terms[:m, :m] = (basis * process_prior()) @ basis.T
+    terms[:m, m] = terms[m, :m] = heights
+    found = np.full((len(kernels), size, PROCESS_NOISES), np.inf)
+    at_one = partial(_neg2_log_at, terms, work, 2.0 * float(heights @ heights))
+    squares, noise_squares = (AMPLITUDES**2).tolist(), (noises**2).tolist()
+    for within, kernel, row in zip(kernels, kernels_of, found, strict=True):
+        kernel[:m, :m] = within
+        for side in (range(size // 2, size), range(size // 2 - 1, -1, -1)):
+            before = row[side.start - side.step, MIDDLE]
+            for at in side:
+                row[at, MIDDLE] = now = at_one(kernel, squares[at], noise_squares[MIDDLE])
+                if now > max(before, found.min() + NEGLIGIBLE):
+                    break
+                before = now
+    for length, at in np.argwhere(found[..., MIDDLE] < found.min() + NEGLIGIBLE).tolist():
+        for i in (i for i in range(PROCESS_NOISES) if i != MIDDLE):
+            found[length, at, i] = at_one(kernels_of[length], squares[at], noise_squares[i])
+    return found
+
+
+def _neg2_log_at(
+    terms: Array, work: Array, twice: float, kernel: Array, variance: float, noise: float
+) -> float:
+    """-2 log likelihood for one variance of the process and one squared noise.
+
+    terms, work, kernel : (m + 1, m + 1), bordered by the heights; twice : twice the sum of the heights'
+        squares
+    """
+    np.multiply(kernel, variance, out=work)
+    work += terms
+    diagonal = work.reshape(-1)[:: len(work) + 1]
+    diagonal += noise
+    corner = diagonal[-1] = twice / noise + 1.0  # It exceeds heights' K^-1 heights.
+    pivots = cholesky_in_place(work)
+    return 2.0 * float(np.log(pivots[:-1]).sum()) + corner - float(pivots[-1]) ** 2

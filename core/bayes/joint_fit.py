@@ -1,18 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The accurate fit: one Bayesian linear solve for everything at once, which knows what it cannot see.
+"""The fit of polynomials, which finds their Darboux frames and weighs outliers down, many touches at once.
 
-Beside the paper. Near the reference point the surface is taken for a polynomial of degree 6, in unit
-radius and in its Darboux frame. Slopes and second derivatives are free. The coefficient a_ij of a
-higher degree is a length^(1 - i - j): where the curvature changes over a length l it has the size
-l^(1 - i - j), so its prior is
-
-    a_ij ~ N(m_ij, (waviness^(i + j - 1) / 10)^2)    with waviness = L / l.
-
-m are the quartic and sextic of a surface that goes on with the curvatures it has at the point. The
-waviness and the noise of the contacts follow from their marginal likelihood (evidence.py).
-
-All functions fit b touches at once: of one, most of the time goes into calling numpy.
+Beside the paper. Each pass solves for all coefficients in the axes so far; then the axes turn to the normal
+and the principal directions that were found, and outlying contacts are weighed down. All functions fit b
+touches at once: of one, most of the time goes into calling numpy.
 """
 
 import math
@@ -23,16 +15,10 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import along, cross, dot, scaled
-from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances, restricted
-from .linear_system import (
-    System,
-    hyperparameters,
-    linear_system,
-    posterior,
-    prior_mean,
-    solution,
-)
-from .posterior import FREE, Posterior
+from .evidence import Hyperparameters, hyperparameters
+from .posterior import SurfacePosterior
+from .prior import FREE, USUAL_WAVINESS, prior_mean, prior_variances
+from .sextic import Sextics, mean_given, posterior_given, sextics
 
 # benchmarks.accuracy judges MISFIT, and the outliers of benchmarks.stability judge the last two.
 MISFIT = 2e-3  # The noise is at least this share of the radius, because no surface is a polynomial.
@@ -46,16 +32,26 @@ OUTLYING = 5.0  # A contact off by more standard deviations is an outlier.
 STUDENT = 4.0  # Outliers weigh as under a Student t distribution of so many degrees of freedom.
 
 
-class _Touches(NamedTuple):
-    """What a pass of the fit has to know of b touches. It changes all fields from the axes on.
+class _Given(NamedTuple):
+    """What b touches are fitted to.
 
-    told : (b, n), the weights for which waviness, noise and triangle (evidence.py) were found
+    contacts : (b, n, 3); normals : (b, n, 3), or (b, 0, 3) without
+    tangent : (b, 3); floor : (b,), the least noise
     """
 
     contacts: Array
-    normals: Array  # (b, 0, 3) without
+    normals: Array
     tangent: Array
     floor: Array
+
+
+class _State(NamedTuple):
+    """What a pass knows of b touches, and changes.
+
+    axes : (b, 3, 3); k1, k2 : (b,); weights : (b, n)
+    typical, variances, noise : the hyperparameters, which were found with the weights `of_weights` (b, n)
+    """
+
     axes: Array
     k1: Array
     k2: Array
@@ -63,17 +59,12 @@ class _Touches(NamedTuple):
     typical: Array
     variances: Array
     noise: Array
-    triangle: Array
-    told: Array
+    of_weights: Array
 
     @property
     def hyper(self) -> Hyperparameters:
         """Waviness and noise."""
         return Hyperparameters(self.typical, self.variances, self.noise)
-
-    def at(self, which: NDArray[np.bool_]) -> "_Touches":
-        """Some of these touches."""
-        return _Touches(*(values[which] for values in self))
 
 
 def joint_fit(
@@ -85,8 +76,8 @@ def joint_fit(
     noise: Array,
     normals: Array | None = None,
     through: bool = True,
-) -> tuple[Array, Posterior, Array]:
-    """The Darboux frames and the surfaces that the contacts of b touches show, and how well they show them.
+) -> tuple[Array, SurfacePosterior, Array]:
+    """The Darboux frames and the polynomials that the contacts of b touches show, and how well they do.
 
     contacts : (b, n, 3), in unit radius, in a frame near to the Darboux frame
     weights : (b, n), 1 for a contact, 0 where there is none
@@ -102,95 +93,90 @@ def joint_fit(
     Student t distribution.
     """
     axes = np.eye(3)[None].repeat(len(contacts), axis=0)
-    given = contacts[:, :0] if normals is None else normals
     floor, usual = np.maximum(noise, MISFIT), prior_variances(np.full(len(contacts), USUAL_WAVINESS))
-    unknown = np.zeros((*usual.shape, usual.shape[1]))
-    first = axes, k1, k2, weights, usual, usual, floor, unknown, weights
-    touches = _Touches(contacts, given, tangent, floor, *first)
+    given = _Given(contacts, contacts[:, :0] if normals is None else normals, tangent, floor)
+    state = _State(axes, k1, k2, weights, usual, usual, floor, weights)
     pending, found = np.arange(len(contacts)), []
     for step in range(PASSES):
-        touches, settled, surface = _pass(touches, step, through)
+        state, settled, surface = _pass(given, state, step, through)
         if surface is not None:
-            found.append((pending[settled], touches.axes[settled], touches.weights[settled], *surface))
+            parts = surface.mean, surface.root, surface.noise, surface.visibility
+            found.append((pending[settled], state.axes[settled], state.weights[settled], *parts))
         if settled.all():
             break
         if not settled.any():
             continue
-        touches, pending = touches.at(~settled), pending[~settled]
+        given, state = _Given(*(v[~settled] for v in given)), _State(*(v[~settled] for v in state))
+        pending = pending[~settled]
     if len(found) == 1:  # All have settled at once, as nearly always, so they are in order.
-        return found[0][1], Posterior(*found[0][3:]), found[0][2]
+        return found[0][1], SurfacePosterior(*found[0][3:]), found[0][2]
     order, turns, found_weights, *surfaces = (np.concatenate(parts) for parts in zip(*found, strict=True))
     back = np.argsort(order)
-    return turns[back], Posterior(*(values[back] for values in surfaces)), found_weights[back]
+    return turns[back], SurfacePosterior(*(values[back] for values in surfaces)), found_weights[back]
 
 
 def _pass(
-    touches: _Touches, step: int, through: bool
-) -> tuple[_Touches, NDArray[np.bool_], Posterior | None]:
+    given: _Given, state: _State, step: int, through: bool
+) -> tuple[_State, NDArray[np.bool_], SurfacePosterior | None]:
     """One fit in the axes and with the weights so far: a mask of settled touches, and their posteriors."""
-    expected = prior_mean(touches.k1, touches.k2)
-    local, normals = touches.contacts @ touches.axes, touches.normals @ touches.axes
-    system = linear_system(local, touches.weights, expected, normals, through)
+    expected = prior_mean(state.k1, state.k2)
+    local, normals = given.contacts @ state.axes, given.normals @ state.axes
+    data = sextics(local, state.weights, expected, normals, through)
     if step:
-        stale = np.abs(touches.weights - touches.told).max(axis=1) > STALE_WEIGHT
-        touches = _with_evidence(touches, system, stale | (step == 1))
-    found = solution(system, touches.hyper)
+        stale = np.abs(state.weights - state.of_weights).max(axis=1) > STALE_WEIGHT
+        state = _with_evidence(state, data, given.floor, stale | (step == 1))
+    found = mean_given(data, state.hyper)
     mean = expected + found
-    found_axes = [turned(*touch) for touch in zip(touches.axes, mean, touches.tangent, strict=True)]
+    found_axes = [turned(*touch) for touch in zip(state.axes, mean, given.tangent, strict=True)]
     axes, k1, k2, angle = (np.array(values) for values in zip(*found_axes, strict=True))
     # Outliers can be told only once the axes are level.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
-    weights, settled, surface = touches.weights, np.full(len(mean), step == PASSES - 1), None
+    weights, settled, surface = state.weights, np.full(len(mean), step == PASSES - 1), None
     if step and level.any():
-        told = _student_weights(system.residuals(found), weights > 0.0, touches.floor)
-        weights = np.where(level[:, None], told, weights)
-        settled |= level & (np.abs(weights - touches.weights).max(axis=1) <= SETTLED_WEIGHT)
+        students = _student_weights(data.residuals(found), weights > 0.0, given.floor)
+        weights = np.where(level[:, None], students, weights)
+        settled |= level & (np.abs(weights - state.weights).max(axis=1) <= SETTLED_WEIGHT)
     if step and settled.any():
         which = slice(None) if settled.all() else settled
-        surface = posterior(mean, system, touches.triangle, touches.hyper, touches.weights)
-        surface = surface.at(which).turned(angle[which])
+        surface = posterior_given(mean, data, state.hyper).at(which).rotated(angle[which])
         surface.mean[:, [0, 1, 3]] = 0.0
         surface.mean[:, 2], surface.mean[:, 4] = k1[settled] / 2.0, k2[settled] / 2.0
-    return touches._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, surface
+    return state._replace(axes=axes, k1=k1, k2=k2, weights=weights), settled, surface
 
 
-def _with_evidence(touches: _Touches, system: System, stale: NDArray[np.bool_]) -> _Touches:
-    """The touches, where waviness and noise of the stale ones (b,) are found anew from their systems."""
+def _with_evidence(state: _State, data: Sextics, floor: Array, stale: NDArray[np.bool_]) -> _State:
+    """The state, where waviness and noise of the stale touches (b,) are found anew."""
     if not stale.any():
-        return touches
-    some = system if stale.all() else system.at(stale)
-    data = restricted(some.equations)
-    found = *hyperparameters(some, data, touches.floor[stale]), data.triangle, touches.weights[stale]
-    if stale.all():
-        return _Touches(*touches[:-5], *found)
-    changed = _Touches(*touches[:-5], *(values.copy() for values in touches[-5:]))
-    for values, new in zip(changed[-5:], found, strict=True):
+        return state
+    some = data if stale.all() else data.at(stale)
+    found = *hyperparameters(some.heights, some.slopes, floor[stale]), state.weights[stale]
+    changed = _State(*state[:-4], *(values.copy() for values in state[-4:]))
+    for values, new in zip(changed[-4:], found, strict=True):
         values[stale] = new
     return changed
 
 
-def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> Posterior:
+def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> SurfacePosterior:
     """The posterior of contacts (n, 3) in a given frame with curvatures k1 and k2, all in unit radius."""
     return posteriors_of(k1, k2, contacts, np.ones((1, len(contacts))), noise).at(0)
 
 
 def posteriors_of(
     k1: float, k2: float, contacts: Array, weights: Array, noise: float, by_evidence: bool = True
-) -> Posterior:
+) -> SurfacePosterior:
     """What `posterior_of` gives for b different weights (b, n) of the contacts.
 
     by_evidence : whether waviness and noise follow from the contacts. If not, they are the usual waviness and
-        the given noise, which is quick; the visibility is 0 then
+        the given noise, which is quick
     """
     b = len(weights)
     expected, local = prior_mean(np.full(b, k1), np.full(b, k2)), contacts[None].repeat(b, axis=0)
-    system = linear_system(local, weights, expected, local[:, :0])
+    data = sextics(local, weights, expected, local[:, :0])
     floor, usual = np.full(b, max(noise, MISFIT)), prior_variances(np.full(b, USUAL_WAVINESS))
-    triangle, hyper = np.zeros((b, *2 * usual.shape[1:])), Hyperparameters(usual, usual, floor)
+    hyper = Hyperparameters(usual, usual, floor)
     if by_evidence:
-        data = restricted(system.equations)
-        triangle, hyper = data.triangle, hyperparameters(system, data, floor)
-    return posterior(expected + solution(system, hyper), system, triangle, hyper, weights)
+        hyper = hyperparameters(data.heights, None, floor)
+    return posterior_given(expected + mean_given(data, hyper), data, hyper)
 
 
 def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from .joint_fit import posteriors_of
-from .posterior import Posterior
+from .posterior import SurfacePosterior
 
 ENOUGH = 4  # So many curves, or strokes in place of one, may contradict each other.
 OUTER = 0.5  # A curve counts from this share of its reach on, where it leaves the tangent plane.
@@ -19,9 +19,9 @@ NOTICED = 4.0  # Waviness and noise of the others are found where this many devi
 
 
 def contradicting_curve(
-    contacts: Array, curve: NDArray[np.intp], posterior: Posterior, noise: float
+    contacts: Array, curve: NDArray[np.intp], posterior: SurfacePosterior, noise: float
 ) -> tuple[float, float]:
-    """The number of deviations, and the height in unit radius, by which a curve is off what the others tell.
+    """The number of deviations, and the height in unit radius, by which a curve is off what the others show.
 
     contacts : (n, 3), besides the reference point, in the frame and in unit radius
     curve : (n,), the number of the curve of each, -1 beside curves
@@ -34,20 +34,20 @@ def contradicting_curve(
     if len(numbers) < ENOUGH:
         return 0.0, 0.0
     others = (curve != numbers[numbers >= 0][:, None]).astype(float)
-    k1, k2 = (2.0 * float(posterior.mean[i]) for i in (2, 4))  # The terms x^2 and y^2.
-    told = posteriors_of(k1, k2, contacts, others, float(posterior.noise), by_evidence=False)
-    found = _most_off(contacts, others, told)
+    k1, k2 = (2.0 * float(posterior.polynomial[i]) for i in (2, 4))  # The terms x^2 and y^2.
+    alone = posteriors_of(k1, k2, contacts, others, float(posterior.noise), by_evidence=False)
+    found = _most_off(contacts, others, alone)
     if found[0] <= NOTICED:
         return found
     return _most_off(contacts, others, posteriors_of(k1, k2, contacts, others, noise))
 
 
-def _most_off(contacts: Array, others: Array, told: Posterior) -> tuple[float, float]:
-    """The medians for the curve that is off by most deviations, given what `others` (b, n) tell of each."""
+def _most_off(contacts: Array, others: Array, posteriors: SurfacePosterior) -> tuple[float, float]:
+    """The medians for the curve that is off by most deviations, given those of `others` (b, n) for each."""
     reach, found = np.hypot(contacts[:, 0], contacts[:, 1]), []
     for i, weights in enumerate(others):
         own = reach * (weights == 0.0)
-        outer, alone = contacts[own > OUTER * own.max()], told.at(i)
+        outer, alone = contacts[own > OUTER * own.max()], posteriors.at(i)
         off = outer[:, 2] - alone.height(*outer[:, :2].T)
         std = np.hypot(alone.height_std(*outer[:, :2].T), alone.noise)
         found.append((abs(float(np.median(off / std))), abs(float(np.median(off)))))

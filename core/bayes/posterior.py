@@ -1,23 +1,35 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What contacts say of a surface and what they leave open: a Gaussian over polynomials of degree 6."""
+"""What contacts show of a surface and what they leave open: a Gaussian process with explicit basis functions.
+
+Beside the paper, after Rasmussen and Williams (2006), section 2.7. In unit radius and in the Darboux frame,
+
+    z = phi' b + g,
+
+where phi are the terms of degree 1 to 6, b has the prior of prior.py, and g has zero mean and the covariance
+of kernel.py. Where contacts ask for no g, z is a polynomial.
+"""
 
 import math
 from collections.abc import Callable
-from functools import cache
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
-from ..patch.monge import DEGREE, TERMS, MongePatch, monomials
+from ..lapack import solved
+from ..patch.differential_geometry import Derivatives
+from ..patch.monge import DEGREE, TERMS, HeightField, MongePatch, exponents, monomials, polynomial_derivatives
+from . import kernel as process
+from .kernel import PARTIALS, derived_kernel, kernel, kernels, places_factor, weighted_kernel
+from .prior import FREE, ORDERS
 
-ORDERS = TERMS.sum(axis=1).astype(float)
 WINDING = 1j * (TERMS[:, 0] - TERMS[:, 1])  # A turn multiplies the phase of z^i z'^j, z = x + iy, by i - j.
-FREE = 5  # The terms x, y, x^2, xy and y^2 have no prior.
 LEAST_DEGREE = 2  # No patch has a lower degree.
 DISK = 0.95  # A patch of lower degree is fitted over a disk of this radius: not all curves end at L.
+QUARTIC_SHARE = 0.6  # Share of the radius (benchmarks.real); 0.8 takes in what says nothing of the point.
 ALIKE = 0.05  # Curvatures that differ by less make no directions, as in the rule of benchmarks.stability.
 CONFIDENCE = 0.95  # Directions are judged with this probability.
 ROUND = 12.59  # The quantile at CONFIDENCE of chi squared with six degrees of freedom.
@@ -30,90 +42,173 @@ _UNLIKE_SPHERE[0, [2, 4]] = -1.0, 1.0
 _UNLIKE_SPHERE[range(1, 6), [3, *range(FREE, FREE + 4)]] = 1.0
 
 
-class Posterior(NamedTuple):
-    """A Gaussian over the heights sum b_ij x^i y^j, degree 1 to 6, in unit radius; or a stack (...) of such.
+@dataclass(frozen=True, eq=False)
+class SurfacePosterior(HeightField):
+    """A Gaussian over surfaces z = phi' b + g in unit radius; without places, also a stack (...) of such.
 
-    mean : (..., 27), b_10 b_01 b_20 b_11 b_02 b_30 ...
-    covariance : (..., 27, 27)
+    With places u of contacts, k(u, u) = L L' and the features f(p) = (phi(p), 1, L^-1 k(u, p)), the mean of z
+    is phi' mean + k(p, u)' alpha, and its covariance
+
+        k(p, q) - k(p, u) k(u, u)^-1 k(u, q) + f(p)' root' root f(q).
+
+    mean : (..., 27), of b_10 b_01 b_20 b_11 b_02 b_30 ...
+    root : (..., r, 28 + m), of the features' covariance; the column of the feature 1 is 0 if the height at
+        the origin is exact, as at a reference point that was touched
     noise : (...), standard deviation of a contact
     visibility : (..., 22, 22), upper triangular: its singular values tell how well the contacts show each
         direction among the terms of degree 3 to 6, in units of noise, for a surface of waviness 1; the
         singular values of a leading block tell that of the terms up to a lower degree
-    level : (..., 28), variance of the height at the origin, and its covariances with the terms; 0 if the
-        height is exact there, as at a reference point that was touched
+    places : (m, 2), the places u; none without a process
+    alpha : (m,); variances : (2,), of g, for each of LENGTHS
     """
 
     mean: Array
-    covariance: Array
+    root: Array
     noise: Array
     visibility: Array
-    level: Array
+    places: Array = field(default_factory=lambda: np.empty((0, 2)))
+    alpha: Array = field(default_factory=lambda: np.empty(0))
+    variances: Array = field(default_factory=lambda: np.zeros(2))
 
-    __eq__, __hash__ = object.__eq__, object.__hash__  # type: ignore[misc]  # Arrays have no single truth value.
-
-    def at(self, index: int | slice | NDArray[np.bool_]) -> "Posterior":
+    def at(self, index: int | slice | NDArray[np.bool_]) -> "SurfacePosterior":
         """One posterior of the stack, or several."""
-        return Posterior(*(values[index] for values in self))
+        return SurfacePosterior(self.mean[index], self.root[index], self.noise[index], self.visibility[index])
 
-    def scaled(self, factor: ArrayLike) -> "Posterior":
-        """The posterior of these surfaces with every length multiplied by `factor` (...)."""
+    def scaled(self, factor: ArrayLike) -> "SurfacePosterior":
+        """The posterior of these polynomials with every length multiplied by `factor` (...)."""
         f = np.asarray(factor)
-        factors = f[..., None] ** (1.0 - ORDERS)
-        covariance = factors[..., :, None] * factors[..., None, :] * self.covariance
-        level = f[..., None] * np.concatenate([f[..., None], factors], axis=-1) * self.level
-        return self._replace(
-            mean=factors * self.mean, covariance=covariance, noise=f * self.noise, level=level
+        factors = f[..., None] ** (1.0 - np.append(ORDERS, 0.0))
+        return replace(
+            self,
+            mean=factors[..., :-1] * self.mean,
+            root=self.root * factors[..., None, :],
+            noise=f * self.noise,
         )
 
-    def turned(self, angle: Array) -> "Posterior":
-        """The posterior of these surfaces in axes that are turned by `angle` (...) about the normal."""
-        turn = _turn(angle)
-        mean, level = (turn @ self.mean[..., None])[..., 0], self.level.copy()
-        level[..., 1:] = (turn @ level[..., 1:, None])[..., 0]
-        return self._replace(
-            mean=mean, covariance=turn @ self.covariance @ np.swapaxes(turn, -1, -2), level=level
-        )
+    def rotated(self, angle: Array) -> "SurfacePosterior":
+        """The posterior of these polynomials in axes that are turned by `angle` (...) about the normal."""
+        turn, root = _turn(angle), self.root.copy()
+        root[..., :-1] = root[..., :-1] @ np.swapaxes(turn, -1, -2)
+        return replace(self, mean=(turn @ self.mean[..., None])[..., 0], root=root)
 
-    # The methods below are for a single posterior, not for a stack.
+    def levels(self, contacts: Array, weights: Array) -> Array:
+        """The mean heights (b,) by which contacts (b, n, 3) with weights (b, n) are above b polynomials."""
+        basis = monomials(contacts[..., 0].ravel(), contacts[..., 1].ravel(), TERMS)
+        off = contacts[..., 2] - (basis.reshape(*weights.shape, -1) @ self.mean[..., None])[..., 0]
+        found: Array = (weights * off).sum(axis=1) / weights.sum(axis=1)
+        return found
 
-    def height_std(self, x: Array, y: Array) -> Array:
+    # What follows is for a single posterior, not for a stack.
+
+    @property
+    def amplitude(self) -> float:
+        """The standard deviation of g far from the point, as a share of the radius; 0 for a polynomial."""
+        return math.sqrt(float(self.variances.sum()))
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The mean height at (x, y)."""
+        z: Array = polynomial_derivatives(self.mean, TERMS, x, y, PARTIALS[:1])[0]
+        if len(self.places):
+            p = _rows(x, y)
+            z += weighted_kernel(p, self.places, self.variances, self.alpha).reshape(z.shape)
+        return z
+
+    def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
+        """Height, slopes and second derivatives of the mean at (x, y)."""
+        d = polynomial_derivatives(self.mean, TERMS, x, y, PARTIALS)
+        if len(self.places):
+            d += derived_kernel(_rows(x, y), self.places, self.variances, self.alpha).reshape(d.shape)
+        return Derivatives(*d)
+
+    def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviations of the height at n points, (n,)."""
-        basis = monomials(x, y, TERMS)
-        variance = np.einsum("ni,ni->n", basis @ self.covariance, basis) + self._levels(basis, basis)
-        return np.sqrt(np.maximum(variance, 0.0))
+        known, left = self._whitened(_rows(x, y))
+        variance = np.einsum("in,in->n", left, left) - np.einsum("in,in->n", known, known)
+        return np.sqrt(np.maximum(self.variances.sum() + variance, 0.0))
 
     def height_covariance(self, p: Array, q: Array) -> Array:
         """Covariances of the heights at points (..., n, 2) and (..., m, 2), (..., n, m)."""
-        flat = (v.reshape(-1, 2) for v in (p, q))
-        at_p, at_q = (monomials(v[:, 0], v[:, 1], TERMS) for v in flat)
-        at_p, at_q = at_p.reshape(*p.shape[:-1], -1), at_q.reshape(*q.shape[:-1], -1)
-        covariance: Array = (at_p @ self.covariance) @ np.swapaxes(at_q, -1, -2)
-        return covariance + self._levels(at_p[..., :, None, :], at_q[..., None, :, :])
-
-    def _levels(self, at_p: Array, at_q: Array) -> Array:
-        """What the height at the origin adds to covariances (...) of heights whose terms are (..., 27)."""
-        added: Array = self.level[0] + (at_p + at_q) @ self.level[1:]
-        return added
+        return self._covariance(p, self._signed(p), q, self._signed(q))
 
     def covariances_with(self, q: Array) -> Callable[[Array], tuple[Array, Array]]:
         """A function: covariances of heights at points (..., n, 2) with those at q (m, 2), and each other."""
-        return lambda p: (self.height_covariance(p, q), self.height_covariance(p, p))
+        at_q = self._signed(q)
 
-    def height(self, x: Array, y: Array) -> Array:
-        """The mean height at n points, (n,)."""
-        return monomials(x, y, TERMS) @ self.mean
+        def covariances(p: Array) -> tuple[Array, Array]:
+            """Covariances of heights at p with those at q, (..., n, m), and with each other, (..., n, n)."""
+            at_p = self._signed(p)
+            return self._covariance(p, at_p, q, at_q), self._covariance(p, at_p, p, at_p)
+
+        return covariances
+
+    def _covariance(self, p: Array, at_p: Array, q: Array, at_q: Array) -> Array:
+        """The covariances of heights at p and q, given what `_signed` gives for both."""
+        signs = np.repeat([-1.0, 1.0], [len(self.places), len(self.root)])
+        found: Array = (signs * at_p) @ np.swapaxes(at_q, -1, -2)
+        return found + kernel(p, q, self.variances) if len(self.places) else found
+
+    def _signed(self, p: Array) -> Array:
+        """Both results of `_whitened` for points (..., n, 2), side by side, (..., n, m + r)."""
+        return np.vstack(self._whitened(p.reshape(-1, 2))).T.reshape(*p.shape[:-1], -1)
+
+    def _whitened(self, p: Array) -> tuple[Array, Array]:
+        """L^-1 k(u, p), (m, n), and root @ f(p), (r, n), at points (n, 2)."""
+        terms = monomials(p[:, 0], p[:, 1], TERMS).T
+        within = kernel(self.places, p, self.variances) if len(self.places) else np.empty((0, len(p)))
+        return self._whitened_sums(terms, np.ones(len(p)), within)
+
+    def _whitened_sums(self, terms: Array, ones: Array, within: Array) -> tuple[Array, Array]:
+        """What `_whitened` gives for terms (27, n), ones (n,) and k(u, p) (m, n), or for sums of such."""
+        known = solved(self._places_factor, within) if len(within) else within
+        return known, self.root @ np.vstack([terms, ones, known])
+
+    @cached_property
+    def _places_factor(self) -> Array:
+        """The factor L of k(u, u), (m, m), lower triangular."""
+        return places_factor(kernel(self.places, self.places, self.variances))
+
+    @cached_property
+    def polynomial(self) -> Array:
+        """The coefficients (27,) of the polynomial that describes the mean of z in its Darboux frame.
+
+        Those up to degree 2 are of the quartic nearest to z over QUARTIC_SHARE of the radius, the others are
+        nearest to what these leave: a Matern process of order 3/2 has no second derivative at the point. If z
+        is a polynomial, they are its own.
+        """
+        if not len(self.places):
+            return self.mean
+        at, weights = _projection()
+        found: Array = _projected_terms() @ self.mean
+        found += weights @ weighted_kernel(at, self.places, self.variances, self.alpha)
+        mean, half = found[2] + found[4], math.hypot(found[2] - found[4], found[3])
+        found[:FREE] = 0.0, 0.0, 0.5 * (mean - half), 0.0, 0.5 * (mean + half)
+        return found
+
+    @cached_property
+    def covariance(self) -> Array:
+        """The covariance of the coefficients of `polynomial`, (27, 27)."""
+        if not len(self.places):
+            root = self.root[:, :-1]
+            return root.T @ root
+        at, weights = _projection()
+        within = kernel(self.places, at, self.variances) @ weights.T
+        known, left = self._whitened_sums(_projected_terms().T, weights.sum(axis=1), within)
+        own = sum(map(np.multiply, self.variances, _projected_kernels(tuple(process.LENGTHS))))
+        covariance: Array = own + left.T @ left - known.T @ known
+        return covariance
 
     def patch(self, degree: int) -> MongePatch:
         """The patch (1) of this degree that has the mean's curvatures and is nearest to it over the disk."""
-        a = _truncation(degree) @ self.mean[FREE:]
-        return MongePatch(2.0 * float(self.mean[2]), 2.0 * float(self.mean[4]), a)
+        a = _truncation(degree) @ self.polynomial[FREE:]
+        return MongePatch(2.0 * float(self.polynomial[2]), 2.0 * float(self.polynomial[4]), a)
 
     def degree_shown(self, contacts: Array) -> int:
         """The least degree whose patch is off the mean by at most half its deviation at contacts (n, 3)."""
         x, y, _ = contacts.T
         basis = monomials(x, y, TERMS)
-        variance = np.einsum("ni,ni->", basis @ self.covariance, basis)
-        off = basis[:, FREE:] @ (_departures() @ self.mean[FREE:]).T
+        left = basis @ self.root[:, :-1].T
+        variance = np.einsum("ni,ni->", left, left)
+        off = basis[:, FREE:] @ (_departures() @ self.polynomial[FREE:]).T
         enough = np.flatnonzero(np.einsum("nk,nk->k", off, off) <= 0.25 * variance)
         return LEAST_DEGREE + int(enough[0]) if len(enough) else DEGREE
 
@@ -122,7 +217,7 @@ class Posterior(NamedTuple):
 
         It is 0 if the curvatures are ALIKE with that probability, because then there are no directions.
         """
-        x, y, xx, xy, yy = self.mean[:FREE].tolist()
+        x, y, xx, xy, yy = self.polynomial[:FREE].tolist()
         c = self.covariance
         # The ratio of yy - xx and xy turns the frame. This is a Cholesky factor of their covariance.
         std = math.sqrt(max(c[2, 2] + c[4, 4] - 2.0 * c[2, 4], 1e-300))
@@ -143,9 +238,9 @@ class Posterior(NamedTuple):
         """
         if self.curvature_std() > ALIKE:
             return False
-        apart = _UNLIKE_SPHERE @ self.mean
-        told = float(apart @ np.linalg.solve(_UNLIKE_SPHERE @ self.covariance @ _UNLIKE_SPHERE.T, apart))
-        return told <= ROUND
+        apart = _UNLIKE_SPHERE @ self.polynomial
+        apart_covariance = _UNLIKE_SPHERE @ self.covariance @ _UNLIKE_SPHERE.T
+        return float(apart @ np.linalg.solve(apart_covariance, apart)) <= ROUND
 
     def curvature_std(self) -> float:
         """Standard deviation of the normal curvature at the origin, in the direction where it is largest."""
@@ -166,7 +261,7 @@ def terms_to(degree: int) -> int:
 
 
 def coefficients_of(patch: MongePatch) -> Array:
-    """The coefficients of a patch as those of the 27 terms of a Posterior, (27,)."""
+    """The coefficients of a patch as those of the 27 terms, (27,)."""
     b = np.zeros(len(TERMS))
     b[2], b[4] = patch.k1 / 2.0, patch.k2 / 2.0
     b[FREE : FREE + len(patch.coefficients)] = patch.coefficients
@@ -243,3 +338,48 @@ def nodes() -> tuple[Array, Array, Array]:
     radii = DISK * np.sqrt((at + 1.0) / 2.0)
     x, y = np.outer(radii, np.cos(azimuths)).ravel(), np.outer(radii, np.sin(azimuths)).ravel()
     return x, y, np.repeat(weights, 14)
+
+
+def nearest_quartic(mean: Array, places: Array, variances: Array, alpha: Array) -> Array:
+    """The terms of degree 1 and 2, (5,), of the quartic nearest to z over QUARTIC_SHARE of the radius."""
+    (at, weights), half = _projection(), len(nodes()[2])
+    found: Array = _projected_terms()[:FREE] @ mean
+    return found + weights[:FREE, :half] @ weighted_kernel(at[:half], places, variances, alpha)
+
+
+def _rows(x: ArrayLike, y: ArrayLike) -> Array:
+    """Points (n, 2) of raveled x and y."""
+    return np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
+
+
+@cache
+def _projection() -> tuple[Array, Array]:
+    """Points (n, 2) and weights (27, n) that take heights there to coefficients of the nearest polynomial.
+
+    Terms up to degree 2 are those of the nearest quartic over the disk of QUARTIC_SHARE. The other terms are
+    nearest to what these leave over DISK.
+    """
+    x, y, shares = nodes()
+    whole, root = np.column_stack([x, y]), np.sqrt(shares)
+    near = QUARTIC_SHARE / DISK * whole
+    quartic = np.linalg.pinv(root[:, None] * monomials(near[:, 0], near[:, 1], exponents(0, 4)))[1:] * root
+    basis = monomials(x, y, TERMS)
+    rest = np.linalg.pinv(root[:, None] * basis[:, FREE:]) * root
+    first = np.hstack([quartic[:FREE], np.zeros((FREE, len(x)))])
+    left = np.hstack([np.zeros((len(x), len(x))), np.eye(len(x))]) - basis[:, :FREE] @ first
+    return np.vstack([near, whole]), np.vstack([first, rest @ left])
+
+
+@cache
+def _projected_terms() -> Array:
+    """What the projection makes of each term, (27, 27)."""
+    (x, y), weights = _projection()[0].T, _projection()[1]
+    return weights @ monomials(x, y, TERMS)
+
+
+@cache
+def _projected_kernels(lengths: tuple[float, ...]) -> Array:
+    """Covariances (2, 27, 27) of the coefficients of a process of unit variance and each of the lengths."""
+    assert lengths == tuple(process.LENGTHS)
+    at, weights = _projection()
+    return np.array([weights @ values @ weights.T for values in kernels(at, at)])

@@ -11,9 +11,10 @@ import numpy as np
 
 from ..arguments import Array
 from ..patch.monge import TERMS
-from .evidence import USUAL_WAVINESS, Hyperparameters, prior_variances
+from .evidence import Hyperparameters
 from .joint_fit import MISFIT
-from .linear_system import linear_system, solution
+from .prior import USUAL_WAVINESS, prior_variances
+from .sextic import mean_given, sextics
 
 # benchmarks.extents judges these.
 EXPLAINED_TERMS = 15  # Three curves show so many of the 27 terms, which as many contacts determine.
@@ -31,7 +32,7 @@ def roughness(contacts: Array, noise: float) -> float:
         return 0.0
     local /= radius
     nothing, usual = np.zeros((1, len(TERMS))), prior_variances(np.array([USUAL_WAVINESS]))
-    system = linear_system(local[None], np.ones((1, len(local))), nothing, local[None, :0])
-    off = system.residuals(solution(system, Hyperparameters(usual, usual, np.array([MISFIT]))))[0]
+    data = sextics(local[None], np.ones((1, len(local))), nothing, local[None, :0])
+    off = data.residuals(mean_given(data, Hyperparameters(usual, usual, np.array([MISFIT]))))[0]
     variance = float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1)
     return math.sqrt(max(variance - (NOISY * noise / radius) ** 2, 0.0))

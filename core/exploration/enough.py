@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.joint_fit import MISFIT
-from ..bayes.residual_evidence import MOST_PLACES
+from ..bayes.process_fit import MOST_PLACES
 from ..lapack import cholesky, solved
 from ..reconstruction.result import Reconstruction
 
@@ -26,22 +26,21 @@ def is_enough(r: Reconstruction) -> bool:
     They would tell nothing if this deviation is less than any polynomial is off a surface, nor if it is
     larger than the noise: then it comes from directions that no contact of these curves tells of.
     """
-    if r.mean_height_std <= MISFIT * r.radius or r.uncertainty.noise * r.radius <= QUIET * r.mean_height_std:
+    if r.mean_height_std <= MISFIT * r.radius or r.posterior.noise * r.radius <= QUIET * r.mean_height_std:
         return True
     (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
-    if r.residual is None:
+    some = r.posterior.places
+    if not len(some):
         which = np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)
         some = contacts[which] / r.radius
-    else:
-        some = r.residual.places
     over, m = points / r.radius, len(some)
-    shared, seen = r.uncertainty.covariances_with(over)(some)
+    shared, seen = r.posterior.covariances_with(over)(some)
     # A patch by another method departs from the posterior's mean, and more contacts do not lower that.
-    own = r.node_stds / r.radius if r.joint_posterior is not None else r.uncertainty.height_std(*over.T)
+    own = r.node_stds / r.radius if r.method == "bayes" else r.posterior.height_std(*over.T)
     variance = own**2
-    seen.flat[:: m + 1] += r.uncertainty.noise**2 * m / len(contacts)
+    seen.flat[:: m + 1] += r.posterior.noise**2 * m / len(contacts)
     told = solved(cholesky(seen), shared)
-    lost = r.geometry.node_widening**2 * np.einsum("in,in->n", told, told)
+    lost = r.widening(r.domain.node_places) ** 2 * np.einsum("in,in->n", told, told)
     then = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
     return bool(then >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))
 

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The geometry of a patch: a surface over a part of the tangent plane, and its place in the world."""
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,13 +11,10 @@ from ..arguments import Array, finite_array
 from ..contours.local_geometry import Frame
 from .differential_geometry import Derivatives
 from .domain import GRID, Domain
-from .monge import HeightField, MongePatch
-from .residual import Residual
+from .monge import HeightField
 from .triangulation import patch_mesh
 
 EVEN = 1e-4  # A similarity in single precision may be off by so much.
-
-NEAR_POINT = 0.6  # This share of a residual's deviation is left at the point (benchmarks.real).
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,67 +23,28 @@ class Geometry(HeightField):
 
     frame : the Darboux frame at the reference point
     radius : L, the largest distance of a contact from the point in the tangent plane
-    polynomial : equation (1)
+    surface : the heights, in unit radius
     domain : the part of the tangent plane over which the surface is valid
-    residual : difference of the surface from the polynomial, in unit radius, or None
     """
 
     frame: Frame
     radius: float
-    polynomial: MongePatch
+    surface: HeightField
     domain: Domain
-    residual: Residual | None = None
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives at local (x, y)."""
-        d = self.polynomial.derivatives(x, y)
-        if self.residual is None:
-            return d
-        shape, (u, v) = d.z.shape, self.in_unit_radius(x, y)
-        orders = {"z": 1.0, "x": 0.0, "y": 0.0, "xx": -1.0, "xy": -1.0, "yy": -1.0}  # Powers of length.
-        beside = self.residual.derivatives(u, v)
-        return Derivatives(**{
-            name: getattr(d, name) + self.radius**order * getattr(beside, name).reshape(shape)
-            for name, order in orders.items()
-        })  # fmt: skip
+        d = self.surface.derivatives(*self.in_unit_radius(x, y))
+        bends = (values / self.radius for values in (d.xx, d.xy, d.yy))
+        return Derivatives(self.radius * d.z, d.x, d.y, *bends)
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height z at local (x, y)."""
-        if self.residual is None:
-            return self.polynomial.height(x, y)
-        z = self._whole.height(*self.in_unit_radius(x, y))
-        return self.radius * z.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
-
-    @cached_property
-    def _whole(self) -> Residual:
-        """The residual with the polynomial among its terms, in unit radius."""
-        assert self.residual is not None
-        mean, first = self.residual.mean.copy(), self.polynomial.scaled(1.0 / self.radius)
-        mean[2:5:2] += 0.5 * first.k1, 0.5 * first.k2
-        mean[5 : 5 + len(first.coefficients)] += first.coefficients
-        return replace(self.residual, mean=mean)
+        return self.radius * self.surface.height(*self.in_unit_radius(x, y))
 
     def in_unit_radius(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """Local x and y, raveled to (n,) each, in units of L."""
-        x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        return x_array.ravel() / self.radius, y_array.ravel() / self.radius
-
-    def widening(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """The factor (n,) of the residual's deviations at local (x, y).
-
-        Near the point, where curves meet, real surfaces are smoother than their covariance says, and near the
-        rim they are rougher. The mean over the domain is 1.
-        """
-        points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
-        if self.residual is None:
-            return np.ones(len(points))
-        return _widened(np.linalg.norm(self.domain.places(points), axis=1))
-
-    @property
-    def node_widening(self) -> Array:
-        """The `widening` at the nodes of the domain, (n,)."""
-        outward = self.domain.node_places
-        return np.ones(len(outward)) if self.residual is None else _widened(outward)
+        """Local x and y in units of L."""
+        return np.asarray(x, dtype=float) / self.radius, np.asarray(y, dtype=float) / self.radius
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether each local (x, y) lies in the domain or on its boundary; in the shape of x and y."""
@@ -106,15 +63,9 @@ class Geometry(HeightField):
         return Geometry(
             Frame(scale * turn @ self.frame.origin + shift, turn @ self.frame.axes),
             scale * self.radius,
-            self.polynomial.scaled(scale),
+            self.surface,
             self.domain.scaled(scale),
-            self.residual,
         )
-
-
-def _widened(outward: Array) -> Array:
-    """The factors of the deviation for places at these shares of the domain's radius."""
-    return NEAR_POINT + 1.5 * (1.0 - NEAR_POINT) * outward
 
 
 def similarity(matrix: ArrayLike) -> tuple[float, Array, Array]:

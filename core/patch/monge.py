@@ -163,21 +163,32 @@ class MongePatch(HeightField):
         return self._evaluate(x, y, [(0, 0)])[0]
 
     def _evaluate(self, x: ArrayLike, y: ArrayLike, orders: list[tuple[int, int]]) -> Array:
-        """The derivatives (m, ...) of m orders (dx, dy), by tables of a_ij, times x^i, times y^j."""
-        x_array, y_array = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        if x_array.shape != y_array.shape:
-            x_array, y_array = np.broadcast_arrays(x_array, y_array)
-        count = self.degree + 1
-        table = np.zeros((count, count))
-        i, j = exponents(2, self.degree).T
-        table[j, i] = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
-        tables = [_derive(count, dy) @ table @ _derive(count, dx).T for dx, dy in orders]
-        powers = np.ones((count, 2, x_array.size))
-        powers[1] = x_array.ravel(), y_array.ravel()
-        for k in range(2, count):
-            np.multiply(powers[k - 1], powers[1], out=powers[k])
-        rows = (np.concatenate(tables) @ powers[:, 0]).reshape(len(orders), count, -1)
-        return np.einsum("mjn,jn->mn", rows, powers[:, 1]).reshape(len(orders), *x_array.shape)
+        """The derivatives (m, ...) of m orders (dx, dy)."""
+        a = np.concatenate([[self.k1 / 2.0, 0.0, self.k2 / 2.0], self.coefficients])
+        return polynomial_derivatives(a, exponents(2, self.degree), x, y, orders)
+
+
+def polynomial_derivatives(
+    coefficients: Array, terms: NDArray[np.intp], x: ArrayLike, y: ArrayLike, orders: list[tuple[int, int]]
+) -> Array:
+    """The derivatives (m, ...) of m orders (dx, dy) of a sum of all terms (k, 2) of some degrees.
+
+    They follow from tables of the coefficients (k,), times x^i, times y^j.
+    """
+    x_array, y_array = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if x_array.shape != y_array.shape:
+        x_array, y_array = np.broadcast_arrays(x_array, y_array)
+    count, (i, j) = int(terms[-1].sum()) + 1, terms.T
+    table = np.zeros((count, count))
+    table[j, i] = coefficients
+    tables = [_derive(count, dy) @ table @ _derive(count, dx).T for dx, dy in orders]
+    powers = np.ones((count, 2, x_array.size))
+    powers[1] = x_array.ravel(), y_array.ravel()
+    for k in range(2, count):
+        np.multiply(powers[k - 1], powers[1], out=powers[k])
+    rows = (np.concatenate(tables) @ powers[:, 0]).reshape(len(orders), count, -1)
+    found: Array = np.einsum("mjn,jn->mn", rows, powers[:, 1]).reshape(len(orders), *x_array.shape)
+    return found
 
 
 @cache

@@ -34,13 +34,13 @@ def suggest_plane(
     """
     points, weights = r.domain.nodes
     wanted = max(3, round(2 * len(r.contacts) / len(r.domain.ends)))
-    covariances = r.uncertainty.covariances_with(points / r.radius)
-    widening = r.geometry.node_widening**2
+    covariances = r.posterior.covariances_with(points / r.radius)
+    widening = r.widening(r.domain.node_places) ** 2
 
     def lost(azimuths: NDArray[np.intp], most: int) -> Array:
         """What a contour at each of k azimuths takes off the variances at n points, (k, n), in L^2."""
         count = min(wanted, most)
-        noise = float(r.uncertainty.noise) ** 2 * count / wanted
+        noise = float(r.posterior.noise) ** 2 * count / wanted
         return widening * _lost(covariances, TRIED[azimuths % len(TRIED)], count, noise)
 
     tried = np.arange(0, len(TRIED), COARSE_STRIDE)

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
-from ..bayes.contradiction import contradiction, measured_normals, scatter
 from ..bayes.joint_fit import posterior_of
+from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import contradicting_curve
-from ..bayes.posterior import FREE, Posterior, terms_to
+from ..bayes.posterior import SurfacePosterior, terms_to
+from ..bayes.prior import FREE
 from ..contours.contour import Contour, read_only
 from ..contours.curves import Curves, besides_point, curves_through, has_measured_normals, misses, stacked
 from ..contours.local_geometry import Frame
@@ -21,9 +22,9 @@ from ..paper import least_squares
 from ..patch.domain import Domain
 from ..patch.geometry import Geometry, similarity, total_absolute_curvature
 from ..patch.monge import MongePatch, exponents, monomials
-from ..patch.residual import Residual
 from .status import Taps, contradicted, doubt, notes
 
+NEAR_POINT = 0.6  # This share of a process's deviation is left at the point (benchmarks.real).
 # The mesh is off the patch by at most this share of mean_height_std (benchmarks.patch_mesh).
 MESH_SHARE = 0.6
 
@@ -39,7 +40,6 @@ class Reconstruction:
     noise : least standard deviation of a contact, in units of L
     method : the method of the fit
     converged : whether its solver converged
-    joint_posterior : the posterior of "bayes", in the frame and in units of L; None for other methods
     taps : what was felt between the curves; None if nobody tapped there
     known_height_std : mean_height_std, if it is known already
     known_curves : the contours as Curves of one touch, in the world, if they are known already
@@ -55,7 +55,6 @@ class Reconstruction:
     method: str
     converged: bool = True
     strokes: Array = field(default_factory=lambda: np.empty((0, 3)))
-    joint_posterior: Posterior | None = None
     taps: Taps | None = None
     known_height_std: float | None = None
     known_curves: Curves | None = None
@@ -79,11 +78,6 @@ class Reconstruction:
         """The part of the tangent plane over which the patch is valid, bounded by a closed spline (8)."""
         return self.geometry.domain
 
-    @property
-    def residual(self) -> Residual | None:
-        """The difference of the surface from its polynomial, or None."""
-        return self.geometry.residual
-
     @cached_property
     def contacts(self) -> Array:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
@@ -98,37 +92,45 @@ class Reconstruction:
         return misses(curves)[0, : len(self.contours)]
 
     @cached_property
-    def posterior(self) -> Posterior:
-        """What the contacts leave open, in the frame and in units of L."""
-        if self.joint_posterior is not None:
-            return self.joint_posterior
+    def posterior(self) -> SurfacePosterior:
+        """What the contacts show and leave open, in the frame and in units of L."""
+        if isinstance(self.geometry.surface, SurfacePosterior):
+            return self.geometry.surface
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
         return posterior_of(k1, k2, self.contacts / self.radius, self.noise)
-
-    @property
-    def uncertainty(self) -> Residual | Posterior:
-        """The residual or posterior that has the covariances of heights, in the frame and in units of L."""
-        return self.posterior if self.residual is None else self.residual
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height of the surface at local (x, y), in their shape.
 
-        For "bayes" it is the posterior's mean, a sextic and the residual, whatever the degree of the patch.
-        For the paper's methods it is the height of the patch.
+        For "bayes" it is the posterior's mean, whatever the degree of the patch. For the paper's methods it
+        is the height of the patch.
         """
         return self.geometry.height(x, y)
 
     def height_std(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Standard deviation of the height at local (x, y), in their shape, including blind directions."""
-        return self._height_std(x, y, self.geometry.widening(x, y))
+        points = np.column_stack([np.ravel(v) for v in np.broadcast_arrays(x, y)])
+        outward = np.ones(len(points))
+        if self.posterior.amplitude:  # Otherwise it makes no difference.
+            outward = np.linalg.norm(self.domain.places(points), axis=1)
+        std = self._height_std(points, self.widening(outward))
+        return std.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
 
-    def _height_std(self, x: ArrayLike, y: ArrayLike, widening: Array) -> Array:
-        u, v = self.geometry.in_unit_radius(x, y)
-        std = widening * self.uncertainty.height_std(u, v)
-        if self.joint_posterior is None:  # A patch by another method departs from the posterior's mean, too.
-            off = self.posterior.height(u, v) - np.ravel(self.height(x, y)) / self.radius
-            std = np.hypot(std, off)
-        return self.radius * std.reshape(np.broadcast_shapes(np.shape(x), np.shape(y)))
+    def _height_std(self, points: Array, widening: Array) -> Array:
+        u, v = points.T / self.radius
+        std = widening * self.posterior.height_std(u, v)
+        if self.method != "bayes":  # A patch by another method departs from the posterior's mean, too.
+            std = np.hypot(std, self.posterior.height(u, v) - self.geometry.surface.height(u, v))
+        return self.radius * std
+
+    def widening(self, outward: Array) -> Array:
+        """The factor (n,) of a process's deviations at these shares (n,) of the domain's radius.
+
+        Near the point, where curves meet, real surfaces are smoother than their covariance says, and near the
+        rim they are rougher. The mean over the domain is 1.
+        """
+        near = NEAR_POINT if self.posterior.amplitude else 1.0
+        return near + 1.5 * (1.0 - near) * outward
 
     @cached_property
     def mean_height_std(self) -> float:
@@ -139,8 +141,7 @@ class Reconstruction:
     @cached_property
     def node_stds(self) -> Array:
         """height_std at the domain's nodes, (n,)."""
-        x, y = self.domain.nodes[0].T
-        return self._height_std(x, y, self.geometry.node_widening)
+        return self._height_std(self.domain.nodes[0], self.widening(self.domain.node_places))
 
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
@@ -201,11 +202,11 @@ class Reconstruction:
 
     @cached_property
     def waves(self) -> float:
-        """What a quartic leaves of the surface at the contacts: a root mean square; 0 without a residual.
+        """What a quartic leaves of the surface at the contacts: a root mean square; 0 without a process.
 
         Outlying contacts do not count, because the surface itself leaves them out.
         """
-        if self.residual is None:
+        if not self.posterior.amplitude:
             return 0.0
         x, y = self.contacts[:, :2].T
         basis = monomials(x / self.radius, y / self.radius, exponents(1, 4))
@@ -259,17 +260,17 @@ class Reconstruction:
     @cached_property
     def curve_contradiction(self) -> tuple[float, float]:
         """The number of deviations, and the share of L, by which a curve is off what the others tell."""
-        if self.joint_posterior is None:
+        if self.method != "bayes":
             return 0.0, 0.0
         beside = [besides_point(contour.points - self.frame.origin)[1] for contour in self.contours]
         curve = np.repeat(np.arange(len(beside)), list(map(np.count_nonzero, beside)))
         curve = np.append(curve, np.full(len(self.strokes), -1))
-        return contradicting_curve(self.contacts / self.radius, curve, self.joint_posterior, self.noise)
+        return contradicting_curve(self.contacts / self.radius, curve, self.posterior, self.noise)
 
     @cached_property
     def _fitted_normals(self) -> tuple[Array, Array]:
         """Contacts with fitted normals and these normals, (n, 3) each, as `measured_normals` has them."""
-        if self.joint_posterior is None or not has_measured_normals(self.contours):
+        if self.method != "bayes" or not has_measured_normals(self.contours):
             return np.empty((0, 3)), np.empty((0, 3))
         return measured_normals(self.contours, self.frame, self.radius)
 

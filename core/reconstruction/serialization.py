@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import LARGEST, SMALLEST, Array, finite_array, number, shown
-from ..bayes.posterior import FREE, Posterior, terms_to
+from ..arguments import LARGEST, SMALLEST, finite_array, number, shown
+from ..bayes.kernel import LENGTHS
+from ..bayes.posterior import SurfacePosterior, terms_to
+from ..bayes.prior import FREE
 from ..contours.contour import Contour
 from ..contours.local_geometry import Frame
 from ..patch.domain import closed_spline_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import TERMS, MongePatch
-from ..patch.residual import LENGTHS, Residual
 from .from_contours import METHODS
 from .result import Reconstruction
 from .status import Taps
 
-VERSION = 2
+VERSION = 3
 ORTHONORMAL = 1e-6  # Axes may be off by so much, because files may have them in single precision.
-LEAST_PIVOT = 1e-3  # A residual's factor has no smaller pivot; its priors leave ten times as much.
 COEFFICIENTS = [terms_to(degree) - FREE for degree in range(2, 7)]  # Numbers of coefficients by degree.
 
 
@@ -30,9 +30,10 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
     """A reconstruction as JSON has it: a dict of numbers, words, lists and dicts, which `from_dict` reads.
 
     Lengths are in the caller's unit, those of the geometry in its frame. `noise` and `posterior` are in
-    units of the radius. `status` and `message` are for readers only: they follow from the rest.
+    units of the radius; the latter is None for the paper's methods, whose surface is `patch`. `status` and
+    `message` are for readers only: they follow from the rest.
     """
-    posterior, residual = r.joint_posterior, r.residual
+    posterior = r.posterior if r.method == "bayes" else None
     return {
         "version": VERSION,
         "method": r.method,
@@ -44,15 +45,13 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "geometry": {
             "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
             "radius": r.radius,
-            "polynomial": polynomial_dict(r.geometry.polynomial),
-            "residual": residual and plain({f.name: getattr(residual, f.name) for f in fields(residual)}),
             "domain": r.domain.ends.tolist(),
             "brinks": None if r.domain.brinks is None else r.domain.brinks.tolist(),
         },
         "patch": polynomial_dict(r.patch),
         "contours": [plain(vars(contour)) for contour in r.contours],
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
-        "posterior": None if posterior is None else plain(posterior._asdict()),
+        "posterior": posterior and plain({f.name: getattr(posterior, f.name) for f in fields(posterior)}),
         "taps": None if r.taps is None else r.taps._asdict(),
     }
 
@@ -79,19 +78,19 @@ def from_dict(d: Mapping[str, Any]) -> Reconstruction:
         raise ValueError(
             f"version: expected {VERSION}, got {shown(d['version'])}: this was written by another release"
         )
-    method, posterior, strokes = _of(d, "method"), _of(d, "posterior"), _of(d, "strokes")
+    method, strokes, patch = _of(d, "method"), _of(d, "strokes"), _polynomial(_of(d, "patch"))
     contours = _contours(_of(d, "contours"), strokes is not None)
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {shown(method)}")
+    surface = _posterior(_of(d, "posterior")) if method == "bayes" else None
     r = Reconstruction(
-        geometry=_geometry(_of(d, "geometry")),
-        patch=_polynomial(_of(d, "patch")),
+        geometry=_geometry(_of(d, "geometry"), surface or patch),
+        patch=patch,
         contours=contours,
         noise=number("noise", _of(d, "noise"), least=0.0),
         method=method,
         converged=bool(_of(d, "converged")),
         strokes=np.empty((0, 3)) if strokes is None else finite_array("strokes", strokes, (None, 3), LARGEST),
-        joint_posterior=None if posterior is None else _posterior(posterior),
         taps=_taps(d.get("taps")),
         known_height_std=number("mean_height_std", _of(d, "mean_height_std"), least=0.0),
     )
@@ -108,21 +107,20 @@ def _of(d: Any, key: str) -> Any:
     return d[key]
 
 
-def _geometry(d: Any) -> Geometry:
+def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:
     frame, radius = _of(d, "frame"), number("radius", _of(d, "radius"), least=SMALLEST)
     axes = finite_array("axes", _of(frame, "axes"), (3, 3))
     if np.abs(axes.T @ axes - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(axes) < 0.0:
         raise ValueError("axes: expected a right-handed frame of unit vectors, got another matrix")
-    residual, brinks = _of(d, "residual"), _of(d, "brinks")
+    brinks = _of(d, "brinks")
     ends = finite_array("domain", _of(d, "domain"), (None, 2))
     if brinks is not None:
         brinks = finite_array("brinks", brinks, (len(ends),)) != 0.0
     return Geometry(
         Frame(finite_array("origin", _of(frame, "origin"), (3,), LARGEST), axes),
         radius,
-        _polynomial(_of(d, "polynomial")),
+        surface.scaled(1.0 / radius) if isinstance(surface, MongePatch) else surface,
         closed_spline_domain(ends, radius, brinks),
-        None if residual is None else _residual(residual),
     )
 
 
@@ -150,48 +148,22 @@ def _taps(d: Any) -> Taps | None:
     return Taps(taps, missed, number("off", _of(d, "off"), least=0.0))
 
 
-def _posterior(d: Any) -> Posterior:
-    size = len(TERMS)
-    shapes: dict[str, tuple[int, ...]] = {
+def _posterior(d: Any) -> SurfacePosterior:
+    size, places = len(TERMS), finite_array("places", _of(d, "places") or np.empty((0, 2)), (None, 2))
+    shapes: dict[str, tuple[int | None, ...]] = {
         "mean": (size,),
-        "covariance": (size, size),
-        "noise": (),
+        "root": (None, size + 1 + len(places)),
         "visibility": (size - FREE, size - FREE),
-        "level": (size + 1,),
-    }
-    posterior = Posterior(*(finite_array(name, _of(d, name), shape) for name, shape in shapes.items()))
-    _require_covariance(posterior.covariance)
-    return posterior
-
-
-def _require_covariance(matrix: Array) -> None:
-    largest = float(np.abs(matrix).max())
-    apart = np.abs(matrix - matrix.T).max()
-    least = min(np.linalg.eigvalsh(matrix).min() + 1e-9 * largest, matrix.diagonal().min())
-    if apart > 1e-9 * largest or least < 0.0:
-        raise ValueError("covariance: expected a symmetric matrix without negative eigenvalues, got another")
-
-
-def _residual(d: Any) -> Residual:
-    places = finite_array("places", _of(d, "places"), (None, 2))
-    size = len(TERMS) + len(places)
-    shapes: dict[str, tuple[int, ...]] = {
+        "alpha": (len(places),),
         "variances": (len(LENGTHS),),
-        "mean": (size,),
-        "factor": (size, size),
-        "noise": (),
     }
     values = {name: finite_array(name, _of(d, name), shape) for name, shape in shapes.items()}
-    factor, variances, noise = (values[name] for name in ("factor", "variances", "noise"))
-    # It is the factor of the precision, which priors keep from being singular.
-    if not np.array_equal(factor, np.tril(factor)) or factor.diagonal().min() < LEAST_PIVOT:
+    variances, noise = values["variances"], np.array(number("noise", _of(d, "noise"), above=0.0))
+    if variances.min() < 0.0 or (variances.max() > 0.0) != (len(places) > 0):
         raise ValueError(
-            f"factor: expected a lower triangle, its diagonal {LEAST_PIVOT:g} or more, got another"
+            "variances: expected numbers of 0 or more, above 0 where there are places and 0 without, got "
+            f"{shown(variances.tolist())}"
         )
-    if not (
-        variances.min() >= 0.0 < variances.max() and noise > 0.0 and np.abs(places).max(initial=0.0) < 2.0
-    ):
-        raise ValueError(
-            "residual: expected variances and noise above 0, places on the unit disk, got others"
-        )
-    return Residual(places, **values)
+    if np.abs(places).max(initial=0.0) >= 2.0:
+        raise ValueError("places: expected them on the unit disk, got others")
+    return SurfacePosterior(noise=noise, places=places, **values)

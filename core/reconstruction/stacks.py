@@ -10,18 +10,17 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..bayes.joint_fit import joint_fit
-from ..bayes.posterior import Posterior
-from ..bayes.rough_fit import rough_fit
+from ..bayes.posterior import SurfacePosterior
+from ..bayes.process_fit import process_fit
 from ..contours.contour import Contour
 from ..contours.curves import Curves
 from ..contours.local_geometry import DegenerateCurvesError, Frame
 from ..paper.by_method import coefficients
 from ..patch.domain import Domain, hull_domain
 from ..patch.geometry import Geometry
-from ..patch.monge import DEGREE, MongePatch
-from ..patch.residual import Residual
+from ..patch.monge import HeightField, MongePatch
 from .result import Reconstruction
-from .start import Given, Start, curves_start, domain_of, levels, strokes_start
+from .start import Given, Start, curves_start, domain_of, strokes_start
 
 
 class Options(NamedTuple):
@@ -35,22 +34,6 @@ class Options(NamedTuple):
     radius: float | None  # of strokes alone
 
 
-class _Parts(NamedTuple):
-    """What the patch of one touch follows from, in the frame; all but the radius in units of it."""
-
-    frame: Frame
-    radius: float
-    curves: Curves
-    strokes: Array  # (m, 3)
-    known: Curves  # The same as a stack of one, in the world.
-    k1: float
-    k2: float
-    noise: float
-    degree: int
-    posterior: Posterior | None  # What the joint fit has found, if that makes the patch.
-    residual: Residual | None  # What the surface is beside it, if the contacts ask for that.
-
-
 class _Fit(NamedTuple):
     """b touches in the frames that the method finds, with contacts in unit radius."""
 
@@ -58,10 +41,8 @@ class _Fit(NamedTuple):
     axes: Array  # (b, 3, 3)
     radii: Array  # (b,)
     contacts: Array  # (b, n, 3)
-    tangents: Array  # (b, c, 3), of the curves
     degrees: list[int]
-    posteriors: Posterior | None
-    beside: list[Residual | None]
+    posteriors: list[SurfacePosterior] | None  # None if the method is the paper's.
 
 
 def fitted_stack(
@@ -72,80 +53,58 @@ def fitted_stack(
         start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
     else:
         start, contours, errors = curves_start(points, touches, outward, options.noise)
-    found = iter(() if start is None else _fitted(start, options))
-    each = zip(errors, contours, outward, strict=True)
-    return [error or _result(next(found), c, up, options) for error, c, up in each]
-
-
-def _fitted(start: Start, options: Options) -> list[_Parts]:
-    """The touches in the Darboux frames that the method finds."""
-    fit, curves, places = _fit(start, options), start.curves, start.curves.present[0].size
-    along = curves.along / fit.radii[:, None, None]
-    curvatures = fit.radii[:, None, None] * (curves.curvatures @ fit.axes)
-    local = fit.contacts[:, :places].reshape(curves.points.shape)
-    curves = Curves(local, curves.present, along, fit.tangents, curvatures)
-    return [
-        _Parts(
-            Frame(fit.points[i], fit.axes[i]),
-            float(fit.radii[i]),
-            curves.at(i),
-            fit.contacts[i, places : places + len(start.strokes[i])],
-            start.curves.at([i]),
-            float(start.k1[i]),
-            float(start.k2[i]),
-            float(start.stds[i] / fit.radii[i]),
-            fit.degrees[i],
-            fit.posteriors and fit.posteriors.at(i),
-            fit.beside[i],
-        )
-        for i in range(len(fit.points))
-    ]
+    fit = None if start is None else _fit(start, options)
+    found: list[Reconstruction | DegenerateCurvesError] = []
+    each, i = zip(errors, contours, outward, strict=True), 0
+    for error, some, up in each:
+        if error is None:
+            assert start is not None and fit is not None
+            found.append(_result(start, fit, i, some, up, options))
+            i += 1
+        else:
+            found.append(error)
+    return found
 
 
 def _fit(start: Start, options: Options) -> _Fit:
     """The touches in the frames of the paper, or in those of the joint fit."""
     contacts, present = start.contacts()
-    tangents, count = start.curves.tangents @ start.axes, len(start.points)
-    degrees = [options.degree or 0] * count
-    plain = _Fit(start.points, start.axes, start.radii, contacts, tangents, degrees, None, [None] * count)
+    degrees = [options.degree or 0] * len(start.points)
+    plain = _Fit(start.points, start.axes, start.radii, contacts, degrees, None)
     if options.method != "bayes" and options.degree is not None:
         return plain
     turns, posteriors, weights = _joint(start, contacts, present)
     turned = contacts @ turns
     if options.degree is None:
-        degrees = [posteriors.at(i).degree_shown(turned[i][present[i]]) for i in range(count)]
+        degrees = [posteriors.at(i).degree_shown(turned[i][present[i]]) for i in range(len(degrees))]
     if options.method != "bayes":
         return plain._replace(degrees=degrees)
-    joint = plain._replace(
-        axes=start.axes @ turns, contacts=turned, tangents=tangents @ turns, degrees=degrees
-    )
-    return _with_residuals(start, joint, posteriors, weights)
+    joint = plain._replace(axes=start.axes @ turns, contacts=turned, degrees=degrees)
+    return _with_processes(start, joint, posteriors, weights)
 
 
-def _with_residuals(start: Start, fit: _Fit, posteriors: Posterior, weights: Array) -> _Fit:
-    """The joint fit in unit radius; where contacts ask for a residual, with it and in its frame."""
-    points, axes, radii, contacts, tangents = fit[:5]
+def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
+    """The joint fit in unit radius; where contacts ask for a process, with it and in its frame."""
+    points, axes, radii, contacts = fit[:4]
     if start.alone:
-        level = levels(contacts, weights, posteriors)
+        level = posteriors.levels(contacts, weights)
         contacts[..., 2] -= level[:, None]
         points = points + (radii * level)[:, None] * axes[..., 2]
     places = 0 if start.alone else start.curves.present[0].size
     radii, contacts, farthest = _in_unit_radius(radii, contacts, places)
-    turns, farthest, posteriors, beside = rough_fit(
+    found = process_fit(
         contacts,
         weights,
         posteriors.scaled(1.0 / farthest),
         start.stds / radii,
-        start.told,
+        start.stds_are_known,
         (start.tangents[:, None] @ axes)[:, 0],
         start.ranks(),
         _normals(start.curves, axes, contacts),
         through=not start.alone,
     )
-    if any(residual is not None for residual in beside):
-        axes, contacts, tangents = axes @ turns, contacts @ turns, tangents @ turns
-        radii, contacts = radii * farthest, contacts / farthest[:, None, None]
-    return _Fit(points, axes, radii, contacts, tangents, fit.degrees, posteriors, beside)
+    axes, contacts = axes @ found.turns, contacts @ found.turns / found.scales[:, None, None]
+    return _Fit(points, axes, radii * found.scales, contacts, fit.degrees, found.posteriors)
 
 
 def _in_unit_radius(radii: Array, contacts: Array, places: int) -> tuple[Array, Array, Array]:
@@ -154,11 +113,13 @@ def _in_unit_radius(radii: Array, contacts: Array, places: int) -> tuple[Array, 
     return radii * farthest, contacts / farthest[:, None, None], farthest
 
 
-def _joint(start: Start, contacts: Array, present: NDArray[np.bool_]) -> tuple[Array, Posterior, Array]:
+def _joint(
+    start: Start, contacts: Array, present: NDArray[np.bool_]
+) -> tuple[Array, SurfacePosterior, Array]:
     """The joint fit of all contacts of each touch: turns, posteriors, weights."""
     normals = _normals(start.curves, start.axes, contacts)
     tangent, noise = (start.tangents[:, None] @ start.axes)[:, 0], start.stds / start.radii
-    first, through = (start.k1, start.k2, tangent, noise), not start.alone
+    first, through = (start.kappas[:, 0], start.kappas[:, 1], tangent, noise), not start.alone
     most = present.sum(axis=1).max()
     if most == present.shape[1]:
         return joint_fit(contacts, present.astype(float), *first, normals, through)
@@ -183,43 +144,53 @@ def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
 
 
 def _result(
-    touch: _Parts, contours: Sequence[Contour], outward: Array, options: Options
+    start: Start, fit: _Fit, i: int, contours: Sequence[Contour], outward: Array, options: Options
 ) -> Reconstruction | DegenerateCurvesError:
-    if touch.frame.axes[:, 2] @ outward <= 0.0:
+    """What touch i of the stack has found."""
+    if fit.axes[i, :, 2] @ outward <= 0.0:
         return DegenerateCurvesError(
             "the contacts show a surface that faces away from the outward direction: give the direction to "
             "its outer side at the point, or move the point away from the edge"
         )
-    domain = _domain(touch, contours)
+    curves, frame, scale = _curves(start, fit, i), Frame(fit.points[i], fit.axes[i]), float(fit.radii[i])
+    places = curves.present.size
+    strokes = fit.contacts[i, places : places + len(start.strokes[i])]
+    domain = _domain(curves, strokes, contours)
     if isinstance(domain, DegenerateCurvesError):
         return domain
     converged = True
-    if touch.posterior is None:
+    if fit.posteriors is None:
+        k1, k2 = start.kappas[i].tolist()
         paper = options.method, options.weight, options.solver
-        a, converged = coefficients(touch.curves, touch.k1, touch.k2, touch.degree, domain, *paper)
-        patch = MongePatch(touch.k1, touch.k2, a)
+        a, converged = coefficients(curves, k1, k2, fit.degrees[i], domain, *paper)
+        patch = MongePatch(k1, k2, a).scaled(scale)
+        surface: HeightField = patch.scaled(1.0 / scale)
     else:
-        patch = touch.posterior.patch(touch.degree)
-    scale = touch.radius
-    surface = patch if touch.posterior is None else touch.posterior.patch(DEGREE)
-    domain = domain.scaled(scale)
+        surface, patch = fit.posteriors[i], fit.posteriors[i].patch(fit.degrees[i]).scaled(scale)
     return Reconstruction(
-        Geometry(touch.frame, scale, surface.scaled(scale), domain, touch.residual),
-        patch.scaled(scale),
+        Geometry(frame, scale, surface, domain.scaled(scale)),
+        patch,
         tuple(contours),
-        noise=touch.noise,
+        noise=float(start.stds[i] / fit.radii[i]),
         method=options.method,
         converged=converged,
-        strokes=touch.frame.to_world(scale * touch.strokes),
-        joint_posterior=touch.posterior,
-        known_curves=touch.known,
+        strokes=frame.to_world(scale * strokes),
+        known_curves=start.curves.at([i]),
     )
 
 
-def _domain(touch: _Parts, contours: Sequence[Contour]) -> Domain | DegenerateCurvesError:
+def _curves(start: Start, fit: _Fit, i: int) -> Curves:
+    """The curves of touch i, in its frame and in unit radius."""
+    curves, axes, radius = start.curves.at(i), fit.axes[i], fit.radii[i]
+    local = fit.contacts[i, : curves.present.size].reshape(curves.points.shape)
+    along, curvatures = curves.along / radius, radius * (curves.curvatures @ axes)
+    return Curves(local, curves.present, along, curves.tangents @ axes, curvatures)
+
+
+def _domain(curves: Curves, strokes: Array, contours: Sequence[Contour]) -> Domain | DegenerateCurvesError:
     """The domain of the contours, or of strokes alone, in unit radius; or why there is none."""
     try:
-        return domain_of(touch.curves, contours) if contours else hull_domain(touch.strokes[:, :2], 1.0)
+        return domain_of(curves, contours) if contours else hull_domain(strokes[:, :2], 1.0)
     except ValueError:
         return DegenerateCurvesError(
             "the curves end in fewer than three separate places, so they bound no patch: "

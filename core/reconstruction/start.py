@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..bayes.posterior import Posterior
 from ..contours.contour import BRINKS, Contour
 from ..contours.curves import Curves, curves_through, stacked
 from ..contours.local_geometry import (
@@ -22,7 +21,6 @@ from ..contours.local_geometry import (
 )
 from ..contours.thinning import thinned
 from ..patch.domain import BRINK, Domain, closed_spline_domain
-from ..patch.monge import TERMS, monomials
 from .strokes import STRIPS, FirstFrame, first_frame, means, toward_farthest
 
 TOUCH_ROUNDING = 1e-3  # Far from the origin rounding may take this share of a touch; MISFIT has room for it.
@@ -53,19 +51,22 @@ class Start(NamedTuple):
 
     points: Array  # (b, 3), in the world
     axes: Array
-    k1: Array
-    k2: Array
+    kappas: Array  # k1 and k2, (b, 2)
     radii: Array
-    tangents: Array  # (b, 3), in the world, which d1 is to follow
     curves: Curves  # relative to the points, in the world
     strokes: list[Array]  # (m, 3) each, in the axes and in unit radius
     stds: Array  # (b,)
-    told: NDArray[np.bool_]  # (b,), whether these are known to be all of the noise; of means it is more
+    stds_are_known: NDArray[np.bool_]  # (b,), to be all of the noise; of means it is more
 
     @property
     def alone(self) -> bool:
         """Whether there are strokes only."""
         return not self.curves.present.any()
+
+    @property
+    def tangents(self) -> Array:
+        """The tangents (b, 3), in the world, which d1 is to follow."""
+        return self.axes[:, :, 0] if self.alone else self.curves.tangents[:, 0]
 
     def contacts(self) -> tuple[Array, NDArray[np.bool_]]:
         """Contacts (b, n, 3) of curves, then strokes, in the axes and in unit radius; a mask (b, n)."""
@@ -105,17 +106,18 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         return None, touches, errors
     curves = curves.at(good)
     axes, k1, k2, radii = darboux_frames(curves, normals[good])
-    strokes, stds, told = [], [], []
+    strokes, stds, known_stds = [], [], []
     for row, i in enumerate(good):
         beside, size = _beside(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
         strokes.append(beside)
         sizes = [size for _, size in thin[i]]
         known = [contour.noise or 0.0 for contour in touches[i]]
         stds.append(_std(noise, max(size, min(sizes)), [*known, given[i].noise / math.sqrt(size)]))
-        told.append(not len(beside) and (noise is not None or None not in [c.noise for c in touches[i]]))
-    tangents = curves.tangents[:, 0]
-    noises = np.array(stds), np.array(told)
-    first = Start(points[good], axes, k1, k2, radii, tangents, curves, strokes, *noises)
+        known_stds.append(
+            not len(beside) and (noise is not None or None not in [c.noise for c in touches[i]])
+        )
+    noises, kappas = (np.array(stds), np.array(known_stds)), np.stack([k1, k2], axis=1)
+    first = Start(points[good], axes, kappas, radii, curves, strokes, *noises)
     return first, touches, errors
 
 
@@ -173,20 +175,12 @@ def strokes_start(
         _std(noise, size, [given[i].noise / math.sqrt(size)]) for i, (_, size) in zip(good, thin, strict=True)
     ]
     axes = np.array([first.axes for first in firsts.values()])
-    k1, k2, radii = np.array([(first.k1, first.k2, first.radius) for first in firsts.values()]).T
+    kappas = np.array([(first.k1, first.k2) for first in firsts.values()])
+    radii = np.array([first.radius for first in firsts.values()])
     curves = curves_through(*stacked(points[good], [[]] * len(good)))
-    strokes, told = [beside for beside, _ in thin], np.zeros(len(good), dtype=bool)
-    start = Start(points[good], axes, k1, k2, radii, axes[:, :, 0], curves, strokes, np.array(stds), told)
+    strokes, known = [beside for beside, _ in thin], np.zeros(len(good), dtype=bool)
+    start = Start(points[good], axes, kappas, radii, curves, strokes, np.array(stds), known)
     return start, none, errors
-
-
-def levels(contacts: Array, weights: Array, posterior: Posterior) -> Array:
-    """The mean heights (b,) by which contacts (b, n, 3) are above surfaces that pass through the origin."""
-    b, n = weights.shape
-    basis = monomials(contacts[..., 0].ravel(), contacts[..., 1].ravel(), TERMS).reshape(b, n, -1)
-    off = contacts[..., 2] - (basis @ posterior.mean[..., None])[..., 0]
-    found: Array = (weights * off).sum(axis=1) / weights.sum(axis=1)
-    return found
 
 
 def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:

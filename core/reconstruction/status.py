@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..bayes.posterior import terms_to
+from ..bayes.posterior import CONFIDENCE, terms_to
 
 # benchmarks.stability chose these, and benchmarks.real LIKELY and what taps say. A fit is in doubt beyond
 # them.
@@ -143,7 +143,7 @@ def _about_frame(r: Judged) -> Iterator[str]:
             f"Curve {apart[0] + 1} passes the reference point at {r.radius * distances[apart[0]]:.3g}"
             ", more than its scatter explains: set the point where the curves meet."
         )
-    turn = r.posterior.turn() if r.residual is None else r.posterior.turn(LIKELY)
+    turn = r.posterior.turn(LIKELY if r.posterior.amplitude else CONFIDENCE)
     if turn > DOUBTFUL_TURN and not r.posterior.is_round:
         yield (
             f"The principal directions may be {math.degrees(turn):.0f} degrees off: use a longer "

@@ -93,7 +93,7 @@ def reconstruction_report(result, ended=""):
         **{f"{name}_std": getattr(result, f"{name}_std") for name in CURVATURES},
         "shape_index": float(at_point.shape_index),
         "curvedness": float(at_point.curvedness),
-        "residual": 0.0 if result.residual is None else result.radius * result.residual.size,
+        "residual": result.radius * result.posterior.amplitude,
         "coefficients": result.patch.coefficients.tolist(),
         "radius": result.radius,
         "contacts": len(result.contacts),

@@ -11,11 +11,12 @@ import surfaces
 from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, reconstruct_many
-from core.bayes import evidence, linear_system, posterior
-from core.bayes.contradiction import contradiction, measured_normals, scatter
-from core.bayes.measured_slopes import slope_equations
+from core.bayes import evidence, posterior, sextic
+from core.bayes.kernel import kernel, places_factor
+from core.bayes.normals import contradiction, measured_normals, scatter, slope_equations
+from core.bayes.process_fit import Observations, equations_of, process_posterior
 from core.contours.local_geometry import Frame
-from core.patch.monge import monomials
+from core.patch.monge import TERMS, monomials
 
 PLANES = surfaces.planes((0, 60, 120))
 HIDDEN = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})  # zero in these planes
@@ -156,7 +157,7 @@ def test_slopes_are_the_derivatives_of_the_heights():
     x, y, _ = local[0].T
 
     def height(x, y):
-        return monomials(x, y, posterior.TERMS) @ b
+        return monomials(x, y, TERMS) @ b
 
     dx = (height(x + h, y) - height(x - h, y)) / (2.0 * h)
     dy = (height(x, y + h) - height(x, y - h)) / (2.0 * h)
@@ -169,8 +170,8 @@ def test_slopes_are_the_derivatives_of_the_heights():
     for direction in rng.normal(size=(5, 27)):
         misses = slopes[0] @ (1e-5 * direction)
         change = np.column_stack([
-            (monomials(x + h, y, posterior.TERMS) - monomials(x - h, y, posterior.TERMS)) @ direction,
-            (monomials(x, y + h, posterior.TERMS) - monomials(x, y - h, posterior.TERMS)) @ direction,
+            (monomials(x + h, y, TERMS) - monomials(x - h, y, TERMS)) @ direction,
+            (monomials(x, y + h, TERMS) - monomials(x, y - h, TERMS)) @ direction,
         ]) / (2.0 * h)  # fmt: skip
         turned = np.column_stack([up[:, :2] + 1e-5 * change, -np.ones(9)])
         cross = np.linalg.norm(np.cross(up, turned), axis=1)
@@ -178,17 +179,27 @@ def test_slopes_are_the_derivatives_of_the_heights():
         assert np.hypot(misses[:9], misses[9:]) == pytest.approx(angles / 0.05, rel=1e-3, abs=1e-9)
 
 
-def test_without_slopes_both_likelihoods_are_one():
-    """The likelihoods agree except for the weak prior of the free terms."""
+def test_the_evidence_is_that_of_heights_and_slopes_under_a_normal_distribution():
+    """Differences of -2 log likelihood over the grid are those of the dense covariances."""
     rng = np.random.default_rng(4)
     local = np.column_stack([rng.uniform(-0.9, 0.9, (60, 2)), 0.02 * rng.normal(size=60)])[None]
-    weights, nothing = np.ones((1, 60)), np.zeros((1, 27))
-    alone = linear_system.linear_system(local, weights, nothing, local[:, :0])
-    data = evidence.restricted(alone.equations)
-    empty = alone._replace(slopes=np.zeros((1, 2, 27)), steepness=np.zeros((1, 2)))
-    one, other = (linear_system.hyperparameters(s, data, np.array([2e-3])) for s in (alone, empty))
-    for a, b in zip(one, other, strict=True):
-        assert b == pytest.approx(a, rel=1e-4)
+    normals = np.array([0.0, 0.0, 50.0]) + rng.normal(size=(1, 60, 3))
+    weights, noises = np.ones((1, 60)), np.array([[2e-3, 9e-3]])
+    data = sextic.sextics(local, weights, np.zeros((1, 27)), normals)
+    precision = evidence.precision_of(np.array([0.4, 0.9]), 1e-2)
+    slopes, steepness = (part[0] for part in slope_equations(normals, local, weights))
+    x, y, heights = local[0].T
+    basis = np.vstack([monomials(x, y, TERMS), slopes])
+    for both in (True, False):
+        count = 180 if both else 60
+        found = evidence.neg2_log_evidence(data.heights, data.slopes if both else None, precision, noises)[0]
+        wanted = np.empty((2, 2))
+        for (w, i), _ in np.ndenumerate(wanted):
+            white = np.repeat([noises[0, i] ** 2, 1.0], [60, 120])
+            covariance = ((basis / precision[w]) @ basis.T + np.diag(white))[:count, :count]
+            felt = np.append(heights, steepness)[:count]
+            wanted[w, i] = np.linalg.slogdet(covariance)[1] + felt @ np.linalg.solve(covariance, felt)
+        assert found - found[0, 0] == pytest.approx(wanted - wanted[0, 0], rel=1e-6, abs=1e-4)
 
 
 def tilted(surface, contours, degrees):
@@ -377,9 +388,7 @@ def test_a_contradiction_is_counted_in_deviations_of_the_mean_and_in_radians():
     """Contacts determine a plane; each normal is good to 0.02 radians, and all lean by 0.03."""
     rng = np.random.default_rng(9)
     contacts = np.column_stack([rng.uniform(-0.8, 0.8, (40, 2)), np.zeros(40)])
-    known = posterior.Posterior(
-        np.zeros(27), 1e-12 * np.eye(27), np.array(1e-3), np.zeros((22, 22)), np.zeros(28)
-    )
+    known = posterior.SurfacePosterior(np.zeros(27), 1e-6 * np.eye(28), np.array(1e-3), np.zeros((22, 22)))
     lean = np.array([np.sin(0.03) * 0.6, np.sin(0.03) * 0.8, np.cos(0.03)])
     deviations, angle = contradiction(contacts, np.tile(lean / 0.02, (40, 1)), known)
     assert deviations == pytest.approx(0.03 / 0.02 * np.sqrt(40.0), rel=1e-3)
@@ -391,3 +400,35 @@ def test_a_contradiction_is_counted_in_deviations_of_the_mean_and_in_radians():
 def test_of_contours_without_normals_there_are_none():
     contacts, normals = measured_normals([Contour(np.eye(3))], Frame(np.zeros(3), np.eye(3)), 1.0)
     assert contacts.shape == normals.shape == (0, 3)
+
+
+def test_normals_show_the_slopes_of_the_process_too():
+    """The posterior is that of a dense Gaussian process whose slopes at the contacts are observed."""
+    rng, step = np.random.default_rng(2), 1e-4
+    flat, noise, variances = rng.uniform(-0.7, 0.7, (40, 2)), 2e-3, np.array([4e-4, 9e-4])
+    contacts = np.column_stack([flat, 0.05 * np.sin(3.0 * flat[:, 0])])
+    normals = np.column_stack([-0.15 * np.cos(3.0 * flat[:, 0]), np.zeros(40), np.ones(40)]) / 0.03
+    touch = Observations(contacts, np.ones(40), noise, noise, normals, np.arange(40))
+    hyper = evidence.ProcessHyperparameters(variances, noise, True)
+    found = process_posterior(touch, equations_of(touch), hyper, np.zeros((22, 22)))
+
+    def features(p):
+        """Terms and whitened covariances with the contacts: the places carry the process."""
+        factor = places_factor(kernel(flat, flat, variances))
+        return np.column_stack(
+            [monomials(*p.T, TERMS), np.linalg.solve(factor, kernel(flat, p, variances)).T]
+        )
+
+    def slopes(axis):
+        return (features(flat + step * axis) - features(flat - step * axis)) / (2.0 * step)
+
+    partials = np.array([slopes(np.array([1.0, 0.0])), slopes(np.array([0.0, 1.0]))])[:, None]
+    rows, steepness = slope_equations(normals[None], contacts[None], np.ones((1, 40)), partials)
+    basis = np.vstack([features(flat) / noise, rows[0]])
+    felt = np.append(contacts[:, 2] / noise, steepness[0])
+    prior = np.append(1.0 / evidence.process_prior(), np.ones(40))
+    covariance = np.linalg.inv(basis.T @ basis + np.diag(prior))
+    over = rng.uniform(-0.7, 0.7, (30, 2))
+    assert found.height(*over.T) == pytest.approx(features(over) @ covariance @ basis.T @ felt, abs=1e-6)
+    left = kernel(over, over, variances) - (f := features(over))[:, 27:] @ f[:, 27:].T + f @ covariance @ f.T
+    assert found.height_covariance(over, over) == pytest.approx(left, abs=1e-7)

@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Bayesian fit: its algebra, its accuracy, and that it knows what it cannot see."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import surfaces
 from scipy.spatial.transform import Rotation
 
 from core import Contour, SamplingPlane, reconstruct, reconstruct_many, suggest_plane, track
-from core.bayes import evidence, joint_fit, linear_system, posterior
-from core.patch.monge import monomials
+from core.bayes import evidence, joint_fit, posterior, prior, sextic
+from core.patch.monge import TERMS, monomials
 from core.reconstruction import next_plane
 
 EXTENT = 12.0
@@ -27,33 +29,32 @@ def touched(surface, planes=THREE, noise=0.0, seed=0, extent=EXTENT, **options):
 def test_turning_coefficients_about_the_normal_turns_the_surface():
     b, (x, y) = np.random.default_rng(0).normal(size=27), np.random.default_rng(1).normal(size=(2, 9))
     c, s = np.cos(0.7), np.sin(0.7)
-    turned = monomials(c * x + s * y, c * y - s * x, posterior.TERMS) @ posterior._turn(0.7) @ b
-    assert turned == pytest.approx(monomials(x, y, posterior.TERMS) @ b, rel=1e-9)
+    turned = monomials(c * x + s * y, c * y - s * x, TERMS) @ posterior._turn(0.7) @ b
+    assert turned == pytest.approx(monomials(x, y, TERMS) @ b, rel=1e-9)
 
 
 @pytest.mark.parametrize(("count", "freedom"), [(65, 60.0), (9, 5.0)])
 def test_intervals_count_in_that_waviness_and_noise_are_estimates(count, freedom):
     flat = np.random.default_rng(0).uniform(-0.7, 0.7, (2, count))
     contacts = np.array([*flat, 0.1 * flat[0] ** 2]).T[None]
-    expected, weights = linear_system.prior_mean(np.array([0.2]), np.zeros(1)), np.ones((1, count))
-    system = linear_system.linear_system(contacts, weights, expected, contacts[:, :0])
-    data = evidence.restricted(system.equations)
-    hyper = linear_system.hyperparameters(system, data, np.array([2e-3]))
-    found = linear_system.posterior(expected, system, data.triangle, hyper, weights).covariance[0]
-    alone = np.linalg.inv(linear_system._precision(system, hyper.variances, hyper.noise)[0])
+    expected, weights = prior.prior_mean(np.array([0.2]), np.zeros(1)), np.ones((1, count))
+    data = sextic.sextics(contacts, weights, expected, contacts[:, :0])
+    hyper = evidence.hyperparameters(data.heights, None, np.array([2e-3]))
+    found = sextic.posterior_given(expected, data, hyper).at(0).covariance
+    alone = np.linalg.inv(sextic._with_prior(data.precision(hyper.noise), hyper.variances)[0])
     assert found == pytest.approx(freedom / (freedom - 2.0) * alone, rel=1e-6)
 
 
 def test_the_patch_of_a_lower_degree_is_the_nearest_over_the_disk():
     rng = np.random.default_rng(2)
     mean = np.concatenate([[0.0, 0.0, 0.2, 0.0, 0.3], rng.normal(size=22)])
-    whole = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)), np.zeros(28))
+    whole = posterior.SurfacePosterior(mean, np.eye(28), 0.0, np.zeros((22, 22)))
     x, y = rng.uniform(-1.0, 1.0, (2, 200_000))
     inside = np.hypot(x, y) < posterior.DISK
     x, y = x[inside], y[inside]
     for degree in (3, 4, 5):
-        fixed = monomials(x, y, posterior.TERMS[2:5]) @ mean[2:5]
-        basis = monomials(x, y, posterior.TERMS[5 : posterior.terms_to(degree)])
+        fixed = monomials(x, y, TERMS[2:5]) @ mean[2:5]
+        basis = monomials(x, y, TERMS[5 : posterior.terms_to(degree)])
         wanted = np.linalg.lstsq(basis, whole.height(x, y) - fixed, rcond=None)[0]
         assert whole.patch(degree).coefficients == pytest.approx(wanted, abs=0.05)
         assert [whole.patch(degree).k1, whole.patch(degree).k2] == [0.4, 0.6]
@@ -113,9 +114,9 @@ def test_intervals_cover_surfaces_drawn_from_the_prior(planes):
     covered = []
     for seed in range(60):
         waviness = 0.6 * np.exp(0.5 * rng.normal())
-        sizes = evidence.PRIOR_SCALE * waviness ** (posterior.ORDERS - 1.0) * rng.normal(size=27)
-        b = np.where(posterior.ORDERS <= 2, [0.3], 1.0) * sizes * length ** (1.0 - posterior.ORDERS)
-        s = surfaces.graph(dict(zip(map(tuple, posterior.TERMS[2:].tolist()), b[2:], strict=True)))
+        sizes = prior.PRIOR_SCALE * waviness ** (prior.ORDERS - 1.0) * rng.normal(size=27)
+        b = np.where(prior.ORDERS <= 2, [0.3], 1.0) * sizes * length ** (1.0 - prior.ORDERS)
+        s = surfaces.graph(dict(zip(map(tuple, TERMS[2:].tolist()), b[2:], strict=True)))
         r = touched(s, planes, noise=0.03, seed=seed, extent=length, degree=6)
         points, heights = surfaces.heights_over(s, r, 60)
         miss = np.abs(r.patch.height(*points.T) - heights)
@@ -313,15 +314,15 @@ def test_few_contacts_are_enough_for_a_finite_answer():
 def test_without_evidence_the_waviness_is_the_priors():
     """The prior is log-normal about 0.6."""
     noises = np.full((1, 5), 0.01)
-    found = evidence._averaged(np.zeros((1, 6, 5)), noises)
+    found = evidence.averaged(np.zeros((1, 6, 5)), noises)
     w = evidence.WAVINESS
     density = np.exp(-0.5 * (np.log(w / 0.6) / 0.5) ** 2)
     density /= density.sum()
-    typical = evidence.prior_variances(np.exp(density @ np.log(w)))
+    typical = prior.prior_variances(np.exp(density @ np.log(w)))
     assert found.typical[0] == pytest.approx(typical)
-    assert found.variances[0] == pytest.approx(density @ evidence.prior_variances(w))
+    assert found.variances[0] == pytest.approx(density @ prior.prior_variances(w))
     assert found.noise == pytest.approx([0.01])
-    assert evidence.prior_variances(np.array([0.6]))[0, [0, -1]] == pytest.approx([0.036**2, 0.007776**2])
+    assert prior.prior_variances(np.array([0.6]))[0, [0, -1]] == pytest.approx([0.036**2, 0.007776**2])
 
 
 @pytest.mark.parametrize(("ratio", "degree"), [(0.4, 3), (0.6, 5)])
@@ -331,11 +332,11 @@ def test_a_degree_will_do_whose_patch_departs_by_half_a_deviation(ratio, degree)
     contacts = np.column_stack([rng.uniform(-0.9, 0.9, (50, 2)), np.zeros(50)])
     mean = np.zeros(27)
     mean[14] = 0.1
-    alone = posterior.Posterior(mean, np.eye(27), 0.0, np.zeros((22, 22)), np.zeros(28))
-    basis = monomials(contacts[:, 0], contacts[:, 1], posterior.TERMS)
+    alone = posterior.SurfacePosterior(mean, np.eye(28), 0.0, np.zeros((22, 22)))
+    basis = monomials(contacts[:, 0], contacts[:, 1], TERMS)
     off = basis @ (mean - posterior.coefficients_of(alone.patch(4)))
     variance = np.sum(off**2) / ratio**2 / np.sum(basis**2)
-    assert alone._replace(covariance=variance * np.eye(27)).degree_shown(contacts) == degree
+    assert replace(alone, root=np.sqrt(variance) * np.eye(28)).degree_shown(contacts) == degree
 
 
 def test_an_outlying_contact_weighs_as_under_students_distribution():
@@ -368,8 +369,8 @@ def test_the_suggested_plane_is_nearly_the_best_of_all_that_there_are():
     for azimuths in ((0, 60, 120), (0, 35, 80), (10, 20, 60), (0, 45, 100), (5, 50, 140), (0, 70, 110)):
         r = touched(surface, surfaces.planes(azimuths), noise=0.03)
         points, weights = r.domain.nodes
-        covariances = r.uncertainty.covariances_with(points / r.radius)
-        count, noise = len(r.contacts) / 3, r.uncertainty.noise**2
+        covariances = r.posterior.covariances_with(points / r.radius)
+        count, noise = len(r.contacts) / 3, r.posterior.noise**2
 
         def lost_at_all(most, c=covariances, weights=weights, count=count, noise=noise):
             return next_plane._lost(c, next_plane.TRIED, most, noise * most / count) @ weights
@@ -399,7 +400,7 @@ def test_deviations_of_curvatures_are_those_of_surfaces_drawn_from_the_posterior
 
 def prior_mean(k1, k2):
     """The prior means of the coefficients of one surface."""
-    return linear_system.prior_mean(np.array([k1]), np.array([k2]))[0]
+    return prior.prior_mean(np.array([k1]), np.array([k2]))[0]
 
 
 @pytest.mark.parametrize("k", [-0.7, 0.4])
@@ -407,7 +408,7 @@ def test_the_priors_mean_goes_on_as_spheres_and_cylinders_do(k):
     """z = (1 - sqrt(1 - k^2 r^2)) / k is k r^2 / 2 + k^3 r^4 / 8 + k^5 r^6 / 16 and more."""
     rng = np.random.default_rng(1)
     x, y = rng.uniform(-1.0, 1.0, (2, 20))
-    terms = monomials(x, y, posterior.TERMS)
+    terms = monomials(x, y, TERMS)
     for pair, square in (((k, k), x**2 + y**2), ((k, 0.0), x**2), ((0.0, k), y**2)):
         wanted = k**3 * square**2 / 8.0 + k**5 * square**3 / 16.0
         assert terms @ prior_mean(*pair) == pytest.approx(wanted, rel=1e-9)
@@ -422,7 +423,7 @@ def test_the_priors_mean_between_is_that_of_a_surface_that_goes_on_and_of_a_toru
     a, b = k1**2, k2**2
     x, y = 0.3, -0.7
     whole = (k1 * x**2 + k2 * y**2) / 2.0 * (a * x**2 + b * y**2) ** 2 / 8.0
-    assert monomials(np.array([x]), np.array([y]), posterior.TERMS[20:]) @ mean[20:] == pytest.approx([whole])
+    assert monomials(np.array([x]), np.array([y]), TERMS[20:]) @ mean[20:] == pytest.approx([whole])
 
 
 def test_the_suggested_plane_is_measured_as_the_contours_were_tracked():
@@ -447,24 +448,22 @@ def test_what_is_expected_of_a_plane_is_the_posterior_with_its_contacts_added(st
     count = round(len(r.contacts) / 3)
     few = min(count, 24)
     t = np.linspace(-1.0, 1.0, few)[:, None] * [np.cos(plane.azimuth), np.sin(plane.azimuth)]
-    basis = monomials(*t.T, posterior.TERMS)
+    basis = monomials(*t.T, TERMS)
     noise = r.posterior.noise**2 * few / count
     after = np.linalg.inv(np.linalg.inv(r.posterior.covariance) + basis.T @ basis / noise)
     points, weights = r.domain.nodes
-    over = monomials(*points.T / r.radius, posterior.TERMS)
+    over = monomials(*points.T / r.radius, TERMS)
     stds = np.sqrt(np.einsum("ni,ij,nj->n", over, after, over))
     assert expected == pytest.approx(r.radius * weights @ stds, rel=1e-5)
 
 
 def test_a_height_at_the_origin_that_is_open_varies_with_the_terms():
     """The level and the 27 coefficients are one Gaussian of 28."""
-    half = np.random.default_rng(4).normal(size=(28, 28))
-    whole = half @ half.T
-    level = whole[0].copy()
-    some = posterior.Posterior(np.zeros(27), whole[1:, 1:], np.array(0.1), np.zeros((22, 22)), level)
+    root = np.random.default_rng(4).normal(size=(28, 28))
+    some = posterior.SurfacePosterior(np.zeros(27), root, np.array(0.1), np.zeros((22, 22)))
     x, y = np.random.default_rng(5).uniform(-1.0, 1.0, (2, 9))
-    basis = np.column_stack([np.ones(9), monomials(x, y, posterior.TERMS)])
-    wanted, points = basis @ whole @ basis.T, np.column_stack([x, y])
+    basis = np.column_stack([monomials(x, y, TERMS), np.ones(9)])
+    wanted, points = basis @ root.T @ root @ basis.T, np.column_stack([x, y])
     assert some.height_std(x, y) ** 2 == pytest.approx(wanted.diagonal())
     assert some.height_covariance(points, points) == pytest.approx(wanted)
 

@@ -61,7 +61,7 @@ def test_far_from_the_origin_it_is_the_same_too(method):
 
 def test_it_says_what_it_is():
     d = to_dict(RESULTS[0])
-    assert d["version"] == 2
+    assert d["version"] == 3
     assert d["status"] == RESULTS[0].status
     assert len(d["contours"]) == 3
     assert len(d["contours"][0]["points"]) == 25
@@ -100,22 +100,23 @@ def test_a_damaged_dict_is_refused_with_a_sentence(key, value):
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
-        (["version"], 3, "version: expected 2, got 3: this was written by another release"),
+        (["version"], 2, "version: expected 3, got 2: this was written by another release"),
         (["geometry", "radius"], None, "radius: expected it in the dict of a reconstruction, got none"),
         (["geometry", "radius"], 1e-300, "radius: expected a finite number of 1e-50 or more"),
         (["method"], "magic", "method: expected one of bayes"),
         (["geometry", "frame", "axes"], np.diag([1, 1, -1]).tolist(), "axes: expected a right-handed frame"),
         (["geometry", "frame", "axes"], np.diag([2, 2, 2]).tolist(), "axes: expected a right-handed frame"),
         (["geometry", "frame", "origin"], [0, 0], "origin: expected shape"),
-        (["geometry", "polynomial", "k1"], "flat", "k1: expected a finite number"),
+        (["patch", "k1"], "flat", "k1: expected a finite number"),
         (["patch", "coefficients"], [1.0, 2.0], "coefficients: expected 0, 4, 9, 15, 22 of them, got 2"),
         (["geometry", "domain"], [[0, 0], [1, 1]], "three or more"),
         (["contours"], [], "contours: expected a list of some"),
         (["contours", 0, "points"], [1, 2], "points: expected shape"),
         (["contours", 0, "noise"], -1.0, "noise: expected a finite number of 0 or more"),
-        (["geometry", "residual"], {"places": 3}, "places: expected shape"),
-        (["posterior", "covariance"], [[1.0]], "covariance: expected shape"),
+        (["posterior", "places"], 3, "places: expected shape"),
+        (["posterior", "root"], [[1.0]], "root: expected shape"),
         (["posterior", "mean"], None, "mean: expected it in the dict"),
+        (["posterior"], None, "posterior: expected it in the dict"),
     ],
 )
 def test_what_is_wrong_is_named(path, value, words):
@@ -129,34 +130,8 @@ def test_what_is_no_dict_is_refused(value):
         from_dict(value)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda c: -c,
-        np.triu,
-        lambda c: c + 1e-6 * np.abs(c).max() * np.eye(27, k=5),  # hardly skew
-        lambda c: c + np.abs(c).max() * (np.ones((27, 27)) - np.eye(27)),  # with a positive diagonal
-    ],
-    ids=["negative", "skew", "hardly skew", "indefinite"],
-)
-def test_a_covariance_that_is_none_is_refused(change):
-    d = to_dict(touched(noise=0.0))
-    d["posterior"]["covariance"] = change(np.array(d["posterior"]["covariance"])).tolist()
-    with pytest.raises(ValueError, match="covariance: expected a symmetric matrix without negative"):
-        from_dict(d)
-
-
-def test_a_covariance_may_be_singular_but_for_rounding():
-    d = to_dict(touched(noise=0.0))
-    values, axes = np.linalg.eigh(d["posterior"]["covariance"])
-    values[0] = -1e-10 * values[-1]
-    singular = axes * values @ axes.T
-    d["posterior"]["covariance"] = (0.5 * (singular + singular.T)).tolist()
-    assert from_dict(d).blind == touched(noise=0.0).blind
-
-
 def rough():
-    """A dict with a residual, of contacts on waves that no sextic follows."""
+    """A dict with a process, of contacts on waves that no sextic follows."""
     t, contours = np.linspace(-1.0, 1.0, 31), []
     for a in np.radians((0.0, 60.0, 120.0)):
         x, y = t * np.cos(a), t * np.sin(a)
@@ -167,20 +142,26 @@ def rough():
 @pytest.mark.parametrize(
     ("key", "change", "words"),
     [
-        ("variances", lambda v: v * [-1.0, 1.0], "residual: expected variances and noise above 0"),
-        ("variances", lambda v: 0.0 * v, "residual: expected variances and noise above 0"),
-        ("noise", lambda v: -v, "residual: expected variances and noise above 0"),
-        ("places", lambda v: 1e300 * v, "residual: expected .* places on the unit disk"),
-        ("factor", lambda v: 0.0 * v, "factor: expected a lower triangle"),
-        ("factor", lambda v: v - np.diag(v.diagonal()), "factor: expected a lower triangle"),
-        ("factor", lambda v: v + 1e-3, "factor: expected a lower triangle"),
-        ("factor", lambda v: v[:-1], "factor: expected shape"),
+        ("variances", lambda v: v * [-1.0, 1.0], "variances: expected numbers of 0 or more"),
+        ("variances", lambda v: 0.0 * v, "variances: expected .* above 0 where there are places"),
+        ("places", lambda v: v[:0], "root: expected shape"),
+        ("noise", lambda v: -v, "noise: expected a finite number above 0"),
+        ("places", lambda v: 1e300 * v, "places: expected them on the unit disk"),
+        ("root", lambda v: v[:, :-1], "root: expected shape"),
+        ("alpha", lambda v: v[:-1], "alpha: expected shape"),
     ],
 )
-def test_a_damaged_residual_is_refused(key, change, words):
+def test_a_damaged_posterior_is_refused(key, change, words):
     d = rough()
-    residual = d["geometry"]["residual"]
-    assert from_dict(d).residual is not None
-    residual[key] = change(np.array(residual[key])).tolist()
+    posterior = d["posterior"]
+    assert from_dict(d).posterior.amplitude > 0.0
+    posterior[key] = change(np.array(posterior[key])).tolist()
     with pytest.raises(ValueError, match=words):
+        from_dict(d)
+
+
+def test_a_polynomial_with_the_variances_of_a_process_is_refused():
+    d = to_dict(touched())
+    d["posterior"]["variances"] = [1e-4, 0.0]
+    with pytest.raises(ValueError, match=r"variances: expected .* 0 without"):
         from_dict(d)

@@ -9,7 +9,7 @@ import pytest
 import surfaces
 
 from core import METHODS, Contour, reconstruct
-from core.bayes.posterior import Posterior
+from core.bayes.posterior import SurfacePosterior
 from core.contours.curves import curves_through, misses, stacked
 
 EXTENT = 12.0
@@ -276,8 +276,8 @@ def test_the_frame_may_be_ten_degrees_off_and_curvatures_a_tenth_of_one_over_the
 ):
     s = surfaces.pear()
     r = s.fit(contours_of(s))
-    monkeypatch.setattr(Posterior, "turn", lambda *_: np.radians(degrees))
-    monkeypatch.setattr(Posterior, "curvature_std", lambda _: std)
+    monkeypatch.setattr(SurfacePosterior, "turn", lambda *_: np.radians(degrees))
+    monkeypatch.setattr(SurfacePosterior, "curvature_std", lambda _: std)
     assert (r.status == "uncertain") == bool(doubt)
     assert doubt in r.message
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The residual of real surfaces: its algebra, its intervals, and that exact surfaces have none."""
+"""The process of real surfaces: its algebra, its intervals, and that exact surfaces have none."""
 
 import json
 
@@ -17,14 +17,13 @@ from core import (
     suggest_plane,
     to_dict,
 )
-from core.bayes import residual_evidence
-from core.bayes.evidence import USUAL_WAVINESS, prior_variances
-from core.bayes.posterior import DISK, FREE, nodes
-from core.bayes.residual_evidence import FREE_VARIANCE, Observations, fitted, system_of
-from core.bayes.rough_fit import QUARTIC_SHARE
-from core.patch import residual
+from core.bayes import evidence, kernel, process_fit
+from core.bayes.evidence import FREE_VARIANCE
+from core.bayes.kernel import weighted_kernel
+from core.bayes.posterior import DISK, QUARTIC_SHARE, nodes
+from core.bayes.prior import FREE, USUAL_WAVINESS, prior_variances
+from core.bayes.process_fit import Observations, equations_of, process_posterior
 from core.patch.monge import TERMS, exponents, monomials
-from core.patch.residual import kernel, weighted_kernel
 from core.reconstruction.deviations import mean_height_stds
 from core.reconstruction.next_plane import TRIED, _lost
 
@@ -67,10 +66,10 @@ def over(r, count=60):
 
 @pytest.mark.parametrize("lengths", [(0.4, 1.6), (0.4, 1.0), (0.5, 0.5)])
 def test_kernels_are_materns_of_each_length(monkeypatch, lengths):
-    monkeypatch.setattr(residual, "LENGTHS", np.array(lengths))
+    monkeypatch.setattr(kernel, "LENGTHS", np.array(lengths))
     p, q = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 7, 2))
     p[0] = q[0]
-    for values, length in zip(residual.kernels(p, q), lengths, strict=True):
+    for values, length in zip(kernel.kernels(p, q), lengths, strict=True):
         a = np.sqrt(3.0) / length * np.linalg.norm(p[:, None] - q, axis=2)
         assert values == pytest.approx((1.0 + a) * np.exp(-a), rel=1e-12)
 
@@ -81,30 +80,27 @@ def test_the_mean_alone_is_that_of_the_posterior(weight):
     contacts = np.column_stack([flat, rough(3)(flat)])
     weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
     touch = Observations(contacts, weights, 1e-3, 4e-3, None, np.arange(len(weights)))
-    system = system_of(touch)
-    size = residual_evidence.sizes(touch, system)
-    mean = residual_evidence.mean_given(touch, system, size)
-    whole = fitted(touch, system, size.variances, size.noise)
+    equations = equations_of(touch)
+    hyper = evidence.process_hyperparameters(*equations.at_places(), 1e-3, 4e-3)
+    mean, alpha = process_fit._mean_given(touch, equations, hyper)
+    whole = process_posterior(touch, equations, hyper, np.zeros((22, 22)))
     over = np.random.default_rng(1).uniform(-0.6, 0.6, (50, 2))
-    heights = (
-        monomials(*over.T, TERMS) @ m[: len(TERMS)]
-        + weighted_kernel(over, contacts[:, :2], size.variances, m[len(TERMS) :])
-        for m in (mean, whole.mean)
-    )
-    assert next(heights) == pytest.approx(next(heights), abs=1e-4)
+    heights = monomials(*over.T, TERMS) @ mean
+    heights += weighted_kernel(over, contacts[:, :2], hyper.variances, alpha)
+    assert whole.height(*over.T) == pytest.approx(heights, abs=1e-4)
 
 
 def test_derivatives_are_those_of_the_height():
-    residual, h = touched()[1].residual, 2e-5
+    surface, h = touched()[1].posterior, 2e-5
     rng = np.random.default_rng(0)
-    # Places of the residual, where its second derivatives are not smooth, other points and the origin.
-    points = np.vstack([residual.places[5:8], rng.uniform(-0.7, 0.7, (9, 2)), np.zeros((1, 2))])
+    # Places of the process, where its second derivatives are not smooth, other points and the origin.
+    points = np.vstack([surface.places[5:8], rng.uniform(-0.7, 0.7, (9, 2)), np.zeros((1, 2))])
     x, y = points.T
 
     def at(dx, dy):
-        return residual.height(x + dx * h, y + dy * h)
+        return surface.height(x + dx * h, y + dy * h)
 
-    d = residual.derivatives(x, y)
+    d = surface.derivatives(x, y)
     near = {"abs": 5e-4 * np.abs(d.xx).max()}
     assert d.z == pytest.approx(at(0, 0), abs=1e-12)
     assert d.x == pytest.approx((at(1, 0) - at(-1, 0)) / (2 * h), abs=1e-6)
@@ -121,21 +117,22 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     contacts, (x, y, z) = r.contacts / r.radius, r.contacts.T / r.radius
     sizes = np.array([4e-4, 9e-4])
     touch = Observations(contacts, np.ones(len(x)), noise, noise, None, np.arange(len(x)))
-    residual = fitted(touch, system_of(touch), sizes, noise)
+    hyper = evidence.ProcessHyperparameters(sizes, noise, True)
+    surface = process_posterior(touch, equations_of(touch), hyper, np.zeros((22, 22)))
     variances = np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(USUAL_WAVINESS))])
     places, points = contacts[:, :2], over(r) / r.radius
     basis, wanted = monomials(x, y, TERMS), monomials(*points.T, TERMS)
 
     def covariance(p, q, basis_p, basis_q):
-        return (basis_p * variances) @ basis_q.T + kernel(p, q, sizes)
+        return (basis_p * variances) @ basis_q.T + kernel.kernel(p, q, sizes)
 
     seen = covariance(places, places, basis, basis) + noise**2 * np.eye(len(x))
     shared = covariance(points, places, wanted, basis)
     mean = shared @ np.linalg.solve(seen, z)
     left = covariance(points, points, wanted, wanted) - shared @ np.linalg.solve(seen, shared.T)
-    assert residual.height(*points.T) == pytest.approx(mean, abs=1e-5)
-    assert residual.height_std(*points.T) ** 2 == pytest.approx(np.diag(left), rel=1e-2, abs=1e-8)
-    assert residual.height_covariance(points, points) == pytest.approx(left, abs=1e-7)
+    assert surface.height(*points.T) == pytest.approx(mean, abs=1e-5)
+    assert surface.height_std(*points.T) ** 2 == pytest.approx(np.diag(left), rel=1e-2, abs=1e-8)
+    assert surface.height_covariance(points, points) == pytest.approx(left, abs=1e-7)
 
 
 def test_the_patch_is_that_of_the_surface_over_a_disk():
@@ -161,13 +158,15 @@ def test_the_patch_is_that_of_the_surface_over_a_disk():
 def test_a_weighted_kernel_is_the_kernel_times_weights():
     rng, sizes = np.random.default_rng(0), np.array([2e-4, 3e-4])
     p, q, weights = rng.uniform(-1.0, 1.0, (900, 2)), rng.uniform(-1.0, 1.0, (70, 2)), rng.normal(size=70)
-    assert weighted_kernel(p, q, sizes, weights) == pytest.approx(kernel(p, q, sizes) @ weights, abs=1e-14)
+    assert weighted_kernel(p, q, sizes, weights) == pytest.approx(
+        kernel.kernel(p, q, sizes) @ weights, abs=1e-14
+    )
 
 
 def test_grid_points_that_are_not_tried_would_change_nothing(monkeypatch):
-    few = touched(3)[1].residual
-    monkeypatch.setattr(residual_evidence, "NEGLIGIBLE", np.inf)
-    all_of_them = touched(3)[1].residual
+    few = touched(3)[1].posterior
+    monkeypatch.setattr(evidence, "NEGLIGIBLE", np.inf)
+    all_of_them = touched(3)[1].posterior
     assert few.variances == pytest.approx(all_of_them.variances, rel=0.01)
     assert few.noise == pytest.approx(all_of_them.noise, rel=0.01)
 
@@ -175,7 +174,7 @@ def test_grid_points_that_are_not_tried_would_change_nothing(monkeypatch):
 def test_the_point_is_a_contact_like_the_others():
     """On a rough surface, as at a vertex of a mesh, the point may be off what is around it as they are."""
     _, r = touched()
-    noise = r.radius * r.residual.noise
+    noise = r.radius * r.posterior.noise
     assert abs(r.height(0.0, 0.0)) < 3.0 * noise
     assert 0.1 * noise < r.height_std(0.0, 0.0) <= noise
 
@@ -202,17 +201,17 @@ def test_a_point_above_its_surroundings_bends_no_curvature():
 def test_exact_surfaces_ask_for_none(surface, noise):
     contours = surface.track(surfaces.UPRIGHT, extent=EXTENT, step=1.0, noise=noise, rng=3)
     r = surface.fit(contours)
-    assert r.residual is None
+    assert r.posterior.amplitude == 0.0
     x, y = over(r).T
     assert r.height(x, y) == pytest.approx(surface.fit(contours, degree=6).patch.height(x, y), abs=1e-9)
 
 
-def test_white_noise_that_nobody_told_of_is_no_residual():
+def test_white_noise_that_nobody_told_of_is_no_process():
     s, sizes = surfaces.sphere(25), []
     for seed in range(10):
         contours = s.track(surfaces.UPRIGHT, extent=EXTENT, step=1.0, noise=0.1, rng=seed)
         r = s.fit([Contour(c.points) for c in contours])
-        sizes.append(0.0 if r.residual is None else r.residual.size)
+        sizes.append(r.posterior.amplitude)
     assert sizes.count(0.0) >= 8 and max(sizes) < 0.02
 
 
@@ -225,10 +224,10 @@ def test_heights_are_nearer_and_intervals_true_on_rough_surfaces(azimuths):
         at = r.frame.to_world(np.column_stack([flat, r.height(*flat.T)]))
         off = np.abs(at[:, 2] - EXTENT * height(at[:, :2] / EXTENT)) * r.frame.axes[2, 2]
         covered.append(np.mean(off <= 1.645 * r.height_std(*flat.T)))
-        sextic = r.radius * r.posterior.height(*flat.T / r.radius)
+        sextic = r.radius * monomials(*flat.T / r.radius, TERMS) @ r.posterior.polynomial
         at = r.frame.to_world(np.column_stack([flat, sextic]))
         errors.append([off.mean(), np.abs(at[:, 2] - EXTENT * height(at[:, :2] / EXTENT)).mean()])
-        assert r.residual is not None and 0.002 < r.residual.size < 0.2
+        assert 0.002 < r.posterior.amplitude < 0.2
     ours, sextics = np.mean(errors, axis=0)
     assert 0.8 < np.mean(covered) < 0.97
     assert ours < 0.9 * sextics
@@ -243,7 +242,7 @@ def test_it_moves_with_its_contacts(scale):
     moved = [Contour(scale * c.points @ turn.T + shift, noise=0.0) for c in contours]
     other = reconstruct(shift, moved, outward=turn @ OUTWARD)
     x, y = over(one).T
-    assert other.residual.size == pytest.approx(one.residual.size, rel=1e-5)
+    assert other.posterior.amplitude == pytest.approx(one.posterior.amplitude, rel=1e-5)
     assert other.height(scale * x, scale * y) / scale == pytest.approx(one.height(x, y), abs=1e-7 * EXTENT)
     assert other.height_std(scale * x, scale * y) / scale == pytest.approx(
         one.height_std(x, y), rel=1e-4, abs=1e-9
@@ -267,7 +266,7 @@ def test_a_stack_of_rough_and_smooth_touches_gives_what_each_gives_alone():
     points[3], outward[3] = smooth.point, smooth.normal
     found = reconstruct_many(points, touches, outward=outward)
     alone = [reconstruct(*each, outward=n) for *each, n in zip(points, touches, outward, strict=True)]
-    assert [r.residual is None for r in found] == [False, True, False, True, False]
+    assert [r.posterior.amplitude > 0.0 for r in found] == [True, False, True, False, True]
     for one, other in zip(found, alone, strict=True):
         x, y = over(other).T
         assert one.height(x, y) == pytest.approx(other.height(x, y), abs=1e-6)
@@ -283,7 +282,7 @@ def test_more_contacts_than_places_say_as_much():
     dense = [along * [np.cos(a), np.sin(a)] for a in azimuths]
     contours = [Contour(EXTENT * np.column_stack([p, height(p)]), noise=0.0) for p in dense]
     many = reconstruct(np.zeros(3), contours, outward=OUTWARD)
-    assert len(many.residual.places) < len(many.contacts)
+    assert len(many.posterior.places) < len(many.contacts)
     flat = over(r)
     assert many.height(*flat.T) == pytest.approx(r.height(*flat.T), abs=0.03 * EXTENT)
     assert 0.5 < many.mean_height_std / r.mean_height_std < 2.0
@@ -303,10 +302,9 @@ def test_the_suggested_plane_keeps_what_it_promises():
 def test_the_suggested_plane_tells_as_much_as_any_of_all(seed):
     r = touched(seed, azimuths=(0, 50, 130))[1]
     points, weights = r.domain.nodes
-    covariances = r.uncertainty.covariances_with(points / r.radius)
-    told = (
-        r.geometry.widening(*points.T) ** 2 * _lost(covariances, TRIED, 24, r.uncertainty.noise**2) @ weights
-    )
+    covariances = r.posterior.covariances_with(points / r.radius)
+    widening = r.widening(r.domain.node_places)
+    told = widening**2 * _lost(covariances, TRIED, 24, r.posterior.noise**2) @ weights
     chosen = np.argmin(np.abs(TRIED - suggest_plane(r)[0].azimuth))
     assert told[chosen] >= 0.97 * told.max()
 
@@ -314,11 +312,11 @@ def test_the_suggested_plane_tells_as_much_as_any_of_all(seed):
 def test_deviations_are_less_near_the_point_and_more_at_the_rim_and_a_contour_takes_off_as_much():
     _, r = touched()
     x, y = np.vstack([np.zeros(2), r.domain.boundary(12)]).T
-    process = r.radius * r.residual.height_std(x / r.radius, y / r.radius)
+    process = r.radius * r.posterior.height_std(x / r.radius, y / r.radius)
     wanted = np.append(0.6, np.full(12, 1.2)) * process
     assert r.height_std(x, y) == pytest.approx(wanted, rel=1e-4)
-    points, weights = r.domain.nodes
-    assert weights @ r.geometry.widening(*points.T) == pytest.approx(1.0, abs=0.01)
+    weights = r.domain.nodes[1]
+    assert weights @ r.widening(r.domain.node_places) == pytest.approx(1.0, abs=0.01)
     # A contour takes the same share off these variances as off those of the process.
     assert 0.0 < suggest_plane(r)[1] < r.mean_height_std
 
@@ -331,9 +329,9 @@ def test_it_goes_into_json_and_back():
     assert again.height_std(x, y) == pytest.approx(r.height_std(x, y), rel=1e-9)
 
 
-def test_the_derivatives_of_a_surface_with_a_residual_are_those_of_its_height_in_its_unit():
+def test_the_derivatives_of_a_surface_with_a_process_are_those_of_its_height_in_its_unit():
     _, r = touched()
-    assert r.residual is not None and r.radius > 10.0
+    assert r.posterior.amplitude and r.radius > 10.0
     (x, y), h = over(r, 20).T, 1e-3 * r.radius
     d = r.geometry.derivatives(x, y)
     assert d.z == pytest.approx(r.height(x, y), abs=1e-12)
@@ -341,54 +339,51 @@ def test_the_derivatives_of_a_surface_with_a_residual_are_those_of_its_height_in
     assert d.y == pytest.approx((r.height(x, y + h) - r.height(x, y - h)) / (2.0 * h), abs=2e-4)
     xx = (r.height(x + h, y) - 2.0 * r.height(x, y) + r.height(x - h, y)) / h**2
     assert d.xx == pytest.approx(xx, abs=0.02 * np.abs(d.xx).max() + 2e-3)
-    plain = r.geometry.polynomial.derivatives(x, y)
-    beside = r.residual.derivatives(x / r.radius, y / r.radius)
-    for name in ("xx", "xy", "yy"):
-        wanted = getattr(plain, name) + getattr(beside, name) / r.radius
-        assert getattr(d, name) == pytest.approx(wanted, rel=1e-9)
 
 
 def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
-    """The likelihoods agree up to the constant of 2 pi, with a residual of any size and without one."""
+    """The likelihoods agree up to the constant of 2 pi, with a process of any amplitude and without one."""
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     basis, heights = monomials(*flat.T, TERMS), rough(3)(flat)
     noises = np.array([1e-3, 2e-3, 4e-3])
 
-    def surprise(covariance):
+    def neg2_log(covariance):
         return np.linalg.slogdet(covariance)[1] + heights @ np.linalg.solve(covariance, heights)
 
     def prior(waviness):
-        return (basis * residual_evidence._prior(waviness)) @ basis.T
+        return (basis / evidence.precision_of(np.array(waviness), 1.0 / FREE_VARIANCE)) @ basis.T
 
-    found = residual_evidence._surprises(basis, heights, residual.kernels(flat, flat), noises)
+    rows = np.vstack([basis.T, heights])
+    found = evidence.process_neg2_log_evidence(rows, kernel.kernels(flat, flat), noises)
     assert found.shape == (2, 5, 3) and np.isfinite(found).sum() > 6
     for (length, at, i), value in np.ndenumerate(found):
         if np.isfinite(value):
-            within = residual_evidence.AMPLITUDES[at] ** 2 * residual.kernels(flat, flat)[length]
+            within = evidence.AMPLITUDES[at] ** 2 * kernel.kernels(flat, flat)[length]
             white = noises[i] ** 2 * np.eye(len(flat))
-            assert value == pytest.approx(surprise(prior(USUAL_WAVINESS) + within + white), rel=1e-6)
-    alone = residual_evidence._surprises_alone(basis / 4e-3, heights / 4e-3)
-    for value, waviness in zip(alone, residual_evidence.ALONE, strict=True):
-        white = 4e-3**2 * np.eye(len(flat))
-        wanted = surprise(prior(waviness) + white) - 2.0 * len(flat) * np.log(4e-3)
-        assert value == pytest.approx(wanted, rel=1e-6)
+            assert value == pytest.approx(neg2_log(prior(USUAL_WAVINESS) + within + white), rel=1e-6)
+    equations = evidence.NormalEquations((rows @ rows.T)[None], np.array([len(flat)]))
+    precision = evidence.precision_of(evidence.SEXTIC_WAVINESS, 1.0 / FREE_VARIANCE)
+    sextics = evidence.neg2_log_evidence(equations, None, precision, np.array([[4e-3]]))[0, :, 0]
+    for value, waviness in zip(sextics, evidence.SEXTIC_WAVINESS, strict=True):
+        assert value - 1.0 == pytest.approx(neg2_log(prior(waviness) + 4e-3**2 * np.eye(len(flat))), rel=1e-6)
 
 
 def test_the_noise_may_be_all_that_a_sextic_leaves_over():
     rng = np.random.default_rng(6)
     contacts = np.column_stack([rng.uniform(-0.7, 0.7, (120, 2)), rng.normal(0.0, 0.008, 120)])
     touch = Observations(contacts, np.ones(120), 1e-3, 8e-3, None, np.arange(120))
-    assert residual_evidence.sizes(touch, system_of(touch)).noise > 6e-3
+    found = evidence.process_hyperparameters(*equations_of(touch).at_places(), 1e-3, 8e-3)
+    assert found.noise > 6e-3
 
 
 def test_the_factor_of_places_is_that_of_their_covariance():
     places = np.random.default_rng(7).uniform(-1.0, 1.0, (60, 2))
-    within = kernel(places, places, np.array([2e-4, 3e-4]))
-    factor = residual.places_factor(within.copy())
+    within = kernel.kernel(places, places, np.array([2e-4, 3e-4]))
+    factor = kernel.places_factor(within.copy())
     assert factor @ factor.T == pytest.approx(within, abs=1e-11)
     assert np.array_equal(factor, np.tril(factor))
 
 
-def test_contacts_beside_a_residual_are_known_to_five_ten_thousandths_of_the_radius_at_best():
-    noises = [float(touched(seed)[1].residual.noise) for seed in range(6)]
+def test_contacts_beside_a_process_are_known_to_five_ten_thousandths_of_the_radius_at_best():
+    noises = [float(touched(seed)[1].posterior.noise) for seed in range(6)]
     assert 5e-4 <= min(noises) < 1e-3

@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Polynomials given contacts and measured normals: a linear model under a Gaussian prior, in stacks.
+
+This is the surface's model where the process has the amplitude 0 (Rasmussen and Williams 2006, 2.1).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from ..lapack import cholesky, inverse_lower, solved_definite
+from ..patch.monge import TERMS, monomials
+from .evidence import FREE_PRECISION, ROUNDING, Hyperparameters, NormalEquations
+from .normals import slope_equations
+from .posterior import SurfacePosterior
+from .prior import FREE, PRIOR_SCALE
+
+LEAST_FREEDOM = 5.0  # Few contacts count as so many degrees of freedom, because a prior adds to them.
+
+
+class Sextics(NamedTuple):
+    """Heights of n contacts ~ terms @ coefficients, all less the prior's mean; and the normal equations.
+
+    rows : (b, 28, n), the 27 terms and the heights
+    weights : (b, n)
+    heights, slopes : the normal equations of contacts, and of measured normals in units of their deviations;
+        the latter are None without normals
+    pivot : (b, 27), mean of the terms over the contacts, for surfaces that need not pass through the origin:
+        the rows are then less their means. None for surfaces that do
+    """
+
+    rows: Array
+    weights: Array
+    heights: NormalEquations
+    slopes: NormalEquations | None = None
+    pivot: Array | None = None
+
+    def at(self, which: NDArray[np.bool_]) -> "Sextics":
+        """Those of some of the b touches."""
+        heights, slopes = (
+            e and NormalEquations(*(part[which] for part in e)) for e in (self.heights, self.slopes)
+        )
+        assert heights is not None
+        pivot = None if self.pivot is None else self.pivot[which]
+        return Sextics(self.rows[which], self.weights[which], heights, slopes, pivot)
+
+    def residuals(self, coefficients: Array) -> Array:
+        """What the coefficients (b, 27) do not explain of the heights, (b, n)."""
+        left: Array = self.rows[:, -1] - (coefficients[:, None] @ self.rows[:, :-1])[:, 0]
+        return left
+
+    def precision(self, noise: Array) -> Array:
+        """What contacts and normals add to the precision of the coefficients, (b, 27, 27)."""
+        found: Array = self.heights.gram / (noise**2)[:, None, None]
+        return found if self.slopes is None else found + self.slopes.gram
+
+
+def sextics(local: Array, weights: Array, expected: Array, normals: Array, through: bool = True) -> Sextics:
+    """The equations of contacts (b, n, 3) and their weights (b, n), less the prior's means (b, 27).
+
+    normals : (b, n, 3), measured normals over their standard deviations, or (b, 0, 3)
+    through : whether the surfaces pass through the origin
+    """
+    b, n = weights.shape
+    rows, pivot = np.empty((b, len(TERMS) + 1, n)), None
+    terms = monomials(local[..., 0].ravel(), local[..., 1].ravel(), TERMS)
+    rows[:, :-1] = terms.T.reshape(-1, b, n).transpose(1, 0, 2)
+    np.subtract(local[..., 2], (expected[:, None] @ rows[:, :-1])[:, 0], out=rows[:, -1])
+    if not through:
+        means = np.einsum("bin,bn->bi", rows, weights / weights.sum(axis=1)[:, None])
+        rows -= means[..., None]
+        pivot = means[:, :-1]
+    bordered = (rows * weights[:, None]) @ rows.transpose(0, 2, 1)
+    heights = NormalEquations(bordered, (weights > 0.0).sum(axis=1, dtype=float))
+    slopes = None
+    if normals.shape[1]:
+        partials, steepness = slope_equations(normals, local, weights)
+        steepness = steepness - (partials @ expected[..., None])[..., 0]
+        columns = np.concatenate([partials, steepness[..., None]], axis=2)
+        slopes = NormalEquations(columns.transpose(0, 2, 1) @ columns, heights.contacts)
+    return Sextics(rows, weights, heights, slopes, pivot)
+
+
+def mean_given(data: Sextics, hyper: Hyperparameters) -> Array:
+    """The mean of the coefficients less the prior's mean, (b, 27) (Rasmussen and Williams 2006, eq. 2.8)."""
+    # Heights are nearest with the typical prior, and intervals are true with the averaged one.
+    precision = _with_prior(data.precision(hyper.noise), hyper.typical)
+    rhs = data.heights.rhs / (hyper.noise**2)[:, None]
+    if data.slopes is not None:
+        rhs = rhs + data.slopes.rhs
+    return np.array([solved_definite(*each) for each in zip(precision, rhs, strict=True)])
+
+
+def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> SurfacePosterior:
+    """The posteriors about the means (b, 27), under the averaged prior."""
+    seen = data.precision(hyper.noise)
+    visibility = _visibility(seen)
+    terms, b = len(TERMS), len(mean)
+    root = np.zeros((b, terms + 1, terms + 1))
+    for each, precision in zip(root, _with_prior(seen, hyper.variances), strict=True):
+        each[:-1, :-1] = inverse_lower(cholesky(precision))
+    # Waviness and noise are estimates, so deviations are those of a Student t of this freedom.
+    freedom = np.maximum(data.heights.contacts - FREE, LEAST_FREEDOM)
+    root *= np.sqrt(freedom / (freedom - 2.0))[:, None, None]
+    if data.pivot is not None:  # The mean height of the contacts is that of the surface at the pivot.
+        root[:, :-1, -1] = -(root[:, :-1, :-1] @ data.pivot[..., None])[..., 0]
+        root[:, -1, -1] = hyper.noise / np.sqrt(data.weights.sum(axis=1))
+    return SurfacePosterior(mean, root, hyper.noise, visibility)
+
+
+def _visibility(seen: Array) -> Array:
+    """The visibility of a SurfacePosterior, given what contacts add to the precision, (b, 27, 27)."""
+    bordered = seen.copy()
+    diagonal = np.einsum("bii->bi", bordered)  # a view
+    # What is added exceeds what rounding takes from directions that no contact shows, and is far below noise.
+    diagonal += ROUNDING * diagonal.sum(axis=1)[:, None]
+    found: Array = PRIOR_SCALE * np.linalg.cholesky(bordered)[:, FREE:, FREE:].transpose(0, 2, 1)
+    return found
+
+
+def _with_prior(precision: Array, variances: Array) -> Array:
+    """A precision (b, 27, 27) and that of the prior with these variances (b, 22)."""
+    precision = precision.copy()
+    diagonal = np.einsum("bii->bi", precision)  # a view
+    diagonal[:, :FREE] += FREE_PRECISION  # This keeps it invertible whatever the contacts are.
+    diagonal[:, FREE:] += 1.0 / variances
+    return precision
