@@ -11,6 +11,7 @@ from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..lapack import cholesky_in_place
@@ -36,7 +37,15 @@ FREE_VARIANCE = 0.06
 # The log likelihood counts by this share: neighbors on a curve do not tell of waves between curves.
 TEMPER = 0.1
 
+
+def precision_of(waviness: Array, free: float) -> Array:
+    """Prior precisions of the coefficients, (..., 27), for waviness (...) and the precision of free terms."""
+    higher = 1.0 / prior_variances(waviness)
+    return np.concatenate([np.full((*higher.shape[:-1], FREE), free), higher], axis=-1)
+
+
 VARIANCES = prior_variances(WAVINESS)
+PRECISIONS = precision_of(WAVINESS, FREE_PRECISION)
 LOG_VARIANCES = np.log(VARIANCES)
 UNUSUAL = (np.log(WAVINESS / USUAL_WAVINESS) / WAVINESS_SPREAD) ** 2  # -2 log of the waviness's prior.
 
@@ -49,6 +58,10 @@ class NormalEquations(NamedTuple):
 
     bordered: Array
     contacts: Array
+
+    def at(self, which: slice | NDArray[np.bool_]) -> "NormalEquations":
+        """Those of some of the touches."""
+        return NormalEquations(self.bordered[which], self.contacts[which])
 
     @property
     def gram(self) -> Array:
@@ -77,12 +90,6 @@ class ProcessHyperparameters(NamedTuple):
     use_gp: bool
 
 
-def precision_of(waviness: Array, free: float) -> Array:
-    """Prior precisions of the coefficients, (..., 27), for waviness (...) and the precision of free terms."""
-    higher = 1.0 / prior_variances(waviness)
-    return np.concatenate([np.full((*higher.shape[:-1], FREE), free), higher], axis=-1)
-
-
 def neg2_log_evidence(
     heights: NormalEquations, slopes: NormalEquations | None, precision: Array, noises: Array
 ) -> Array:
@@ -99,11 +106,10 @@ def neg2_log_evidence(
     bordered = heights.bordered[:, None] / (noises**2)[..., None, None]
     if slopes is not None:
         bordered += slopes.bordered[:, None]
-    bordered = bordered[:, None].repeat(len(precision), axis=1)
-    diagonal = np.einsum("bwnii->bwni", bordered)  # a view
-    diagonal[..., :-1] += precision[:, None]
     # Adding 1 changes no ratio of likelihoods and keeps rounding from leaving less than 0 over.
-    diagonal[..., -1] += 1.0 + ROUNDING * diagonal.sum(axis=-1)
+    bordered[..., -1, -1] += 1.0 + ROUNDING * np.einsum("bnii->bn", bordered)
+    bordered = bordered[:, None].repeat(len(precision), axis=1)
+    np.einsum("bwnii->bwni", bordered)[..., :-1] += precision[:, None]  # a view
     pivots = np.einsum("bwnii->bwni", np.linalg.cholesky(bordered))
     found: Array = 2.0 * np.log(pivots[..., :-1]).sum(axis=-1) + pivots[..., -1] ** 2
     found += (heights.contacts[:, None] * np.log(noises**2))[:, None]
@@ -112,11 +118,11 @@ def neg2_log_evidence(
 
 def noise_grid(heights: NormalEquations, floor: Array) -> Array:
     """A grid of the noise, (b, NOISES), from the floor (b,) to beyond what a quadric leaves of contacts."""
-    free, rhs = heights.gram[:, :FREE, :FREE].copy(), heights.rhs[:, :FREE]
-    np.einsum("bii->bi", free)[:] += ROUNDING * np.einsum("bii->b", free)[:, None]
-    explained = np.einsum("bi,bi->b", rhs, np.linalg.solve(free, rhs[..., None])[..., 0])
-    left = np.maximum(heights.bordered[:, -1, -1] - explained, 0.0)
-    largest = 2.0 + 3.0 / floor * np.sqrt(left / heights.contacts)
+    which = [*range(FREE), -1]
+    bordered = heights.bordered[:, which][:, :, which]
+    np.einsum("bii->bi", bordered)[:] += ROUNDING * np.einsum("bii->b", bordered)[:, None]  # a view
+    left = np.linalg.cholesky(bordered)[:, -1, -1]  # the root of the sum of squares
+    largest = 2.0 + 3.0 / floor * left / np.sqrt(heights.contacts)
     found: Array = floor[:, None] * largest[:, None] ** np.linspace(0.0, 1.0, NOISES)
     return found
 
@@ -125,13 +131,11 @@ def hyperparameters(
     heights: NormalEquations, slopes: NormalEquations | None, floor: Array
 ) -> Hyperparameters:
     """Waviness and noise of b touches without a process, in groups that fit into a processor's cache."""
-    noises, precision = noise_grid(heights, floor), precision_of(WAVINESS, FREE_PRECISION)
-    groups = [slice(start, start + GROUP) for start in range(0, len(noises), GROUP)]
-    found = []
-    for group in groups:
-        some = [e and NormalEquations(*(part[group] for part in e)) for e in (heights, slopes)]
-        assert some[0] is not None
-        found.append(neg2_log_evidence(some[0], some[1], precision, noises[group]))
+    noises, found = noise_grid(heights, floor), []
+    for start in range(0, len(noises), GROUP):
+        group = slice(start, start + GROUP)
+        some = heights.at(group), slopes and slopes.at(group)
+        found.append(neg2_log_evidence(*some, PRECISIONS, noises[group]))
     return averaged(np.concatenate(found), noises)
 
 

@@ -150,6 +150,8 @@ def _with_evidence(state: _State, data: Sextics, floor: Array, stale: NDArray[np
         return state
     some = data if stale.all() else data.at(stale)
     found = *hyperparameters(some.heights, some.slopes, floor[stale]), state.weights[stale]
+    if stale.all():
+        return _State(*state[:-4], *found)
     changed = _State(*state[:-4], *(values.copy() for values in state[-4:]))
     for values, new in zip(changed[-4:], found, strict=True):
         values[stale] = new

@@ -86,6 +86,8 @@ class Equations(NamedTuple):
         """Terms and heights (28, m), and kernels (m, m), of the places, each times the root of its weight."""
         root = self.roots[self.places]
         rows = np.vstack([self.basis[self.places].T, self.heights[self.places]])
+        if len(root) == len(self.roots) and root.min() == 1.0:  # This saves a copy.
+            return rows, self.kernels
         return rows * root, [root[:, None] * k[self.places] * root for k in self.kernels]
 
 
@@ -216,7 +218,8 @@ def process_posterior(
     inverse = inverse_lower(cholesky(precision))
     mean = inverse.T @ (inverse @ rhs)
     alpha = solved(places, mean[terms:], transposed=True)
-    root = np.insert(inverse, terms, 0.0, axis=1)  # The feature 1 has no part: the point is a contact.
+    root = np.zeros((len(inverse), len(inverse) + 1))  # The feature 1 has no part: the point is a contact.
+    root[:, :terms], root[:, terms + 1 :] = inverse[:, :terms], inverse[:, terms:]
     noise, at = np.array(hyper.noise), touch.contacts[index, :2]
     found = SurfacePosterior(mean[:terms], root, noise, visibility, at, alpha, hyper.variances)
     vars(found)["_places_factor"] = places  # This saves finding it again.

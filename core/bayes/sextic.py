@@ -40,12 +40,9 @@ class Sextics(NamedTuple):
 
     def at(self, which: NDArray[np.bool_]) -> "Sextics":
         """Those of some of the b touches."""
-        heights, slopes = (
-            e and NormalEquations(*(part[which] for part in e)) for e in (self.heights, self.slopes)
-        )
-        assert heights is not None
         pivot = None if self.pivot is None else self.pivot[which]
-        return Sextics(self.rows[which], self.weights[which], heights, slopes, pivot)
+        equations = self.heights.at(which), self.slopes and self.slopes.at(which)
+        return Sextics(self.rows[which], self.weights[which], *equations, pivot)
 
     def residuals(self, coefficients: Array) -> Array:
         """What the coefficients (b, 27) do not explain of the heights, (b, n)."""
@@ -122,8 +119,7 @@ def _visibility(seen: Array) -> Array:
 
 
 def _with_prior(precision: Array, variances: Array) -> Array:
-    """A precision (b, 27, 27) and that of the prior with these variances (b, 22)."""
-    precision = precision.copy()
+    """A precision (b, 27, 27), to which that of the prior with these variances (b, 22) is added in place."""
     diagonal = np.einsum("bii->bi", precision)  # a view
     diagonal[:, :FREE] += FREE_PRECISION  # This keeps it invertible whatever the contacts are.
     diagonal[:, FREE:] += 1.0 / variances
