@@ -180,12 +180,16 @@ class Charts:
         )
 
     def stds_at(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
-        """Deviations (m,) of the heights at local (x, y), which are those of the nearest knots."""
+        """Deviations (m,) of the heights at local (x, y), linear between knots."""
         pitch = (2.0 * self.halves / (SIDE - 1))[node]
-        nearest = np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp)
-        column, row = np.minimum(np.maximum(nearest, 0), SIDE - 1)
-        found: Array = self.stds.ravel().take((node * SIDE + column) * SIDE + row)
-        return found
+        at = np.clip(np.array([x, y]) / pitch + 0.5 * (SIDE - 1), 0.0, SIDE - 1.0)
+        first = np.minimum(at.astype(np.intp), SIDE - 2)
+        right, up = at - first
+        start, stds = (node * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
+        left = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
+        start += SIDE
+        found: Array = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
+        return left + right * (found - left)
 
     @cached_property
     def mean_stds(self) -> Array:

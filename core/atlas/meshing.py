@@ -6,7 +6,7 @@ Tetrahedra on the indicator's surface are cut, which is closed by construction. 
 patches that face as the indicator does. Triangles where no patch is are left out.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator a
 # Vertices that were off by more cells, or are of folded triangles, are moved again, so often.
 FAR, STEPS = 0.05, 4
 WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none is lost between them.
+CONTINUED_STD = 0.25  # The deviation of what is continued beyond all patches is this share of the way there.
 ROOM = 5.0  # The surface is within so many cells of the level of the indicator.
 HALVINGS = 5  # So many halvings of an edge of the lattice find the level.
 LATTICE_AT_ONCE = 100_000  # A step takes so many points of the lattice,
@@ -117,10 +118,16 @@ def lattice_of(indicator: Indicator, edge: float) -> tuple[float, int]:
     return size, halvings
 
 
-def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float, None, Mesh]:
+def meshed(
+    charts: Charts,
+    indicator: Indicator,
+    edge: float,
+    ended: Callable[[Array], NDArray[np.bool_]] | None = None,
+) -> Generator[float, None, Mesh]:
     """The mesh of the surface; yields the share that is done.
 
     edge : about the length of its edges, which are shorter than a quarter of the thinnest wall
+    ended : which of places (n, 3) are beyond the ends of a mesh of the surface that was made before
     """
     edge = min(edge, WALL * indicator.resolved)
     size, halvings = lattice_of(indicator, edge)
@@ -133,8 +140,9 @@ def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float
         yield 0.7
         vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
     found = yield from creased(charts, vertices, triangles, surface.normal, edge)
-    at = np.append(np.arange(len(vertices)), found.parents)
-    return _felt(found.vertices, found.triangles, surface.chosen(at), indicator.cell)
+    surface = surface.chosen(np.append(np.arange(len(vertices)), found.parents))
+    surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * found.unfelt))
+    return (yield from _felt(found.vertices, found.triangles, surface, indicator.cell, ended))
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -240,11 +248,17 @@ def _onto(
     return surface
 
 
-def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) -> Mesh:
-    """The mesh without triangles where nothing was felt.
+def _felt(
+    vertices: Array,
+    triangles: Indices,
+    surface: Surface,
+    cell: float,
+    ended: Callable[[Array], NDArray[np.bool_]] | None,
+) -> Generator[float, None, Mesh]:
+    """The mesh without triangles where nothing was felt; yields the share that is done.
 
     Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
-    as small as some cells of the indicator is bridged.
+    as small as some cells of the indicator is bridged; a later mesh ends where the first one did.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -254,11 +268,18 @@ def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) ->
     beyond = triangles[~inside[triangles].all(axis=1)]
     links = np.ones(2 * len(beyond)), (beyond[:, :2].ravel(), beyond[:, 1:].ravel())
     count, piece = connected_components(coo_matrix(links, (len(vertices),) * 2))
-    a, b, c = vertices[beyond].transpose(1, 0, 2)
-    # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
-    far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
-    areas = np.bincount(piece[beyond[:, 0]], far, count)
     beside = np.bincount(piece[inside], minlength=count) > 0
-    gone = ~inside & ((areas > BRIDGED * cell**2) | ~beside)[piece]
+    gone = ~inside & ~beside[piece]
+    if ended is None:
+        a, b, c = vertices[beyond].transpose(1, 0, 2)
+        # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
+        far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
+        gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * cell**2)[piece]
+    else:
+        outer = np.flatnonzero(~inside & ~gone)
+        for start in range(0, len(outer), PLACES_AT_ONCE):
+            some = outer[start : start + PLACES_AT_ONCE]
+            gone[some] = ended(vertices[some])
+            yield 0.9
     std = np.where(surface.node < 0, cell, surface.std)
     return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))

@@ -300,7 +300,7 @@ class Atlas:
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
                 f"{edge:.3g}, which takes {1e-9 * memory:.3g} GB: use a longer one"
             )
-        mesh = yield from meshed(self.charts, self.reference.indicator, edge)
+        mesh = yield from meshed(self.charts, self.reference.indicator, edge, self.reference.ended)
         return mesh if self.border is None else bordered(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:

@@ -13,9 +13,9 @@ from ..arguments import Array
 from ..contours.contour import Vector
 from ..patch.tetrahedra import Indices
 from .charts import Charts
-from .field import Surface, surface_at
+from .field import Surface, patched
 from .indicator import Indicator
-from .meshing import LEAST_DIVISOR, ROOM, Mesh
+from .meshing import LEAST_DIVISOR, Mesh
 
 # python -m benchmarks.atlas judges these.
 NEAREST = 3  # The nearest triangle is looked for at so many of the nearest vertices.
@@ -85,6 +85,10 @@ class ReferenceMesh:
         std = np.einsum("ni,ni->n", weights[row, best], self.mesh.std[corners])
         return feet[row, best], triangle, std, ends
 
+    def ended(self, points: Array) -> NDArray[np.bool_]:
+        """Which of points (n, 3) are beyond where the mesh ends."""
+        return self.feet(points)[3]
+
     def away(self, point: Vector) -> float:
         """The distance of a point from the triangles."""
         return float(np.linalg.norm(self.feet(np.array([point]))[0] - point))
@@ -117,11 +121,10 @@ class ReferenceMesh:
 
     def _settled(self, charts: Charts, places: Array, up: Array) -> tuple[Surface, Array]:
         """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""
-        room = max(ROOM * self.indicator.cell, self.mesh.edge)
-        first = surface_at(charts, self.indicator, places, up, room)
-        places = places - first.distance[:, None] * first.normal
-        surface = surface_at(charts, self.indicator, places, up, room)
-        return surface, places - surface.distance[:, None] * surface.normal
+        for _ in range(2):  # Farther away than an edge there is only another part of the surface.
+            surface = patched(charts, self.indicator, places, up, self.mesh.edge)
+            places = places - surface.distance[:, None] * surface.normal
+        return surface, places
 
 
 def closest(triangles: Array, points: Array) -> tuple[Array, Array]:
