@@ -194,16 +194,16 @@ class Charts:
     @cached_property
     def mean_stds(self) -> Array:
         """The mean deviation of the heights over each domain, (n,), a length."""
-        inside = self._inside()
+        inside = self.inside(1.0)
         sums: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
         return self.radii * sums
 
-    def _inside(self) -> NDArray[np.bool_]:
-        """Which knots are inside the domains, (n, SIDE, SIDE)."""
-        count = len(self.radii)
-        x, y = self.knots().reshape(2, -1)
-        shares = self.shares(x, y, np.repeat(np.arange(count), SIDE**2))
-        return (shares <= 1.0).reshape(count, SIDE, SIDE)
+    def inside(self, share: float) -> NDArray[np.bool_]:
+        """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""
+        every, found = self.knots(), []
+        for i, (x, y) in enumerate(zip(*every.reshape(2, len(self.radii), -1), strict=True)):
+            found.append(self.shares(x, y, np.full(len(x), i)) <= share)
+        return np.reshape(found, self.heights.shape)
 
     def knots(self) -> Array:
         """Local x and y of all knots, (2, n, SIDE, SIDE)."""

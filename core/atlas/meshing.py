@@ -68,31 +68,41 @@ class Mesh(NamedTuple):
     @property
     def border(self) -> Indices:
         """The edges (k, 2) of one triangle only, each as this triangle has it."""
-        ends, first, counts = self._edges
-        return ends[first[counts == 1]]
+        sides, keys, once, _ = self._sides
+        return sides[once][np.argsort(keys[once])]
 
     @property
     def sides_on_border(self) -> Indices:
         """The number of sides (m,) of each triangle that are on the border."""
-        _, first, counts = self._edges
-        return np.bincount(first[counts == 1] // 3, minlength=len(self.triangles))
+        found: Indices = self._sides[2].reshape(-1, 3).sum(axis=1)
+        return found
 
     def chosen(self, which: NDArray[np.bool_]) -> "Mesh":
         """Some of the triangles, and their vertices."""
-        used, index = np.unique(self.triangles[which], return_inverse=True)
-        return Mesh(self.vertices[used], index.reshape(-1, 3), self.std[used], self.patch[used])
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.triangles[which]] = True
+        index = np.cumsum(used) - 1
+        return Mesh(self.vertices[used], index[self.triangles[which]], self.std[used], self.patch[used])
 
     @property
-    def _edges(self) -> tuple[Indices, Indices, Indices]:
-        """The edges (3 m, 2) of all triangles; the first of each that are the same, and their number."""
-        ends = self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        keys = ends.min(axis=1) * len(self.vertices) + ends.max(axis=1)
-        return ends, *np.unique(keys, return_index=True, return_counts=True)[1:]
+    def _sides(self) -> tuple[Indices, Indices, NDArray[np.bool_], bool]:
+        """The sides (3 m, 2) of all triangles, and numbers (3 m,) that are equal for the same edge.
+
+        Also which sides (3 m,) no other triangle has, and whether each edge belongs to exactly two.
+        """
+        sides = self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        keys = sides.min(axis=1) * len(self.vertices) + sides.max(axis=1)
+        order = np.sort(keys)
+        first = np.flatnonzero(np.diff(order, prepend=-1))
+        counts = np.diff(first, append=len(order))
+        once = order[first[counts == 1]]
+        at = np.searchsorted(once, keys)
+        return sides, keys, np.append(once, -1)[at] == keys, bool((counts == 2).all())
 
     @property
     def is_closed(self) -> bool:
         """Whether there are triangles, and each edge belongs to exactly two."""
-        return len(self.triangles) > 0 and bool((self._edges[2] == 2).all())
+        return len(self.triangles) > 0 and self._sides[3]
 
 
 def memory_of(vertices: Array, triangles: Indices, edge: float, lattice: float = np.inf) -> float:
@@ -189,12 +199,11 @@ def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]
     # A cell of the grid is in at most two cubes along an axis, or three.
     ways = (0.0, 1.0) if size >= indicator.cell else (0.0, 0.5, 1.0)
     ends = [np.floor((low + way * indicator.cell) / size).astype(np.intp) for way in ways]
-    parts = []
+    cells = ends[0]
     for which in np.ndindex(3 * (len(ways),)):
-        parts.append(unique(np.stack([ends[i][:, axis] for axis, i in enumerate(which)], axis=1)))
+        beside = unique(np.stack([ends[i][:, axis] for axis, i in enumerate(which)], axis=1))
+        cells = unique(np.vstack([cells, beside]))
         yield 0.0
-    cells = unique(np.vstack(parts))
-    yield 0.0
     beside = np.vstack([np.zeros((1, 3), dtype=np.intp), np.eye(3, dtype=np.intp), -np.eye(3, dtype=np.intp)])
     return unique((cells[:, None] + beside).reshape(-1, 3))
 
@@ -268,6 +277,7 @@ def _felt(
     beyond = triangles[~inside[triangles].all(axis=1)]
     links = np.ones(2 * len(beyond)), (beyond[:, :2].ravel(), beyond[:, 1:].ravel())
     count, piece = connected_components(coo_matrix(links, (len(vertices),) * 2))
+    yield 0.9
     beside = np.bincount(piece[inside], minlength=count) > 0
     gone = ~inside & ~beside[piece]
     if ended is None:
