@@ -9,6 +9,7 @@ What a sample presupposes (a scan, contacts, a scene with Suzanne) lies in the f
 import re
 import shlex
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,8 @@ def save(bpy, path):
 def folder(empty, scans, tmp_path, monkeypatch):
     """The files that samples read, in the current folder, and the scene that is open."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "tactile_core", core)  # as pip installs it
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
     shutil.copy(scans / "pear.ply", tmp_path)
     measured = [points for points, _ in curves()]
     for name in ("contacts.csv", "scan.csv"):

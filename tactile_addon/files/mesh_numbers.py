@@ -4,8 +4,8 @@
 
 import numpy as np
 
+from ...core.contact_data.rows import POINT_COLUMNS
 from . import ply_contacts
-from .contact_rows import POINT_COLUMNS
 
 STL_HEAD = 84  # The head of a binary .stl has so many bytes, the last four of which number its triangles.
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

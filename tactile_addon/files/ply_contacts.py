@@ -8,8 +8,8 @@ Blender's own import keeps these attributes, too, but in single precision, and r
 import numpy as np
 
 from ...core.arguments import LARGEST
-from . import contact_rows
-from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
+from ...core.contact_data import rows as contact_rows
+from ...core.contact_data.rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
 PLY_ROWS = 1000  # So many rows of a .ply are read together.
 PLY_TYPES = {

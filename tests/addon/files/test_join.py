@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 from scenes import datablocks, made, positions, values
 
-from core import Contour, atlas_of
+from core import Contacts, Contour, atlas_of
 
 CENTER, RADIUS = np.array([40.0, -3.0, 7.0]), 2.0
 GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
@@ -40,7 +40,7 @@ def write(extension, empty, tmp_path):
 
     def write(name, strokes, **told):
         contact_file = extension.tactile_addon.files.contact_file
-        contact_file.write(tmp_path / name, contact_file.Contacts([], "", strokes=tuple(strokes), **told))
+        contact_file.write(tmp_path / name, Contacts([], "", strokes=tuple(strokes), **told))
         return tmp_path / name
 
     return write
