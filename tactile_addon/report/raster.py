@@ -67,8 +67,9 @@ def _weights(count):
 def _png(rgba):
     """The bytes of a .png of pixels (h, w, 4), uint8."""
     high, wide, _ = rgba.shape
-    lines = np.zeros((high, 1 + 4 * wide), dtype=np.uint8)  # Each begins with its filter, 0.
-    lines[:, 1:] = rgba.reshape(high, -1)
+    # Each line begins with its filter, 2: differences from the line above take less than half the bytes.
+    lines = np.full((high, 1 + 4 * wide), 2, dtype=np.uint8)
+    lines[:, 1:] = np.diff(rgba.reshape(high, -1), axis=0, prepend=np.zeros((1, 4 * wide), dtype=np.uint8))
     parts = (
         (b"IHDR", struct.pack(">IIBBBBB", wide, high, 8, 6, 0, 0, 0)),
         (b"IDAT", zlib.compress(lines.tobytes(), 9)),

@@ -63,7 +63,8 @@ def pixels(address):
         lines += data[at + 8 : at + 8 + length] if data[at + 4 : at + 8] == b"IDAT" else b""
         at += 12 + length
     rows = np.frombuffer(zlib.decompress(lines), dtype=np.uint8).reshape(480, -1)
-    covered = rows[:, 1:].reshape(480, 480, 4)[:, :, 3] > 0
+    assert (rows[:, 0] == 2).all()  # Each line is the difference from the one above.
+    covered = np.cumsum(rows[:, 1:], axis=0, dtype=np.uint8).reshape(480, 480, 4)[:, :, 3] > 0
     first, last = covered.argmax(axis=1), 479 - covered[:, ::-1].argmax(axis=1)
     inside = [row[a : b + 1].all() for row, a, b in zip(covered, first, last, strict=True) if row.any()]
     return covered, not all(inside)
