@@ -7,6 +7,7 @@ has negative curvatures, because normals point outward.
 """
 
 from .atlas.boundaries import Edge
+from .atlas.expected import expected_touches
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
@@ -75,6 +76,7 @@ __all__ = [
     "contacts_to_csv",
     "cover_contacts",
     "distances",
+    "expected_touches",
     "explore",
     "explore_many",
     "explore_object",

@@ -38,7 +38,7 @@ def test_every_option_arrives(command, files):
     arguments = (*PLACE, *options, "--json", path, "--output", output)
     code, out, err = command("reconstruct", files / "ball.blend", *arguments)
     assert (code, err) == (0, "")
-    assert "kappa1, kappa2" in out
+    assert "principal curvatures" in out
     report = json.loads(path.read_text())
     assert [report[key] for key in ("method", "degree", "seed")] == ["quadratic-variation", 5, 4]
     assert report["step"] == pytest.approx(0.05)
@@ -89,7 +89,7 @@ def test_every_option_of_a_map_arrives_and_the_copy_is_saved(command, files):
     arguments = ("map", files / "ball.blend", "--spacing", 1.5, *options)
     code, out, err = command(*arguments, "--json", path, "--output", blend)
     assert (code, err) == (0, "")
-    assert "median height_std" in out
+    assert "median standard deviation" in out
     report = json.loads(path.read_text())
     assert [report[key] for key in ("method", "degree", "seed")] == ["bayes", 5, 4]
     assert [report[key] for key in ("spacing", "extent", "step")] == pytest.approx([1.5, 0.6, 0.05])
@@ -128,18 +128,18 @@ def test_lengths_are_said_in_the_unit_of_the_scene(command, files):
     out = command("reconstruct", files / "ball.blend", *PLACE)[1]
     rows = dict(line.split("  ", 1) for line in out.splitlines() if "  " in line)
     rows = {label.strip(): value.strip() for label, value in rows.items()}
-    assert re.fullmatch(r"-0\.5\S* ± \S+ 1/m, -0\.[45]\S* ± \S+ 1/m", rows["kappa1, kappa2"])
+    assert re.fullmatch(r"-0\.5\S* ± \S+ 1/m, -0\.[45]\S* ± \S+ 1/m", rows["principal curvatures"])
     assert re.fullmatch(r"0\.2\d* ± \S+ 1/m²", rows["Gaussian curvature"])
-    assert re.fullmatch(r"\S+ \w*m, \S+ % of the radius", rows["height std"])
+    assert re.fullmatch(r"\S+ \w*m, \S+ % of the radius", rows["standard deviation of the height"])
     assert re.fullmatch(r"\S+ m, 0.6 m, \S+ m", rows["step, extent, radius"])
     assert rows["point"].endswith(" m")
     bpy.context.scene.unit_settings.system = "NONE"
     bpy.ops.wm.save_as_mainfile(filepath=str(files / "none.blend"))
     out = command("reconstruct", files / "none.blend", *PLACE)[1]
-    assert re.search(r"kappa1, kappa2 +-0\.5\S* ± \S+, -0\.[45]\S* ± \S+\n", out)
+    assert re.search(r"principal curvatures +-0\.5\S* ± \S+, -0\.[45]\S* ± \S+\n", out)
     out = command("map", files / "ball.blend", "--spacing", 1)[1]
-    assert re.search(r"median height_std +\S+ \S*m\n", out)
-    assert re.search(r"median blind_share +[\d.]+\n", out)
+    assert re.search(r"median standard deviation +\S+ \S*m\n", out)
+    assert re.search(r"median blind share +[\d.]+\n", out)
 
 
 def test_strokes_are_fitted_around_a_place(command, empty, tmp_path):
