@@ -61,7 +61,7 @@ TESTS = {  # The tests of each module of core; those that fail soonest come firs
     "reconstruction/start": "reconstruction strokes",
     "reconstruction/status": "status",
     "reconstruction/strokes": "strokes",
-    "scan/mesh_error": "mesh_error",
+    "exploration/mesh_error": "mesh_error",
     "scan/pose_search": "pose_search",
     "scan/sampling": "sampling pose_search",
     "scan/scanned_mesh": "pose_search",

@@ -275,26 +275,28 @@ class _Run:
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
             border = yield from _part(steps, 1.0, 1.0)
             reference = replace(reference, mesh=bordered(reference.mesh, border))
+        yield from reference.prepared()
         check = self.check(reference)
         yield 1.0
-        uncovered = self.frontier.uncovered(reference)
+        uncovered = yield from self.frontier.uncovered(reference)
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
         cut_short = self.done >= self.most
         atlas = Atlas(patches, charts, reference, self.tolerance, places, check, taps, border, cut_short)
-        off, atlas = atlas.contradicting, atlas.widened()
+        off = atlas.contradicting
         yield 1.0
+        atlas = yield from atlas.widened()
         contacts: list[Contact] = [contact for _, contact in uncovered]
         contacts += zip(check.points[off], check.normals[off], strict=True)
         return atlas, contacts + self.rough(atlas.reference.mesh)
 
     def rough(self, mesh: Mesh) -> list[Contact]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
-        left = np.flatnonzero(mesh.std > LIMIT * self.tolerance)
+        left, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
         found: list[Contact] = []
         assert self.frontier.charts is not None
         while len(left):
             worst = left[np.argmax(mesh.std[left])]
-            point, normal = vector_of(mesh.vertices[worst]), vector_of(mesh.normals[worst])
+            point, normal = vector_of(mesh.vertices[worst]), vector_of(normals[worst])
             contact = self.frontier.finger.near(point, normal, self.frontier.near)
             found += [contact] if contact else []
             apart = ROUGH_APART * self.frontier.charts.radii[mesh.patch[worst]]

@@ -16,11 +16,14 @@ LARGEST = float(np.finfo(np.float32).max)
 def unreadable(path):
     """The number of vertices in a .ply, .stl or .obj file whose coordinates are no finite float32 numbers.
 
-    It is 0 for a file that is broken otherwise, which importers find.
+    It is 0 for a .stl or .obj file that is broken otherwise, which importers find. Raises ValueError for a
+    .ply file of whose vertices an importer might read something else.
     """
     data = path.read_bytes()
+    if path.suffix.lower() == ".ply":
+        return _of_ply(data)
     try:
-        return {".ply": _of_ply, ".stl": _of_stl, ".obj": _of_obj}[path.suffix.lower()](data)
+        return {".stl": _of_stl, ".obj": _of_obj}[path.suffix.lower()](data)
     except (ValueError, IndexError):
         return 0
 

@@ -310,6 +310,62 @@ def test_numbers_that_blender_reads_as_0_are_found_wherever_vertices_are(command
     assert "1 of them: correct or delete these" in command("map", tmp_path / "text.ply")[2]
 
 
+def rearranged(kind, change, word="nan"):
+    """A .ply of `mesh_data` whose head and rows were changed by a function of both."""
+    head, rows = mesh_data(kind, word).split(b"end_header\n")
+    head, rows = change(head.decode(), rows)
+    return head.encode() + b"end_header\n" + rows
+
+
+def faces_first(head, rows):
+    vertices, faces, size = head.index("element vertex"), head.index("element face"), len(FACES) * 13
+    strips = "element strip 2\nproperty double width\nproperty list ushort short at\n"
+    data = bytes(8) + b"\2\0" + bytes(4) + bytes(10)
+    return head[:vertices] + strips + head[faces:] + head[vertices:faces], data + rows[-size:] + rows[:-size]
+
+
+def comment_first(head, rows):
+    return head.replace("ply\n", "ply\ncomment of a scanner\n", 1), rows
+
+
+def listed_before(head, rows):
+    words = [(b"1 7 " if i < len(VERTICES) else b"") + line for i, line in enumerate(rows.split(b"\n"))]
+    return head.replace("5\n", "5\nproperty list uchar int group\n"), b"\n".join(words)
+
+
+def twice(head, rows):
+    words = [line + (b" 0.5" if i < len(VERTICES) else b"") for i, line in enumerate(rows.split(b"\n"))]
+    return head.replace("element face", "property float x\nelement face"), b"\n".join(words)
+
+
+def listed(head, rows):
+    words = [line + (b" 2 7 7" if i < len(VERTICES) else b"") for i, line in enumerate(rows.split(b"\n"))]
+    return head.replace("element face", "property list uchar int group\nelement face"), b"\n".join(words)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("binary.ply", faces_first),
+        ("binary.ply", comment_first),
+        ("text.ply", comment_first),
+        ("text.ply", listed),
+    ],
+)
+def test_numbers_that_blender_reads_as_0_are_found_below_any_header(command, empty, tmp_path, kind, change):
+    path = tmp_path / kind
+    path.write_bytes(rearranged(kind, change, "0.1"))
+    assert "not finite" not in command("map", path)[2]
+    path.write_bytes(rearranged(kind, change))
+    assert "1 of them: correct or delete these" in command("map", path)[2]
+
+
+@pytest.mark.parametrize("change", [twice, listed_before])
+def test_a_ply_of_which_blender_may_read_other_vertices_is_refused(command, empty, tmp_path, change):
+    (tmp_path / "text.ply").write_bytes(rearranged("text.ply", change, "0.1"))
+    assert 'no mesh could be read from "text.ply"' in command("map", tmp_path / "text.ply")[2]
+
+
 def test_where_curves_meet_is_told_in_double_precision(command, empty, tmp_path):
     point, t = np.array([1000.00012, 700.0004, -300.0]), np.linspace(-0.01, 0.01, 41)
     rows = ["curve,x,y,z"]
