@@ -29,7 +29,7 @@ def expected_touches(
     noise: float = 0.0,
     rng: np.random.Generator | int | None = None,
 ) -> float:
-    """About how many touches `explore_object` makes of an object, mostly within a factor of two.
+    """About how many touches `explore_object` makes of an object; too many where walls are flat.
 
     points, outward : (n, 3), places spread evenly over the object, and the outward directions there
     area : of the object, in the square of the caller's unit

@@ -16,7 +16,7 @@ from ..scene.viewports import show_colors
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
 # While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
-RINGS, SPOKES = (0.5, 0.95, 1.0), 48
+RINGS, SPOKES = (0.3, 0.65, 0.95, 1.0), 48
 RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
 DRAWN_ABOVE = 5e-3  # It is drawn this share of the object's size above the mesh, in which it would lie.
 
