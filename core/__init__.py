@@ -7,10 +7,13 @@ has negative curvatures, because normals point outward.
 """
 
 from .atlas.boundaries import Edge
+from .atlas.expected import expected_touches
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
 from .atlas.touching import Progress, explore_object, touch_all_over
+from .contact_data.rows import Contacts
+from .contact_data.table import UNIT_METERS, contacts_from_csv, contacts_to_csv
 from .contours.common_point import common_point, in_running_order
 from .contours.contour import (
     CREASE,
@@ -24,7 +27,7 @@ from .contours.contour import (
 from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
-from .exploration.nearby import Nearby, explore_nearby, reaches_of
+from .exploration.mesh_error import height_error, judged_by_mesh
 from .exploration.one_touch import Exploration
 from .exploration.touches import explore, explore_many, exploring_many
 from .paper.by_method import SOLVERS
@@ -36,7 +39,6 @@ from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
-from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
@@ -49,7 +51,9 @@ __all__ = [
     "NO_CONTACT",
     "SOLVERS",
     "UNEXPLAINED",
+    "UNIT_METERS",
     "Atlas",
+    "Contacts",
     "Contour",
     "DegenerateCurvesError",
     "Domain",
@@ -59,7 +63,6 @@ __all__ = [
     "Geometry",
     "Mesh",
     "MongePatch",
-    "Nearby",
     "NextTouch",
     "Pose",
     "Progress",
@@ -69,11 +72,13 @@ __all__ = [
     "atlas_of",
     "azimuth_of",
     "common_point",
+    "contacts_from_csv",
+    "contacts_to_csv",
     "cover_contacts",
     "distances",
+    "expected_touches",
     "explore",
     "explore_many",
-    "explore_nearby",
     "explore_object",
     "exploring_many",
     "fit_error",
@@ -84,7 +89,6 @@ __all__ = [
     "mean_height_stds",
     "overlapped",
     "reachable",
-    "reaches_of",
     "reconstruct",
     "reconstruct_many",
     "register",
