@@ -8,7 +8,8 @@ github.com/vu-arma-dev/robot-palpation-data. Both checkouts are asked for the sa
 by two processes at once. The command prints Markdown tables of means:
 
 (a) errors, scores and shares of the 90 % intervals, on exact and random surfaces (um), on scans (permille of
-    the radius, real.py) and of the robot's contacts (mm); `+-` is the deviation of a paired ratio;
+    the radius, real.py), there with measured normals too, and of the robot's contacts (mm); `+-` is the
+    deviation of a paired ratio;
 (b) verdicts in the sweeps of benchmarks.stability, in numbers of cases;
 (c) automatic touches of the scans, which tap between their curves;
 (d) times, as `benchmarks.speed --base` prints them.
@@ -25,7 +26,8 @@ from tools import blender
 
 from . import ROOT, SCANS_FOLDER, accuracy, machine, ratios, stability, table
 
-TASKS = ("exact", "random", "real", "robot", "stability", "automatic", "times")
+NORMAL_STD = 0.02  # radians
+TASKS = ("exact", "random", "real", "normals", "robot", "stability", "automatic", "times")
 
 
 def compared(base, jobs):
@@ -93,6 +95,8 @@ def main():
         jobs += [("random", seed) for seed in range(5 * n)]
     if "real" in tasks:
         jobs += [("fixed", path, n) for path in scans]
+    if "normals" in tasks:
+        jobs += [("fixed", path, n, NORMAL_STD) for path in scans]
     if "robot" in tasks and options.robot:
         jobs.append(("palpated", options.robot, max(1, n // 5)))
     if jobs:

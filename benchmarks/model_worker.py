@@ -9,6 +9,7 @@ those of the checkout's own benchmarks, drawn by seeds, so two checkouts answer 
 
 import json
 import sys
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -59,12 +60,23 @@ def scan_of(path):
         return real.Scan(Path(path))
 
 
-def fixed(path, points):
-    rows = []
+def fixed(path, points, normal_std=None):
+    """Touches of a scan; with a deviation in radians, the contacts have measured normals that scatter so."""
+    rows, rng = [], np.random.default_rng(0)
     for (planes, _), touch, radius in real.touches(scan_of(path), points):
+        group = f"real, {planes} planes"
+        if normal_std is not None:
+            contours = [with_normals(contour, normal_std, rng) for contour in touch.contours]
+            group, touch = f"normals, {planes} planes", touch._replace(contours=contours)
         found = real.score(real.ours(touch), touch, radius)
-        rows.append([f"real, {planes} planes", found.error, found.interval, found.covered])
+        rows.append([group, found.error, found.interval, found.covered])
     return rows
+
+
+def with_normals(contour, std, rng):
+    normals = contour.normals + rng.normal(0.0, std, contour.normals.shape)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return replace(contour, normals=normals, normal_std=std)
 
 
 def palpated(folder, points):

@@ -112,7 +112,8 @@ def joint_fit(
         return found[0][1], SurfacePosterior(*found[0][3:]), found[0][2]
     order, turns, found_weights, *surfaces = (np.concatenate(parts) for parts in zip(*found, strict=True))
     back = np.argsort(order)
-    return turns[back], SurfacePosterior(*(values[back] for values in surfaces)), found_weights[back]
+    mean, root, noise, visibility = (values[back] for values in surfaces)
+    return turns[back], SurfacePosterior(mean, root, noise, visibility), found_weights[back]
 
 
 def _pass(

@@ -60,6 +60,8 @@ class SurfacePosterior(HeightField):
         singular values of a leading block tell that of the terms up to a lower degree
     places : (m, 2), the places u; none without a process
     alpha : (m,); variances : (2,), of g, for each of LENGTHS
+    sextic : the posterior without g where frame and curvatures are its own, because it averages the facets of
+        a smooth surface; None elsewhere
     """
 
     mean: Array
@@ -69,6 +71,7 @@ class SurfacePosterior(HeightField):
     places: Array = field(default_factory=lambda: np.empty((0, 2)))
     alpha: Array = field(default_factory=lambda: np.empty(0))
     variances: Array = field(default_factory=lambda: np.zeros(2))
+    sextic: "SurfacePosterior | None" = None
 
     def at(self, index: int | slice | NDArray[np.bool_]) -> "SurfacePosterior":
         """One posterior of the stack, or several."""
@@ -178,8 +181,10 @@ class SurfacePosterior(HeightField):
 
         Those up to degree 2 are of the quartic nearest to z over QUARTIC_SHARE of the radius, the others are
         nearest to what these leave: a Matern process of order 3/2 has no second derivative at the point. If z
-        is a polynomial, they are its own.
+        is a polynomial, or if there is a `sextic`, they are its own.
         """
+        if self.sextic is not None:
+            return self.sextic.mean
         if not len(self.places):
             return self.mean
         at, weights = _projection()
@@ -192,6 +197,8 @@ class SurfacePosterior(HeightField):
     @cached_property
     def covariance(self) -> Array:
         """The covariance of the coefficients of `polynomial`, (27, 27)."""
+        if self.sextic is not None:
+            return self.sextic.covariance
         if not len(self.places):
             root = self.root[:, :-1]
             return root.T @ root

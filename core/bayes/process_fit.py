@@ -6,7 +6,8 @@ A real surface has different curvatures at each scale, and those at the point it
 So its frame and curvatures are those of the quartic that is nearest to z over a disk (SurfacePosterior's
 `polynomial`). Compared with dense fits of the scans, they are off at most half as far as those of the sextic
 fitted to the contacts alone, and their intervals are true. If contacts are off that sextic by less than
-MISFIT, as on a smooth surface whose mesh has facets, its frame is kept, because it averages the facets.
+MISFIT, as on a smooth surface whose mesh has facets, its frame and curvatures are kept, because it averages
+the facets.
 """
 
 from typing import NamedTuple
@@ -143,12 +144,13 @@ def process_fit(
         hyper = process_hyperparameters(*equations.at_places(), touch.least, touch.most)
         if not (hyper.use_gp or (noise_is_known[i] and _is_texture(off[i][there], float(noise[i])))):
             continue
-        if rms[i] > MISFIT:
+        sextic = posterior.at(i) if rms[i] <= MISFIT else None
+        if sextic is None:
             turn, scale = _frame(touch, equations, hyper, tangent[i])
             found.turns[i], found.scales[i], touch = turn, scale, touch.moved(turn, scale)
             equations = equations_of(touch)
             hyper = hyper._replace(variances=hyper.variances / scale**2, noise=hyper.noise / scale)
-        found.posteriors[i] = process_posterior(touch, equations, hyper, posterior.visibility[i])
+        found.posteriors[i] = process_posterior(touch, equations, hyper, posterior.visibility[i], sextic)
     return found
 
 
@@ -194,9 +196,15 @@ def _mean_given(
 
 
 def process_posterior(
-    touch: Observations, equations: Equations, hyper: ProcessHyperparameters, visibility: Array
+    touch: Observations,
+    equations: Equations,
+    hyper: ProcessHyperparameters,
+    visibility: Array,
+    sextic: SurfacePosterior | None = None,
 ) -> SurfacePosterior:
     """The posterior given the variances of the process and the noise.
+
+    visibility, sextic : as in SurfacePosterior
 
     The unknowns are the coefficients of the terms and of L^-1 k(u, p), because the latter have the prior
     precision 1, which makes the system well-conditioned.
@@ -221,7 +229,7 @@ def process_posterior(
     root = np.zeros((len(inverse), len(inverse) + 1))  # The feature 1 has no part: the point is a contact.
     root[:, :terms], root[:, terms + 1 :] = inverse[:, :terms], inverse[:, terms:]
     noise, at = np.array(hyper.noise), touch.contacts[index, :2]
-    found = SurfacePosterior(mean[:terms], root, noise, visibility, at, alpha, hyper.variances)
+    found = SurfacePosterior(mean[:terms], root, noise, visibility, at, alpha, hyper.variances, sextic)
     vars(found)["_places_factor"] = places  # This saves finding it again.
     return found
 

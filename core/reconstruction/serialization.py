@@ -51,7 +51,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
         "patch": polynomial_dict(r.patch),
         "contours": [plain(vars(contour)) for contour in r.contours],
         "strokes": r.strokes.tolist() if len(r.strokes) else None,
-        "posterior": posterior and plain({f.name: getattr(posterior, f.name) for f in fields(posterior)}),
+        "posterior": posterior and _posterior_dict(posterior),
         "taps": None if r.taps is None else r.taps._asdict(),
     }
 
@@ -148,6 +148,11 @@ def _taps(d: Any) -> Taps | None:
     return Taps(taps, missed, number("off", _of(d, "off"), least=0.0))
 
 
+def _posterior_dict(posterior: SurfacePosterior) -> dict[str, Any]:
+    values = {f.name: getattr(posterior, f.name) for f in fields(posterior)}
+    return plain(values | {"sextic": posterior.sextic and _posterior_dict(posterior.sextic)})
+
+
 def _posterior(d: Any) -> SurfacePosterior:
     size, places = len(TERMS), finite_array("places", _of(d, "places") or np.empty((0, 2)), (None, 2))
     shapes: dict[str, tuple[int | None, ...]] = {
@@ -166,4 +171,7 @@ def _posterior(d: Any) -> SurfacePosterior:
         )
     if np.abs(places).max(initial=0.0) >= 2.0:
         raise ValueError("places: expected them on the unit disk, got others")
-    return SurfacePosterior(noise=noise, places=places, **values)
+    sextic = _of(d, "sextic")
+    return SurfacePosterior(
+        noise=noise, places=places, sextic=None if sextic is None else _posterior(sextic), **values
+    )

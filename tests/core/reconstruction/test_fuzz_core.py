@@ -135,7 +135,13 @@ def examine(r):
     arrays = [
         *(r.frame.origin, r.frame.axes, r.contacts, r.domain.ends, patch.coefficients, numbers, x, y),
         *(patch.height(x, y), patch.normal(x, y), patch.gaussian_curvature(x, y), patch.mean_curvature(x, y)),
-        *(patch.principal_curvatures(x, y), r.height_std(x, y), *vars(r.posterior).values()),
+        *(
+            patch.principal_curvatures(x, y),
+            r.height_std(x, y),
+            r.posterior.mean,
+            r.posterior.root,
+            r.posterior.alpha,
+        ),
         distances(patch, np.column_stack([x, y, patch.height(x, y)])),
     ]
     for array in arrays:

@@ -130,13 +130,13 @@ def test_what_is_no_dict_is_refused(value):
         from_dict(value)
 
 
-def rough():
-    """A dict with a process, of contacts on waves that no sextic follows."""
+def rough(height=0.01):
+    """A reconstruction with a process, of contacts on waves that no sextic follows."""
     t, contours = np.linspace(-1.0, 1.0, 31), []
     for a in np.radians((0.0, 60.0, 120.0)):
         x, y = t * np.cos(a), t * np.sin(a)
-        contours.append(Contour(np.column_stack([x, y, 0.01 * np.sin(9.0 * x + 4.0 * y)])))
-    return to_dict(reconstruct((0, 0, 0), contours, outward=(0, 0, 1)))
+        contours.append(Contour(np.column_stack([x, y, height * np.sin(9.0 * x + 4.0 * y)])))
+    return reconstruct((0, 0, 0), contours, outward=(0, 0, 1))
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def rough():
     ],
 )
 def test_a_damaged_posterior_is_refused(key, change, words):
-    d = rough()
+    d = to_dict(rough())
     posterior = d["posterior"]
     assert from_dict(d).posterior.amplitude > 0.0
     posterior[key] = change(np.array(posterior[key])).tolist()
@@ -165,3 +165,16 @@ def test_a_polynomial_with_the_variances_of_a_process_is_refused():
     d["posterior"]["variances"] = [1e-4, 0.0]
     with pytest.raises(ValueError, match=r"variances: expected .* 0 without"):
         from_dict(d)
+
+
+def test_a_process_of_low_waves_keeps_the_frame_of_its_sextic():
+    """They are off it by less than 0.2 % of the radius, as facets of a smooth surface are."""
+    r, other = rough(0.002), rough(0.006)
+    assert min(r.posterior.amplitude, other.posterior.amplitude) > 0.0
+    assert r.posterior.sextic is not None and other.posterior.sextic is None
+    assert np.array_equal(r.posterior.polynomial, r.posterior.sextic.mean)
+    assert np.array_equal(r.posterior.covariance, r.posterior.sextic.covariance)
+    assert [r.patch.k1, r.patch.k2] == pytest.approx(2.0 * r.posterior.sextic.mean[[2, 4]] / r.radius)
+    for each in (r, other):
+        text = json.dumps(to_dict(each), allow_nan=False)
+        assert json.dumps(to_dict(from_dict(json.loads(text))), allow_nan=False) == text
