@@ -74,7 +74,8 @@ def cover_contacts(
     if noise > size:
         raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
     cloud = _Cloud(points, normals, cKDTree(points), noise, largest)
-    cloud.require_one_side()
+    if outward is None:
+        cloud.require_one_side()
     yield 0.0
     found = yield from _patches(cloud)
     charts = charts_of(found)

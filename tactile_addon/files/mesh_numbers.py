@@ -9,6 +9,7 @@ from . import ply_contacts
 
 STL_HEAD = 84  # The head of a binary .stl has so many bytes, the last four of which number its triangles.
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+PLY_LINE = 65_000  # Longer lines in a .ply would end Blender.
 AFTER_WORD = (1, 2, 3)  # These words follow the one that begins the line of a vertex.
 LARGEST = float(np.finfo(np.float32).max)
 
@@ -30,6 +31,9 @@ def unreadable(path):
 
 def _of_ply(data):
     rows, fields, is_text = ply_contacts.vertex_rows("", data)
+    lines = np.frombuffer(data, np.uint8, len(data) if is_text else data.find(b"end_header"))
+    if np.diff(np.flatnonzero(lines == ord("\n")), prepend=-1, append=len(lines)).max() > PLY_LINE:
+        raise ValueError
     if not is_text:
         return _of_numbers(np.stack([rows[key] for key in POINT_COLUMNS], axis=1))
     names = [name for name, _ in fields]

@@ -360,10 +360,27 @@ def test_numbers_that_blender_reads_as_0_are_found_below_any_header(command, emp
     assert "1 of them: correct or delete these" in command("map", path)[2]
 
 
-@pytest.mark.parametrize("change", [twice, listed_before])
-def test_a_ply_of_which_blender_may_read_other_vertices_is_refused(command, empty, tmp_path, change):
-    (tmp_path / "text.ply").write_bytes(rearranged("text.ply", change, "0.1"))
-    assert 'no mesh could be read from "text.ply"' in command("map", tmp_path / "text.ply")[2]
+def long_line(head, rows):
+    return head, rows.replace(b"3 0 1 2", b"3 0 1 2" + 70_000 * b" ")
+
+
+def long_comment(head, rows):
+    return head.replace("element face", f"comment {70_000 * 'a'}\nelement face"), rows
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("text.ply", twice),
+        ("text.ply", listed_before),
+        ("text.ply", long_line),
+        ("text.ply", long_comment),
+        ("binary.ply", long_comment),
+    ],
+)
+def test_a_ply_that_blender_reads_otherwise_or_ends_over_is_refused(command, empty, tmp_path, kind, change):
+    (tmp_path / kind).write_bytes(rearranged(kind, change, "0.1"))
+    assert f'no mesh could be read from "{kind}"' in command("map", tmp_path / kind)[2]
 
 
 def test_where_curves_meet_is_told_in_double_precision(command, empty, tmp_path):

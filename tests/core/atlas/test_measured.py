@@ -117,6 +117,11 @@ def test_normals_that_contradict_their_neighbors_are_refused_at_once(wrong, nois
         next(steps)
 
 
+def test_planes_of_neighbors_are_no_measured_normals_and_contradict_nothing():
+    steps = core.cover_contacts([random(ball(), np.random.default_rng(0))], outward=(0, 0, 1))
+    assert next(steps) == 0.0
+
+
 @pytest.mark.parametrize(("thickness", "noise"), [(0.05, 0.01), (0.01, 0.002), (1e-6, 0.0)])
 def test_the_two_sides_of_a_thin_plate_and_of_a_gap_contradict_nothing(thickness, noise):
     rng = np.random.default_rng(0)
