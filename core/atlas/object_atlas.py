@@ -93,6 +93,7 @@ class Atlas:
     check : contacts from outside that the patches do not have; None if there were none
     taps : contacts between the curves of each patch, to which the joined patches are fitted, too
     border : where a finger felt the surface end; None if there was none
+    is_cut_short : whether touches ended because no more were allowed, or were stopped
     """
 
     patches: tuple[Reconstruction, ...]
@@ -103,6 +104,7 @@ class Atlas:
     check: Check | None = None
     taps: tuple[Contour, ...] = ()
     border: Border | None = None
+    is_cut_short: bool = False
 
     @cached_property
     def edges(self) -> list[Edge]:
@@ -140,9 +142,14 @@ class Atlas:
         count = len(self.uncovered)
         if count:
             places = "one place" if count == 1 else f"{count} places"
+            if self.is_cut_short:
+                return "uncertain", (
+                    f"The patches end at {places} where the object goes on: allow more touches or a larger "
+                    "tolerance."
+                )
             return "uncertain", (
-                f"The patches end at {places} where the object goes on: allow more touches or a larger "
-                "tolerance."
+                f"The patches end at {places} where the object goes on, and touches found no patch there: "
+                "use a smaller tolerance."
             )
         inside = self.reference.indicator
         if inside.thinnest < THIN * inside.resolved:
@@ -216,9 +223,9 @@ class Atlas:
         missed = 0 if self.check is None else len(self.check.missed)
         wrong, count = int(self.contradicting.sum()) + missed, len(self._contacts[0]) + missed
         if wrong:
+            advice = "allow more touches" if self.is_cut_short else "use a smaller tolerance"
             return "uncertain", (
-                f"{wrong} of {count} rays from outside meet something else than the surface: allow more "
-                "touches or use a smaller tolerance."
+                f"{wrong} of {count} rays from outside meet something else than the surface: {advice}."
             )
         return "ok", "The object was felt everywhere a finger could reach."
 

@@ -178,6 +178,7 @@ def test_progress_can_end_it_with_what_is_there():
     atlas = explored(solid, progress=progress)
     assert 5 <= len(atlas.patches) <= 8
     assert told[-1][0] == len(atlas.patches)
+    assert "allow more touches" in atlas.message
     assert solids.topology(atlas.mesh(0.1).triangles).open > 0
 
 
@@ -194,6 +195,7 @@ def test_a_small_budget_leaves_places_uncovered_and_says_where_to_go_on():
     assert len(atlas.patches) <= 4
     assert atlas.status == "uncertain"
     assert "places where the object goes on: allow more touches" in atlas.message
+    assert "touches found no patch there: use a smaller" in replace(atlas, is_cut_short=False).message
     touch = atlas.next_touch()
     assert abs(solid.distance(*touch.point)) < 0.05
     assert touch.outward @ touch.point > 0.9
