@@ -51,9 +51,10 @@ def map_rows(record, unit):
     ]
 
 
-def median_rows(record, unit):
-    """(label, value) of the medians over the patches of a stability map."""
-    return [(title, value) for _, title, value in _medians(record, unit)]
+def median_rows(record, unit, more=False):
+    """(label, value) of the medians over the patches of a stability map: those in lengths, or all `more`."""
+    powers = map_object.MAP_POWERS
+    return [(title, value) for name, title, value in _medians(record, unit) if (powers[name] == 0) is more]
 
 
 def _medians(record, unit):

@@ -21,6 +21,7 @@ ADAPTIVE = {
     "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
 }
+LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
 SUPERSCRIPTS = {1: "", 2: "²"}
 
 
@@ -35,7 +36,7 @@ def unit_of(scene, size):
     name, meters = settings.length_unit, size * settings.scale_length * (1.0 + 1e-6)
     if name == "ADAPTIVE" or not 1e-1 <= meters / METERS[name][1] <= 1e4:
         names = ADAPTIVE[settings.system]
-        name = next((n for n in names if METERS[n][1] <= meters), names[-1])
+        name = next((n for n in names if LEAST.get(n, 1.0) * METERS[n][1] <= meters), names[-1])
     symbol, meters = METERS[name]
     return symbol, meters / settings.scale_length
 
