@@ -100,9 +100,14 @@ def test_a_number_that_is_left_to_the_surface_shows_what_it_has(empty, extension
 def test_a_length_that_is_dragged_in_a_dialog_is_the_operators_own(empty, extension):
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=2.0)
     name = extension.tactile_addon.probes.number_fields.fields(4.0)["extent"]
-    inputs = {"location": (0.0, 0.0, 2.0), name: 0.37}
-    assert empty.ops.tactile.reconstruct(**inputs) == {"FINISHED"}
-    assert empty.context.object["tactile"]["extent"] == pytest.approx(0.37)
+    assert empty.ops.tactile.stability_map(**{name: 0.9, "spacing": 0.8}) == {"FINISHED"}
+    assert empty.context.object["tactile_map"]["extent"] == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize("operator", ["pick", "reconstruct", "add_planes"])
+def test_what_blender_logs_has_no_properties_beside_the_inputs(empty, operator):
+    kind = getattr(empty.ops.tactile, operator).get_rna_type()
+    assert not [name for name in kind.properties.keys() if "_by_" in name]  # noqa: SIM118
 
 
 def test_what_was_found_stands_beside_auto(said, empty, ball):
