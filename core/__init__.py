@@ -7,6 +7,7 @@ has negative curvatures, because normals point outward.
 """
 
 from .atlas.boundaries import Edge
+from .atlas.expected import expected_touches
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
@@ -26,7 +27,7 @@ from .contours.contour import (
 from .contours.finger import Surface
 from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
-from .exploration.nearby import Nearby, explore_nearby, reaches_of
+from .exploration.mesh_error import height_error, judged_by_mesh
 from .exploration.one_touch import Exploration
 from .exploration.touches import explore, explore_many, exploring_many
 from .paper.by_method import SOLVERS
@@ -38,7 +39,6 @@ from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
-from .scan.mesh_error import height_error, judged_by_mesh
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
@@ -63,7 +63,6 @@ __all__ = [
     "Geometry",
     "Mesh",
     "MongePatch",
-    "Nearby",
     "NextTouch",
     "Pose",
     "Progress",
@@ -77,9 +76,9 @@ __all__ = [
     "contacts_to_csv",
     "cover_contacts",
     "distances",
+    "expected_touches",
     "explore",
     "explore_many",
-    "explore_nearby",
     "explore_object",
     "exploring_many",
     "fit_error",
@@ -90,7 +89,6 @@ __all__ = [
     "mean_height_stds",
     "overlapped",
     "reachable",
-    "reaches_of",
     "reconstruct",
     "reconstruct_many",
     "register",

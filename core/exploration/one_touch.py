@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..contours.contour import Contour, SamplingPlane
+from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
@@ -19,7 +19,9 @@ from .taps import Tapped, beside
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
 FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts (benchmarks.atlas --shapes).
-SHORTER = 1.15  # Half curves beside a contradiction are shortened so much (benchmarks.real --only taps).
+# Half curves beside a contradiction, or all those of a touch in doubt, are shortened by this factor at once
+SHORTER = 1.15  # (benchmarks.real --only taps),
+LEAST_SHARE = 0.25  # but not all of them to less than this share (benchmarks.real --only automatic).
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +111,8 @@ class Touch:
 
         def at(step: float) -> Contacts:
             """The contacts this step apart."""
-            return self.follow(self.planes, step=step)(extent), step, None
+            contours = self.follow(self.planes, step=step)(extent)
+            return contours if self.extent else [_open(c) for c in contours], step, None
 
         return (yield from self._enough(at, extent, steps))
 
@@ -129,7 +132,10 @@ class Touch:
             # The step was chosen anew, so these are other contacts than those that were explained.
             counts = np.floor(counts / STRETCH).astype(np.intp)
             found = yield from self._of_reaches(largest, counts)
-        return (yield from self._agreeing(largest, counts, found)) if self.is_tapped else found
+        if not self.is_tapped:
+            return found
+        found = yield from self._agreeing(largest, counts, found)
+        return (yield from self._shortened(found)) if self.is_grown else found
 
     def _longest(self, step: float) -> Generator[Ask, Answer, Grown]:
         """The longest half curves that fits explain, of contacts this step apart."""
@@ -159,6 +165,19 @@ class Touch:
             except DegenerateCurvesError:
                 break
         return shorter if shorter.result.status == "ok" else found
+
+    def _shortened(self, found: Exploration) -> Steps:
+        """The touch if it is sure, or else the longest of LEAST_SHARE of its extent or more that is."""
+        extent = found.extent
+        while found.result.status != "ok" and extent > LEAST_SHARE * SHORTER * found.extent:
+            extent /= SHORTER
+            try:
+                shorter, _ = self._tapped((yield from self._of_extent(extent)))
+            except ValueError:  # So short curves carry no fit, or the given step is longer.
+                break
+            if shorter.result.status == "ok":
+                return shorter
+        return found
 
     def _tapped(self, found: Exploration) -> tuple[Exploration, Array]:
         """The touch together with its taps, and the places (k, 2) where they contradict it."""
@@ -231,3 +250,9 @@ class Touch:
             if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * SHORTEST:
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
             counts.flat[worst] = max(2 * SHORTEST, int(counts.flat[worst] / STRETCH) // 2 * 2)
+
+
+def _open(contour: Contour) -> Contour:
+    """The contour, which a given extent has ended, as one that could be followed no farther."""
+    first, last = (UNEXPLAINED if stop == EXTENT else stop for stop in contour.stops or ())
+    return contour.part(slice(None), (first, last))

@@ -14,6 +14,7 @@ from ..contours.finger import Surface, contact_of, section
 from ..patch.domain import GAUSS_ALONG, SAME_END, Domain
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING, Taps
+from .mesh_error import height_error
 
 # benchmarks.real --only taps chooses these. Between the ends of two curves there are four taps at NEAR_RIM of
 # the way to the boundary, and two at WITHIN.
@@ -54,8 +55,14 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     offs[met] = np.abs((felt - feet[met]) @ up)
     offs[~met] = [_off(surface, r, vector_of(foot)) for foot in feet[~met]]
     missed, offs = np.isnan(offs), np.nan_to_num(offs)
-    contradicts = (offs > TOO_FAR_OFF * stds).any() or offs.mean() > CONTRADICTING * stds.mean()
-    taps = Taps(len(offs), int(missed.sum()), float(offs.max()) / r.radius if contradicts else 0.0)
+    within = height_error(r, surface) or 0.0
+    contradicts = (
+        (offs > TOO_FAR_OFF * stds).any()
+        or offs.mean() > CONTRADICTING * stds.mean()
+        or within > CONTRADICTING * r.mean_height_std
+    )
+    off = max(float(offs.max()), within) / r.radius if contradicts else 0.0
+    taps = Taps(len(offs), int(missed.sum()), off)
     return Tapped(taps, where[(offs > CONTRADICTING * stds) & contradicts])
 
 

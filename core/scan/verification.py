@@ -13,6 +13,7 @@ from ..arguments import Array, finite_array
 from ..contours.contour import SamplingPlane, Vector, dot
 from ..contours.finger import Surface, contact_of
 from ..contours.tracking import track
+from ..exploration.mesh_error import layer_off
 from ..patch.domain import GRID, Domain
 from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
@@ -28,12 +29,24 @@ OWN_LAYER = 1e-3  # A layer within this share of the reach is the vertex's own.
 def reachable(
     geometry: Geometry, surface: Surface, vertices: ArrayLike, normals: ArrayLike
 ) -> NDArray[np.intp]:
-    """The indices (m,) of the overlapped world vertices (n, 3) that nothing of `surface` hides from above."""
+    """The indices (m,) of the overlapped world vertices (n, 3) that a finger on the patch could meet.
+
+    Nothing of `surface` hides them from above, and no other layer of it is nearer to the patch.
+    """
     points = np.asarray(vertices, dtype=float)
     over = overlapped(geometry, points, normals)
     up = _vector(geometry.frame.axes[:, 2])
     seen = [not is_hidden(surface, _vector(point), up, 2.0 * geometry.radius) for point in points[over]]
-    return over[np.array(seen, dtype=bool)]
+    over = over[np.array(seen, dtype=bool)]
+    x, y, z = geometry.frame.to_local(points[over]).T
+    heights = geometry.height(x, y)
+    feet, offs = geometry.frame.to_world(np.column_stack([x, y, heights])).tolist(), np.abs(z - heights)
+    hair = 2.0 * OWN_LAYER * geometry.radius
+    own = [
+        off <= hair or layer_off(surface, foot, list(up), off - hair) is None
+        for foot, off in zip(feet, offs.tolist(), strict=True)
+    ]
+    return over[np.array(own, dtype=bool)]
 
 
 def verify(

@@ -42,8 +42,8 @@ def _put(probe, touched):
 def update(probe, depsgraph, complete):
     """Touches again and rewrites the probe's patch; if that fails, the probe's message says why.
 
-    complete : whether to include what takes long, an extent that suits the surface and the distances to the
-        mesh, and to put the probe onto the surface
+    complete : whether to include what takes long, as the distances to the mesh, and to put the probe onto the
+        surface
     """
     settings, patch = probe.tactile_probe, patch_of(probe)
     try:
@@ -117,11 +117,10 @@ def touch_at(probe, depsgraph, complete, **more):
     if not anchor.can_have_children(probe):
         raise ValueError("the probe has a scale of 0 or beyond all numbers: give it a scale of 1")
     arguments = touch_arguments(settings)
-    if not complete and record is not None:  # Choosing an extent anew takes long.
-        kept = {"step": 0.0, "degree": "auto"} if arguments["extent"] else {"degree": "auto"}
-        arguments |= {name: record.get(name, own) for name, own in kept.items() if arguments[name] == own}
-        if not arguments["extent"]:
-            arguments["reaches"] = _reaches(record, len(arguments["planes"]))
+    if not complete and record is not None:
+        if arguments["extent"]:  # Choosing them anew takes long.
+            kept = {"step": 0.0, "degree": "auto"}.items()
+            arguments |= {name: record.get(name, own) for name, own in kept if arguments[name] == own}
         arguments["sound"] = not settings.shape.endswith(NO_SHAPE)
     return touch(
         settings.target,
@@ -132,14 +131,6 @@ def touch_at(probe, depsgraph, complete, **more):
         **arguments,
         **more,
     )
-
-
-def _reaches(record, count):
-    """How far the half curves of a touch with so many planes begin near the last one; None to begin anew."""
-    reaches, extent = record.get("reaches"), record.get("extent")
-    if np.shape(reaches) == (count, 2):
-        return [list(both) for both in reaches]
-    return None if extent is None else [[extent, extent]] * count  # a plane has come or gone
 
 
 def _is_there(target, depsgraph):

@@ -27,7 +27,7 @@ def map_table_rows(record):
         ("refused", refused),
         ("fit", f"{record['method']}, degree {record['degree']}"),
         (", ".join(names), ", ".join(lengths)),
-        *((f"median {name}", value) for name, _, value in _medians(record, unit)),
+        *((f"median {title.lower()}", value) for title, value in _medians(record, unit)),
     ]
 
 
@@ -53,11 +53,11 @@ def map_rows(record, unit):
 
 def median_rows(record, unit):
     """(label, value) of the medians over the patches of a stability map."""
-    return [(title, value) for _, title, value in _medians(record, unit)]
+    return list(_medians(record, unit))
 
 
 def _medians(record, unit):
-    """(attribute, title, value) of each median that is known."""
+    """(title, value) of each median that is known."""
     for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:
-            yield name, title, units.say(record[f"{name}_median"], power, unit)
+            yield title, units.say(record[f"{name}_median"], power, unit)

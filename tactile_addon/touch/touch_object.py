@@ -54,7 +54,6 @@ def touch(
     step,
     noise,
     seed,
-    reaches=None,
     sound=False,
     **fit,
 ):
@@ -66,7 +65,6 @@ def touch(
     outward : the outward direction; None for the surface's normal, on the side `toward` if that is given
     tangent : azimuth 0 of the planes, or None, see core.SamplingPlane.axes
     extent, step : 0 has the surface choose, see core.explore
-    reaches : those in the report of a touch nearby, see core.explore_nearby; None begins anew
     sound : see MeshSurface
     fit : arguments of core.reconstruct
 
@@ -82,13 +80,9 @@ def touch(
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
     given = {"farthest": FARTHEST_SHARE * surface.size, "step": step or "auto", "noise": noise, **fit}
-    given |= {"rng": seed, "tangent": axes[:, 0]}
-    if reaches is None:
-        given |= {"tolerance": tolerance, "most_planes": MOST_PLANES, "extent": extent or "auto"}
-        found = _explored(core.explore, surface, point, outward, planes, **given)
-        reaches = core.reaches_of(found)
-    else:
-        found, reaches = _explored(core.explore_nearby, surface, point, outward, planes, reaches, **given)
+    given |= {"rng": seed, "tangent": axes[:, 0], "extent": extent or "auto"}
+    given |= {"tolerance": tolerance, "most_planes": MOST_PLANES}
+    found = _explored(surface, point, outward, planes, **given)
     clock.append(perf_counter())
     require_single("patch", found.result.radius, found.result.frame.origin)
     report = {
@@ -96,7 +90,6 @@ def touch(
         "method": fit["method"],
         "noise": noise,
         "seed": seed,
-        "reaches": reaches.tolist(),
         **_exploration_report(found, len(planes), (early_ends if extent else ends)(found.result.contours)),
         "axes": axes.tolist(),
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
@@ -104,10 +97,10 @@ def touch(
     return Touched(surface, found.result, report)
 
 
-def _explored(explore, surface, point, *where, **given):
-    """What `explore` of core finds. Where facets are longer than some steps, an error says so."""
+def _explored(surface, point, *where, **given):
+    """What core.explore finds. Where facets are longer than some steps, an error says so."""
     try:
-        return explore(surface, point, *where, **given)
+        return core.explore(surface, point, *where, **given)
     except core.DegenerateCurvesError as error:
         step = {"auto": FINEST_STEP * surface.size}.get(given["step"], given["step"])
         facet = surface.facet(point)

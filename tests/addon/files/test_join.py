@@ -185,3 +185,20 @@ def test_normals_without_a_direction_are_named(empty, write):
     path = write("ball.csv", [Contour(points, normals=0.0 * normals)])
     with pytest.raises(RuntimeError, match=r"Normals: expected vectors with a direction, got \(0, 0, 0\)"):
         joined(empty, [path])
+
+
+def test_normals_that_contradict_each_other_are_refused_before_anything_is_joined(empty, command, write):
+    points, normals = ball()
+    half = [Contour(points[i::2], normals=(1 - 2 * i) * normals[i::2]) for i in (0, 1)]
+    paths = [write(f"half{i}.csv", [some]) for i, some in enumerate(half)]
+    before = datablocks(empty)
+    sentence = "ormals: expected those of neighboring contacts on one side, got opposite ones at 29"
+    with pytest.raises(RuntimeError, match=sentence):
+        joined(empty, paths)
+    assert datablocks(empty) == before
+    code, _, err = command("join", *paths)
+    assert code == 1
+    assert sentence in err
+    code, _, err = command("join", paths[0], "--noise", 5)
+    assert code == 1
+    assert "oise: expected less than the size of what was felt, 4, got 5" in err

@@ -3,12 +3,14 @@
 """Probes while a handle is dragged, as in a window: what takes long waits for the end of the gesture."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+
+
+COMMON = ("extent", "step", "degree", "status", "message", "k1", "k2", "height_std")
 
 
 @pytest.fixture
@@ -58,20 +60,20 @@ def slide(bpy, probe, patch, xs):
     return reports
 
 
-def test_an_automatic_extent_follows_while_the_point_is_dragged(empty, ridge, gesture):
+def test_while_the_point_is_dragged_extent_and_verdict_are_those_of_its_end(empty, ridge, gesture):
     probe, patch = pick(empty, ridge, -0.6)
     first = report_of(patch)
-    reports = slide(empty, probe, patch, np.linspace(-0.58, 0.0, 30))
-    doubts = [report["message"] for report in reports if report["status"] != "ok"]
-    assert len(doubts) <= 2  # they are about what shorter curves would not tell better
-    assert all("principal directions" in message for message in doubts)
-    assert not any(report["is_verified"] for report in reports)
-    extents = [report["extent"] for report in reports]
+    extents = []
+    for x in np.linspace(-0.58, 0.0, 15):
+        (dragged,) = slide(empty, probe, patch, [x])
+        assert not dragged["is_verified"]
+        assert probe.empty_display_size == pytest.approx(0.6 * dragged["extent"])  # the handles fit the patch
+        gesture(empty, probe)
+        ended = report_of(patch)
+        assert ended["is_verified"]
+        assert [dragged[name] for name in COMMON] == [ended[name] for name in COMMON]
+        extents.append(ended["extent"])
     assert extents[-1] < 0.5 * first["extent"]
-    assert not any(b > 1.1 * a for a, b in pairwise(extents))  # the extent does not flicker
-    assert probe.empty_display_size == pytest.approx(0.6 * extents[-1])  # the handles fit the patch
-    back = slide(empty, probe, patch, np.linspace(-0.02, -0.6, 30))
-    assert back[-1]["extent"] > 1.5 * extents[-1]
     assert probe.tactile_probe.extent == 0.0
 
 
@@ -119,18 +121,10 @@ def test_a_plane_that_comes_while_another_is_turned_is_felt_too(empty, ridge, ge
     probe, patch = pick(empty, ridge, -0.6)
     probe.tactile_probe.plane_count = 4
     empty.context.view_layer.update()
-    assert np.shape(report_of(patch)["reaches"]) == (4, 2)
+    assert len(report_of(patch)["planes"]) == 4
     for degrees in (2, 4, 6):
         probe.tactile_probe.azimuths[0] = math.radians(degrees)
     report = report_of(patch)
     assert report["planes"][0][0] == pytest.approx(6.0)
     assert report["status"] == "ok"
     assert len(report["planes"]) == 4
-
-
-def test_reaches_that_somebody_has_edited_are_found_anew(empty, ridge, gesture):
-    probe, patch = pick(empty, ridge, -0.6)
-    for edited in ("far", [1.0], [[1.0, 2.0]]):
-        patch["tactile"]["reaches"] = edited
-        (report,) = slide(empty, probe, patch, [probe.location.x + 0.01])
-        assert np.shape(report["reaches"]) == (3, 2)

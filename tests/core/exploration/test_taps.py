@@ -91,6 +91,31 @@ def test_a_hole_that_no_curve_crosses_leaves_the_touch_in_doubt():
     assert f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface." in r.message
 
 
+def test_a_touch_in_doubt_becomes_shorter_until_it_is_sure():
+    found = explore(Sector(None, nearest=10.0, azimuths=(2.0, 58.0)))
+    assert found.result.status == "ok"
+    assert found.result.taps.missed <= DOUBTFUL_GAP * found.result.taps.number
+    assert 9.0 < found.extent < 14.0
+    assert {stop for contour in found.contours for stop in contour.stops} == {core.UNEXPLAINED}
+
+
+@pytest.mark.parametrize(("nearest", "status"), [(9.0, "ok"), (6.0, "uncertain")])
+def test_it_becomes_no_shorter_than_a_quarter(nearest, status):
+    found = explore(Sector(None, nearest=nearest, azimuths=(2.0, 58.0)))
+    assert found.result.status == status
+    assert found.extent > 0.25 * FARTHEST
+
+
+def test_a_touch_is_in_doubt_where_the_surface_is_off_within_its_rim():
+    """On this torus each tap is off by a little, and the patch by 3.3 times the deviation it expects."""
+    s = surfaces.torus(30, 22, 0.8)
+    longest = core.explore(s, s.point, s.normal, extent=20.0).result
+    assert core.height_error(longest, s) > 3.0 * longest.mean_height_std
+    shorter = core.explore(s, s.point, s.normal, farthest=20.0).result
+    assert (shorter.status, shorter.taps.off) == ("ok", 0.0)
+    assert core.height_error(shorter, s) < 3.0 * shorter.mean_height_std
+
+
 def test_a_small_hole_is_told_and_is_no_doubt():
     r = explore(Sector(None, nearest=16.0, farthest=20.0, azimuths=(10.0, 30.0))).result
     assert r.status == "ok"
@@ -110,7 +135,7 @@ def test_what_three_planes_cannot_show_is_noticed(turn):
     assert r.status != "ok" or off < 5.0 * r.mean_height_std
 
 
-SMOOTH = [surfaces.pear(), surfaces.sphere(20.0), surfaces.plane(), surfaces.torus(30, 22, 0.8)]
+SMOOTH = [surfaces.pear(), surfaces.sphere(20.0), surfaces.plane(), surfaces.torus(30, 22, 1.1)]
 
 
 def without_taps(monkeypatch):
@@ -140,8 +165,9 @@ def test_a_sheet_is_tapped_from_either_side():
         assert [(r.taps.missed, r.taps.off) for r in found] == [(found[0].taps.missed, found[0].taps.off)] * 2
 
 
-def test_many_are_judged_as_each_is():
-    surface = Sector(-4.0, nearest=1.5)
+@pytest.mark.parametrize(("floor", "nearest"), [(-4.0, 1.5), (None, 10.0)])
+def test_many_are_judged_as_each_is(floor, nearest):
+    surface = Sector(floor, nearest=nearest)
     points = np.array([[0.0, 0.0, 0.0], [-8.0, 5.0, 0.0], [0.9, 0.2, 0.0]])
     many = core.explore_many(surface, points, [UP] * 3, farthest=FARTHEST)
     for one, point in zip(many, points, strict=True):

@@ -195,6 +195,20 @@ def test_what_another_layer_hides_does_not_count():
     assert verify(r, roofed, over)["overlap"] == pytest.approx(0.5, abs=0.03)
 
 
+def test_another_layer_than_the_nearest_does_not_count():
+    """A roof over half of the patch is not what the patch was felt on, though a finger could meet it."""
+    surface = SURFACES["plane"]
+    r = touched(surface)
+    up, direction = r.frame.axes[:, 2], r.frame.axes[:, 1]
+    vertices, normals = vertices_of(surface, r)
+    roofed = Cut(surface, r.frame.origin, direction, roof=0.3 * r.radius)
+    on_roof = (vertices - r.frame.origin) @ direction < 0.0
+    assert len(seen(r, roofed, vertices[on_roof] + 0.3 * r.radius * up, normals[on_roof])) == 0
+    lifted = shifted(r, 0.3 * r.radius)  # a patch on the roof, beside which the plane is the nearest layer
+    assert len(seen(lifted, roofed, vertices[on_roof] + 0.3 * r.radius * up, normals[on_roof])) > 50
+    assert len(seen(lifted, roofed, vertices[~on_roof], normals[~on_roof])) > 50
+
+
 def test_no_mesh_below():
     surface = SURFACES["plane"]
     r = shifted(touched(surface), 3.0 * EXTENT)

@@ -23,7 +23,7 @@ def height_error(r: Reconstruction, surface: Surface) -> float | None:
     heights = r.height(points[:, 0], points[:, 1])
     up = r.frame.axes[:, 2].tolist()
     starts = r.frame.to_world(np.column_stack([points, heights])).tolist()
-    offs = [_height_off(surface, start, up, r.radius) for start in starts]
+    offs = [layer_off(surface, start, up, r.radius) for start in starts]
     met = [i for i, off in enumerate(offs) if off is not None]
     return float(np.average([offs[i] or 0.0 for i in met], weights=weights[met])) if met else None
 
@@ -43,7 +43,7 @@ def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
     )
 
 
-def _height_off(surface: Surface, start: list[float], up: list[float], reach: float) -> float | None:
+def layer_off(surface: Surface, start: list[float], up: list[float], reach: float) -> float | None:
     """How far along `up`, in either direction, the nearest layer with its outside up is; None beyond `reach`.
 
     Layers that are seen from inside are another wall of the object, or its other side.

@@ -9,7 +9,7 @@ import pytest
 import surfaces
 
 import core
-from core.scan.mesh_error import CONTRADICTING
+from core.exploration.mesh_error import CONTRADICTING
 
 
 class Levels:
