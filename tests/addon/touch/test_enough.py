@@ -104,7 +104,7 @@ def test_while_a_gesture_goes_on_the_extent_is_near_that_before(empty, sheet, ex
     going, ended = (touch_at(probe, depsgraph, complete=complete).report for complete in (False, True))
     assert going["extent"] == pytest.approx(before["extent"], rel=0.1)
     stops = [{stop for pair in report["stops"] for stop in pair} for report in (going, ended)]
-    assert stops == [{"not explained"}, {"not explained", "no contact"}]
+    assert stops == [{"fit no longer matched"}, {"fit no longer matched", "no contact"}]
     assert going["message"].endswith("All half curves end where the patch could no longer be trusted.")
     assert re.search(r" \d of 6 half curves end (at|where) .*, \d (at|where) .*\.$", ended["message"])
 
