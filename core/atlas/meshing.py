@@ -150,6 +150,7 @@ def meshed(
         yield 0.7
         vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
     found = yield from creased(charts, vertices, triangles, surface.normal, edge)
+    yield 0.9
     surface = surface.chosen(np.append(np.arange(len(vertices)), found.parents))
     surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * found.unfelt))
     return (yield from _felt(found.vertices, found.triangles, surface, indicator.cell, ended))
@@ -293,5 +294,6 @@ def _felt(
             off += np.bincount(piece[some], np.where(ended(vertices[some]), 1.0, -1.0), count)
             yield 0.9
         gone[outer] = off[piece[outer]] > 0.0
+    yield 0.9
     std = np.where(surface.node < 0, cell, surface.std)
     return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))
