@@ -15,7 +15,8 @@ for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
     os.environ[f"{library}_NUM_THREADS"] = "1"  # numpy reads this once, on import.
 
 ROOT = Path(__file__).resolve().parents[1]
-SCANS_FOLDER = ROOT.parent / "shared" / "data" / "meshes"
+# docs/scans.md says where the nine scans are from.
+SCANS_FOLDER = Path(os.environ.get("TACTILE_SCANS", ROOT.parent / "shared" / "data" / "meshes"))
 
 
 def machine(*packages):

@@ -4,6 +4,7 @@
 
 `python -m benchmarks.add_menu ZIP [--only NAME]`, from the root of a checkout; ZIP is the built extension.
 It prints a Markdown table and draws build/charts/add_menu.png, objects above and what was felt of them below.
+With --expected it only prints how many touches the dialog expects of each, which takes seconds.
 
 Deviations are those of the report, both ways between surface and object, in tolerances (1/500 of the size).
 Open edges, Euler number and pieces are of the touched surface, and in brackets of the object where these
@@ -70,6 +71,16 @@ def touched(add):
     start = process_time()
     bpy.ops.tactile.touch_all_over(target=source.name)
     return source, bpy.context.view_layer.objects.active, process_time() - start
+
+
+def expected(addon, add):
+    """How many touches the dialog expects of the object that a function adds."""
+    import bpy
+
+    add()
+    mesh = addon.touch.detached_mesh.DetachedMesh(bpy.context.object, bpy.context.evaluated_depsgraph_get())
+    tolerance = addon.whole_object.object_touches.tolerance_of(mesh.size, "normal", 0.0)
+    return addon.whole_object.expected.expected(mesh, tolerance, 0.0)[0]
 
 
 def shape_of(obj, *, merged):
@@ -142,13 +153,20 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, help="the built extension")
     parser.add_argument("--only", default="", help="only objects with this in their names")
+    parser.add_argument("--expected", action="store_true", help="print only the touches that are expected")
     options = parser.parse_args()
     rows, pairs = [], []
     with blender.quiet():
-        blender.start(options.zip)
+        addon = blender.start(options.zip).tactile_addon
         import bpy
 
         bpy.ops.wm.read_homefile(use_empty=True)
+        if options.expected:
+            rows = [[name, f"{expected(addon, add)}"] for name, add in shapes().items()]
+    if options.expected:
+        table(["object", "touches expected"], rows)
+        return
+    with blender.quiet():
         for name, add in shapes().items():
             if options.only in name:
                 source, made, seconds = touched(add)

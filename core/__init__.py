@@ -7,10 +7,13 @@ has negative curvatures, because normals point outward.
 """
 
 from .atlas.boundaries import Edge
+from .atlas.expected import expected_touches
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
 from .atlas.touching import Progress, explore_object, touch_all_over
+from .contact_data.rows import Contacts
+from .contact_data.table import UNIT_METERS, contacts_from_csv, contacts_to_csv
 from .contours.common_point import common_point, in_running_order
 from .contours.contour import (
     CREASE,
@@ -49,7 +52,9 @@ __all__ = [
     "NO_CONTACT",
     "SOLVERS",
     "UNEXPLAINED",
+    "UNIT_METERS",
     "Atlas",
+    "Contacts",
     "Contour",
     "DegenerateCurvesError",
     "Domain",
@@ -68,8 +73,11 @@ __all__ = [
     "atlas_of",
     "azimuth_of",
     "common_point",
+    "contacts_from_csv",
+    "contacts_to_csv",
     "cover_contacts",
     "distances",
+    "expected_touches",
     "explore",
     "explore_many",
     "explore_object",

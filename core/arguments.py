@@ -101,7 +101,7 @@ def number(name: str, value: float, *, above: float | None = None, least: float 
     What is to be above 0 is SMALLEST or more, so that its shares are above 0, too.
     """
     try:
-        if getattr(value, "ndim", 0) or isinstance(value, np.complexfloating):
+        if getattr(value, "ndim", 0) or isinstance(value, np.complexfloating | np.ma.MaskedArray):
             raise TypeError
         result = float(value)
     except (TypeError, ValueError, OverflowError):

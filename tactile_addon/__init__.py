@@ -15,7 +15,7 @@ from .scene import color_range
 from .sidebar import dots, panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick, tool
-from .whole_object import object_operator
+from .whole_object import kept, object_operator, surface_operators
 
 CLASSES = (
     operators.TACTILE_OT_reconstruct,
@@ -23,6 +23,7 @@ CLASSES = (
     register_operator.TACTILE_OT_register,
     map_operator.TACTILE_OT_stability_map,
     object_operator.TACTILE_OT_touch_all_over,
+    *surface_operators.CLASSES,
     pick.TACTILE_OT_pick,
     drag.TACTILE_OT_drag,
     gizmos.TACTILE_GGT_handles,
@@ -75,6 +76,7 @@ def unregister():
     tool.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    kept.forget()
     dots.unregister()
     map_object.unregister()
     color_range.unregister()

@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from .. import core
 from .command_run import Misuse, run, write
-from .files import contact_file
 from .touch.settings import METHODS, SOLVERS
 
 NOT_OF_ALL = (
@@ -97,7 +97,7 @@ def _add_fit(command):
 def _add_contacts(add, help):
     """Adds the options of measured contacts."""
     add("files", nargs="+", type=Path, metavar="FILE", help=help)
-    add("--unit", choices=list(contact_file.UNIT_METERS), help="unit of the numbers (the file's)")
+    add("--unit", choices=list(core.UNIT_METERS), help="unit of the numbers (the file's)")
     add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
     add("--flip", action="store_true", default=None, help="use the other side as the outer one")
     add("--noise", type=float, help="least standard deviation of a contact")

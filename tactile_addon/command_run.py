@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import bpy
 
+from .. import core
 from .comparison.register_operator import register_patch
 from .comparison.verification_wording import verification_columns
 from .comparison.verify_operator import verify_patch
@@ -173,7 +174,7 @@ def _open_contacts(options):
         settings = bpy.context.scene.unit_settings
         name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
         settings.system = "METRIC" if unit else "NONE"
-        settings.scale_length = contact_file.UNIT_METERS.get(unit, 1.0)
+        settings.scale_length = core.UNIT_METERS.get(unit, 1.0)
         if name in ADAPTIVE["METRIC"]:
             settings.length_unit = name
     paths = [path.absolute() for path in options.files]

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, settings
 
 from tools import blender
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
+BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data" / "meshes"
+DATA = Path(os.environ.get("TACTILE_SCANS", BESIDE))  # docs/scans.md says where they are from.
 
 # The quick and short ones draw the same examples every time, so that no test fails by chance.
 COMMON = {"deadline": None, "suppress_health_check": list(HealthCheck)}
@@ -85,5 +86,5 @@ def files(empty, ball, tmp_path):
 def scans():
     """The folder of real scans."""
     if not DATA.is_dir():
-        pytest.skip("the real scans of ../shared/data are not here")
+        pytest.skip("the scans are not here: docs/scans.md")
     return DATA

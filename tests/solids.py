@@ -92,6 +92,22 @@ def prism(sides, radius=1.0, half=0.6):
     )
 
 
+def cone(radius=0.4, height=1.0):
+    """A cone on the plane z = 0, with its tip on z."""
+    slope = math.hypot(radius, height)
+
+    def distance(x, y, z):
+        r = math.hypot(x, y)
+        side = (height * (r - radius) + radius * z) / slope
+        along = min(max((radius * (radius - r) + height * z) / slope, 0.0), slope)  # from the base to the tip
+        on_side = math.hypot(r - radius + along * radius / slope, z - along * height / slope)
+        if max(side, -z) <= 0.0:
+            return max(side, -z)
+        return min(on_side, math.hypot(max(r - radius, 0.0), z))
+
+    return Solid(distance, (radius / 2.0, 0.0, height / 2.0), (height / slope, 0.0, radius / slope))
+
+
 @dataclass(frozen=True)
 class Convex(Solid):
     """A solid of flat walls, which answer rays at once: walking along a wall takes many steps.

@@ -13,6 +13,7 @@ from tools import build, check_site, release
 
 ROOT = Path(__file__).resolve().parents[1]
 CHANGES = "# Changelog\n\n## [1.2.0] - {}\n\n### Added\n\n- More.\n\n## [1.1.0] - 2026-01-02\n\n- Less.\n"
+URLS = [(name, f"https://example.org/{name}") for name in ("Documentation", "Repository", "Extensions")]
 
 
 def git(folder, *arguments):
@@ -26,6 +27,8 @@ def checkout(tmp_path):
     (tmp_path / "blender_manifest.toml").write_text('version = "1.2.0"\n')
     (tmp_path / "CITATION.cff").write_text("title: T\nversion: 1.2.0\n")
     (tmp_path / "CHANGELOG.md").write_text(CHANGES.format("2026-11-22"))
+    (tmp_path / "pyproject.toml").write_text("[project.urls]\n" + "".join(f'{n} = "{a}"\n' for n, a in URLS))
+    (tmp_path / "README.md").write_text(" ".join(address for _, address in URLS))
     git(tmp_path, "init")
     git(tmp_path, "add", ".")
     git(tmp_path, "commit", "--message", "All")
@@ -44,9 +47,20 @@ def test_what_agrees_can_be_released(checkout):
         ("CHANGELOG.md", CHANGES.format("unreleased"), "has [1.2.0] - unreleased: give it the date"),
         ("CHANGELOG.md", "## [1.1.0] - 2026-01-02\n", "does not begin with a section [1.2.0]"),
         ("CHANGELOG.md", "## [1.2.0] - 2026-01-02\n\n", "says nothing in its section [1.2.0]"),
+        (
+            "CHANGELOG.md",
+            "## [Unreleased]\n\n- M.\n\n## [1.2.0] - 2026-01-02\n\n- L.\n",
+            "section [Unreleased]: move",
+        ),
         ("CITATION.cff", "version: 1.1.0\n", "has another version than the manifest's 1.2.0"),
         ("blender_manifest.toml", 'version = "1.2"\n', "expected three numbers"),
         ("blender_manifest.toml", 'version = "1.3.0"\n', "no tag v1.3.0: git tag v1.3.0"),
+        (
+            "pyproject.toml",
+            "[project]\n",
+            "pyproject.toml has no address of the Repository in [project.urls]",
+        ),
+        ("README.md", "make zip", "README.md does not have https://example.org/Extensions: name it under"),
     ],
 )
 def test_what_does_not_agree_is_said(checkout, name, text, words):
@@ -54,6 +68,12 @@ def test_what_does_not_agree_is_said(checkout, name, text, words):
     reasons = list(release.disagreements(checkout))
     assert any(words in reason for reason in reasons), reasons
     assert "there are changes that are not committed: commit them" in reasons
+
+
+def test_an_empty_section_of_what_is_not_released_may_stay(checkout):
+    text = (checkout / "CHANGELOG.md").read_text()
+    (checkout / "CHANGELOG.md").write_text(text.replace("## [1.2.0]", "## [Unreleased]\n\n## [1.2.0]"))
+    assert list(release.disagreements(checkout)) == ["there are changes that are not committed: commit them"]
 
 
 def test_a_commit_after_the_tag_is_no_release(checkout):
@@ -83,6 +103,20 @@ def test_the_manual_that_ships_leads_nowhere_else(tmp_path):
     text = (tmp_path / "manual" / "viewport.html").read_text(encoding="utf-8")
     assert 'href="messages.html"' in text
     assert ".md" not in text
+
+
+def test_a_refused_release_says_how_to_get_a_zip_without_one(monkeypatch):
+    monkeypatch.setattr(release, "disagreements", lambda _: ["there is no tag"])
+    with pytest.raises(SystemExit, match=r"release: there is no tag\nrelease: without a release, `make zip`"):
+        release.main()
+
+
+@pytest.mark.parametrize("urls", [{}, {"Documentation": "https://example.org/docs"}])
+def test_the_manifest_has_the_website_that_is_published(tmp_path, monkeypatch, urls):
+    monkeypatch.setattr(build, "urls", lambda: urls)
+    build.stage(tmp_path / "staged", [], [])
+    staged = tomllib.loads((tmp_path / "staged" / build.MANIFEST.name).read_text(encoding="utf-8"))
+    assert staged.get("website") == urls.get("Documentation")
 
 
 def test_a_zip_of_a_series_has_its_wheels_and_its_blenders_and_no_other(tmp_path, monkeypatch):

@@ -18,6 +18,7 @@ ROOMS = {
         "arguments",
         "lapack",
         "contours",
+        "contact_data",
         "patch",
         "paper",
         "bayes",
@@ -82,7 +83,12 @@ def test_core_knows_no_blender_and_the_add_on_none_of_its_rooms():
         assert all(imported.startswith("core") for imported in imports(name, path)), name
         assert "bpy" not in path.read_text(encoding="utf-8").replace("without bpy", ""), name
     for name, path in modules("tactile_addon"):
-        assert {found for found in imports(name, path) if "core" in found} <= {"core", "core.arguments"}, name
+        assert {found for found in imports(name, path) if "core" in found} <= {
+            "core",
+            "core.arguments",
+            "core.contact_data",
+            "core.contact_data.rows",
+        }, name
 
 
 def test_what_is_shipped_knows_no_cluster():

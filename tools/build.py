@@ -24,6 +24,7 @@ import markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 MANIFEST = ROOT / "blender_manifest.toml"
+PROJECT = ROOT / "pyproject.toml"
 # Blender's own list of patterns can only exclude files. So what ships is named here, and nothing else that
 # lies in a checkout, such as an environment or a scan, can get into a release.
 SHIPPED = ("__init__.py", "LICENSE", "core", "presets", "tactile_addon")
@@ -32,8 +33,10 @@ SHIPPED = ("__init__.py", "LICENSE", "core", "presets", "tactile_addon")
 DOCS = ROOT / "docs"
 MANUAL = ("viewport", "lesson", "messages")
 PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Tactile Patch</title>
+<meta name="viewport" content="width=device-width">
 <style>body {{ max-width: 50em; margin: 2em auto; padding: 0 1em; font: 1rem/1.5 sans-serif; }}
-img {{ max-width: 100%; }} td, th {{ padding: 0.2em 1em 0.2em 0; text-align: left; }}
+img {{ max-width: 100%; }} table {{ display: block; overflow-x: auto; }}
+td, th {{ padding: 0.2em 1em 0.2em 0; text-align: left; }}
 pre {{ background: #eee; padding: 1em; overflow: auto; }}</style>
 {}
 </html>
@@ -118,6 +121,11 @@ def host_platform() -> str:
     return f"{system}-{MACHINES.get(machine, machine)}"
 
 
+def urls(project: Path = PROJECT) -> dict[str, str]:
+    """The addresses of what is published, by their names in pyproject.toml; none until somebody publishes."""
+    return dict(tomllib.loads(project.read_text(encoding="utf-8"))["project"].get("urls", {}))
+
+
 def wheel_platform(wheel: str) -> str:
     """The platform of a wheel, by Blender's name."""
     tag = Path(wheel).stem.rsplit("-", 1)[1]
@@ -174,6 +182,9 @@ def stage(folder: Path, platforms: list[str], wheels: list[str], series: tuple[s
         array = f"{key} = {json.dumps(values)}\n" if values else ""
         text = re.sub(rf"^{key} = \[[^]]*\]\n", array, text, flags=re.MULTILINE)
         expected[key] = values
+    if website := urls().get("Documentation"):
+        text = re.sub(r"^license = ", f'website = "{website}"\nlicense = ', text, flags=re.MULTILINE)
+        expected["website"] = website
     limits = dict(zip(("blender_version_min", "blender_version_max"), series, strict=False))
     if limits:
         lines = "".join(f'{key} = "{value}"\n' for key, value in limits.items())

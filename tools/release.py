@@ -21,7 +21,8 @@ from pathlib import Path
 from tools import build
 
 ROOT = Path(__file__).resolve().parents[1]
-SECTION = re.compile(r"^## \[(.+?)\] - (\S+)\n(.*?)(?=^## \[|\Z)", re.DOTALL | re.MULTILINE)
+SECTION = re.compile(r"^## \[([^]]+)\] - (\S+)\n(.*?)(?=^## \[|\Z)", re.DOTALL | re.MULTILINE)
+UNRELEASED = re.compile(r"^## \[Unreleased\]\n\s*(?!## \[)\S", re.MULTILINE)
 DATE = re.compile(r"\d{4}-\d\d-\d\d")
 VERSION = re.compile(r"\d+\.\d+\.\d+")
 
@@ -29,6 +30,7 @@ VERSION = re.compile(r"\d+\.\d+\.\d+")
 def main() -> None:
     reasons = list(disagreements(ROOT))
     if reasons:
+        reasons.append("without a release, `make zip` makes the same zips to install, in build/dist")
         sys.exit("\n".join(f"release: {reason}" for reason in reasons))
     version = manifest_version(ROOT)
     folder = folder_of_version()
@@ -67,16 +69,30 @@ def disagreements(root: Path) -> Iterator[str]:
         yield f"CHANGELOG.md has [{version}] - {date}: give it the date of the release, as in 2026-01-31"
     elif not text:
         yield f"CHANGELOG.md says nothing in its section [{version}]: write what is new"
+    if UNRELEASED.search((root / "CHANGELOG.md").read_text(encoding="utf-8")):
+        yield f"CHANGELOG.md has changes in its section [Unreleased]: move them to [{version}]"
     if f"\nversion: {version}\n" not in (root / "CITATION.cff").read_text(encoding="utf-8"):
         yield f"CITATION.cff has another version than the manifest's {version}: change it"
+    yield from unpublished(root)
     if git(root, "status", "--porcelain"):
         yield "there are changes that are not committed: commit them"
     if f"v{version}" not in git(root, "tag", "--points-at", "HEAD").split():
         yield f"this commit has no tag v{version}: git tag v{version}"
 
 
+def unpublished(root: Path) -> Iterator[str]:
+    """Yields a sentence for each address that is not known, or that the first page does not have."""
+    found = build.urls(root / "pyproject.toml")
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    for name in ("Documentation", "Repository", "Extensions"):
+        if name not in found:
+            yield f"pyproject.toml has no address of the {name} in [project.urls]: fill it in"
+        elif found[name] not in readme:
+            yield f"README.md does not have {found[name]}: name it under Install, in place of `make zip`"
+
+
 def section(root: Path, version: str) -> tuple[str | None, str]:
-    """Date and text of the changelog's first section; None and "" if it is of another version."""
+    """Date and text of the changelog's first version; None and "" if it is another one."""
     found = SECTION.search((root / "CHANGELOG.md").read_text(encoding="utf-8"))
     if found is None or found[1] != version:
         return None, ""

@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What MkDocs does besides its own work: it adds two pages that are not in docs, and draws formulas.
+"""What MkDocs does besides its own work: it adds pages that are not in docs, and draws formulas.
 
 mkdocs.yml names this file as a hook.
 """
 
 import re
+import tomllib
 from pathlib import Path
 
 from latex2mathml.converter import convert
@@ -18,6 +19,13 @@ FENCE = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
 CODE = re.compile(r"`[^`]*`")
 DISPLAY = re.compile(r"^\$\$(.+?)\$\$$", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"\$(\S(?:[^$\n]*\S)?)\$")
+
+
+def on_config(config):
+    """Takes the site's and the source's addresses from pyproject.toml, once they are there."""
+    urls = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"].get("urls", {})
+    config.site_url, config.repo_url = urls.get("Documentation"), urls.get("Repository")
+    return config
 
 
 def on_files(files, config):

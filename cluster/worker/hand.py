@@ -14,9 +14,12 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
+
+import bpy
 
 from ..data_set import manifest
 from ..data_set.columns import FOUND, kind_of
@@ -99,6 +102,8 @@ def answered(run: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, 
 def main() -> None:
     """Answers orders until there are no more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # The process that started it handles Ctrl+C.
+    with suppress(OSError):  # Blender's own folder would stay, because this process is killed in the end.
+        os.rmdir(bpy.app.tempdir)
     connection, orders = Connection(int(sys.argv[1])), queue.SimpleQueue()
     threading.Thread(target=_listen, args=(connection, orders), daemon=True).start()
     hand = Hand()

@@ -47,7 +47,10 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
 
     near : the finger feels the surface where that is within this length of the mesh
     """
+    if mesh.is_closed:
+        return Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
     at, before, after, ways = _rim_of(mesh)
+    yield 0.0
     places, normals = mesh.vertices[at], mesh.normals[at]
 
     def off(points: Array, which: Indices) -> Array:

@@ -180,26 +180,30 @@ class Charts:
         )
 
     def stds_at(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
-        """Deviations (m,) of the heights at local (x, y), which are those of the nearest knots."""
+        """Deviations (m,) of the heights at local (x, y), linear between knots."""
         pitch = (2.0 * self.halves / (SIDE - 1))[node]
-        nearest = np.rint(np.array([x, y]) / pitch + 0.5 * (SIDE - 1)).astype(np.intp)
-        column, row = np.minimum(np.maximum(nearest, 0), SIDE - 1)
-        found: Array = self.stds.ravel().take((node * SIDE + column) * SIDE + row)
-        return found
+        at = np.clip(np.array([x, y]) / pitch + 0.5 * (SIDE - 1), 0.0, SIDE - 1.0)
+        first = np.minimum(at.astype(np.intp), SIDE - 2)
+        right, up = at - first
+        start, stds = (node * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
+        left = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
+        start += SIDE
+        found: Array = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
+        return left + right * (found - left)
 
     @cached_property
     def mean_stds(self) -> Array:
         """The mean deviation of the heights over each domain, (n,), a length."""
-        inside = self._inside()
+        inside = self.inside(1.0)
         sums: Array = (self.stds * inside).sum(axis=(1, 2)) / np.maximum(inside.sum(axis=(1, 2)), 1)
         return self.radii * sums
 
-    def _inside(self) -> NDArray[np.bool_]:
-        """Which knots are inside the domains, (n, SIDE, SIDE)."""
-        count = len(self.radii)
-        x, y = self.knots().reshape(2, -1)
-        shares = self.shares(x, y, np.repeat(np.arange(count), SIDE**2))
-        return (shares <= 1.0).reshape(count, SIDE, SIDE)
+    def inside(self, share: float) -> NDArray[np.bool_]:
+        """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""
+        every, found = self.knots(), []
+        for i, (x, y) in enumerate(zip(*every.reshape(2, len(self.radii), -1), strict=True)):
+            found.append(self.shares(x, y, np.full(len(x), i)) <= share)
+        return np.reshape(found, self.heights.shape)
 
     def knots(self) -> Array:
         """Local x and y of all knots, (2, n, SIDE, SIDE)."""

@@ -7,7 +7,7 @@ on two walls crosses their crease. The end that is near the crease moves onto it
 At a corner one triangle has its vertices on three walls.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -23,17 +23,31 @@ SHARP = 0.87  # Two walls meet at a crease where the cosine between their normal
 AWAY = 1.5  # A crease is at most so many edges of the mesh from the middle of the edge that crosses it.
 SNAP = 0.35  # A vertex that is nearer to a crease than this share of an edge moves onto it.
 NEWTON = 3  # The planes of walls are intersected so often.
-ROUND = 0.25  # A crease that is farther than this share of an edge from another patch is rounded.
+ROUND = 0.02  # A crease that is farther than this share of an edge from another patch is rounded.
 SIDES_AT_ONCE = 1000  # A step intersects so many walls.
 LEAST = 1e-12  # Walls are parallel below this share of their squared sines.
 
 
 class Creased(NamedTuple):
-    """Vertices (n, 3), triangles (m, 3), and a vertex beside each of the last k vertices, `parents` (k,)."""
+    """A mesh with creases.
+
+    vertices, triangles : (n, 3) and (m, 3)
+    parents : (k,), a vertex beside each of the last k vertices
+    unfelt : (n,), how far from what patches reach the vertices are that moved or came
+    """
 
     vertices: Array
     triangles: Indices
     parents: Indices
+    unfelt: Array
+
+
+class _Met(NamedTuple):
+    """Points (n, 3) where walls meet, how far patches are from there (n,), and whether they meet (n,)."""
+
+    points: Array
+    unfelt: Array
+    met: NDArray[np.bool_]
 
 
 def creased(
@@ -44,7 +58,7 @@ def creased(
     normals : (n, 3), those of the walls on which the vertices (n, 3) lie
     edge : the length of the edges
     """
-    vertices, free = vertices.copy(), np.ones(len(vertices), dtype=bool)
+    vertices, free, unfelt = vertices.copy(), np.ones(len(vertices), dtype=bool), np.zeros(len(vertices))
     sides = sides_of(triangles, len(vertices))
     yield 0.9
     sharp = np.einsum("ni,ni->n", normals[sides[:, 0]], normals[sides[:, 1]]) < SHARP
@@ -55,61 +69,91 @@ def creased(
     a, b, c = normals[some].transpose(1, 0, 2)
     turned = [np.einsum("ni,ni->n", u, v) < SHARP for u, v in ((a, b), (b, c), (c, a))]
     some = some[np.all(turned, axis=0)]
-    corners, met = _intersections(charts, vertices[some], normals[some], edge)
-    for corner, ends in zip(corners[met], some[met], strict=True):
-        if free[ends].all():
-            nearest = ends[np.argmin(((vertices[ends] - corner) ** 2).sum(axis=1))]
-            vertices[nearest], free[nearest] = corner, False
+    for corner, beyond, at in _corners(charts, vertices, normals, some, edge):
+        vertices[at], unfelt[at], free[at] = corner, beyond, False
     yield 0.9
     sides = sides[free[sides].all(axis=1)]
     parts = []
     for few in np.array_split(sides, len(sides) // SIDES_AT_ONCE + 1):
         parts.append(_intersections(charts, vertices[few], normals[few], edge))
         yield 0.9
-    points, met = (np.concatenate(values) for values in zip(*parts, strict=True))
-    sides, points = sides[met], points[met]
+    points, off, met = (np.concatenate(values) for values in zip(*parts, strict=True))
+    sides, points, off = sides[met], points[met], off[met]
     away = np.linalg.norm(vertices[sides] - points[:, None], axis=2)
     nearer = away.argmin(axis=1)
     order = np.argsort(away.min(axis=1), kind="stable")
     order = order[away.min(axis=1)[order] < SNAP * edge]
     moved, first = np.unique(sides[order, nearer[order]], return_index=True)
-    vertices[moved], free[moved] = points[order[first]], False
+    vertices[moved], unfelt[moved], free[moved] = points[order[first]], off[order[first]], False
     left = free[sides].all(axis=1)
     split = split_sides(triangles, sides[left], len(vertices))
-    return Creased(np.vstack([vertices, points[left]]), split, sides[left, 0])
+    unfelt = np.concatenate([unfelt, off[left]])
+    return Creased(np.vstack([vertices, points[left]]), split, sides[left, 0], unfelt)
 
 
-def _intersections(
-    charts: Charts, places: Array, normals: Array, edge: float
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Points (n, 3) where walls meet, and whether they do (n,).
+def _corners(
+    charts: Charts, vertices: Array, normals: Array, triangles: Indices, edge: float
+) -> Iterator[tuple[Array, float, int]]:
+    """Corners (3,) of triangles on three walls, how far patches are from there, and vertices that move there.
+
+    Near a tip several triangles have the same corner: the vertex is of as many of these as possible.
+    """
+    corners, off, met = _intersections(charts, vertices[triangles], normals[triangles], edge)
+    corners, off, triangles = corners[met], off[met], triangles[met]
+    while len(corners):
+        same = np.linalg.norm(corners - corners[0], axis=1) < SNAP * edge
+        ends, counts = np.unique(triangles[same], return_counts=True)
+        ends = ends[counts == counts.max()]
+        nearest = ends[np.argmin(((vertices[ends] - corners[0]) ** 2).sum(axis=1))]
+        yield corners[0], float(off[0]), int(nearest)
+        left = ~same & (triangles != nearest).all(axis=1)
+        corners, off, triangles = corners[left], off[left], triangles[left]
+
+
+def _intersections(charts: Charts, places: Array, normals: Array, edge: float) -> _Met:
+    """Where walls meet.
 
     places, normals : (n, 2 or 3, 3), a place on each wall, and its normal there
     """
     count, middle = normals.shape[1], places.mean(axis=1)
-    apart = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2).max(axis=1)
-    near = AWAY * np.maximum(edge, apart)
+    longest = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2).max(axis=1)
+    near = AWAY * np.maximum(edge, longest)
     points, met = middle.copy(), np.ones(len(places), dtype=bool)
     for _ in range(NEWTON):
-        up = normals.copy()
+        up, felt = normals.copy(), np.zeros(len(places), dtype=bool)
         # Where no patch reaches, the wall goes on as a plane.
         distance = np.einsum("nki,nki->nk", points[:, None] - places, normals)
         for i in range(count):
             wall = wall_facing(charts, points, normals[:, i], near)
             there = wall.node >= 0
+            felt |= there
             up[there, i], distance[there, i] = wall.normal[there], wall.distance[there]
-        gram = up @ np.swapaxes(up, 1, 2)
-        for i in range(count):
-            met &= np.abs(gram[:, i, i - 1]) < SHARP
-        gram[~met] = np.eye(count)
-        steps = np.linalg.solve(gram + LEAST * np.eye(count), distance[..., None])
-        points -= np.where(met[:, None], (up * steps).sum(axis=1), 0.0)
+        steps, apart = _steps(up, distance)
+        met &= apart
+        points += np.where(met[:, None], steps, 0.0)
         met &= np.linalg.norm(points - middle, axis=1) < near
+    if count == 3:  # Near a tip the walls of patches merge, but the planes of the vertices still meet there.
+        distance = np.einsum("nki,nki->nk", middle[:, None] - places, normals)
+        steps, apart = _steps(normals, distance)
+        tip = ~met & apart & (np.linalg.norm(steps, axis=1) < near)
+        points, met, felt = np.where(tip[:, None], middle + steps, points), met | tip, felt & ~tip
     between = normals.sum(axis=1)
     between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), LEAST)
     pairs = charts.pairs(points, edge)
     toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.place])
     own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.place]).max(axis=1)
-    rounded = (toward > own) & (pairs.share < 1.0) & (np.abs(pairs.distance) > 0.02 * edge)
+    rounded = (toward > own) & (pairs.share < 1.0) & (np.abs(pairs.distance) > ROUND * edge)
     met[pairs.place[rounded]] = False
-    return points, met
+    return _Met(points, np.where(felt, 0.0, np.linalg.norm(points - middle, axis=1)), met)
+
+
+def _steps(normals: Array, distance: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """The shortest steps (n, 3) onto planes with these normals (n, k, 3) at signed distances (n, k).
+
+    Also whether the planes are turned enough, (n,).
+    """
+    gram, count = normals @ np.swapaxes(normals, 1, 2), normals.shape[1]
+    apart = np.all([np.abs(gram[:, i, i - 1]) < SHARP for i in range(count)], axis=0)
+    gram[~apart] = np.eye(count)
+    steps = np.linalg.solve(gram + LEAST * np.eye(count), distance[..., None])
+    return -(normals * steps).sum(axis=1), apart

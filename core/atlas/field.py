@@ -133,19 +133,19 @@ def walls_at(charts: Charts, pairs: Pairs, count: int) -> list[Blend]:
 
 def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, room: float) -> Surface:
     """The surface within a length of places (k, 3) that faces about as `up` (k, 3)."""
-    found = _surface(charts, indicator, points, up, room, MARGIN)
+    found = patched(charts, indicator, points, up, room)
     lost = np.flatnonzero(found.node < 0)
     if len(lost):
-        farther = _surface(charts, indicator, points[lost], up[lost], room, CONTINUED)
+        farther = patched(charts, indicator, points[lost], up[lost], room, CONTINUED)
         for old, new in zip(found, farther, strict=True):
             old[lost] = new
     return found
 
 
-def _surface(
-    charts: Charts, indicator: Indicator, points: Array, up: Array, room: float, margin: float
+def patched(
+    charts: Charts, indicator: Indicator, points: Array, up: Array, room: float, margin: float = MARGIN
 ) -> Surface:
-    """The surface of `surface_at`, of patches that count as far out as a margin."""
+    """The surface of `surface_at`, but only where patches are that count as far out as a margin."""
     pairs, count = charts.pairs(points, room, margin), len(points)
     pairs = pairs.chosen(np.einsum("mi,mi->m", pairs.normal, up[pairs.place]) > SIDEWAYS)
     share = np.full(count, np.inf)

@@ -41,6 +41,7 @@ SLIVER = 0.03  # The blend of patches bridges what is new if it is less than thi
 TRIES = 3  # Touches go on from a place at most so many times.
 LOOK = 15  # So many other places are looked at together with the first of the queue, which is faster.
 ALONG = 0.9  # A direction is along another if the cosine of the angle between them is more.
+PLACES_AT_ONCE = 2000  # A step looks whether so many places are covered.
 TOUCHES_APART = 2.2  # Touches that are made side by side are so many radii apart.
 
 # Kernels of linear algebra round differently, which may not choose between what is equal but for rounding.
@@ -139,7 +140,7 @@ class Frontier:
 
     def taking(self, count: int) -> Generator[None, None, list[Next]]:
         """At most `count` touches, far apart, that bring most. Yields each time before it looks at places."""
-        self._forget_covered()
+        yield from self._forget_covered()
         found: list[Next] = []
         aside: list[tuple[float, int, Place]] = []
         known: dict[Place, Next | None] = {}
@@ -165,8 +166,11 @@ class Frontier:
             heapq.heappush(self.queue, entry)
         return found
 
-    def uncovered(self, reference: ReferenceMesh) -> list[tuple[Place, Contact]]:
-        """Places on the border of a mesh beyond which the object goes on, each with a contact there."""
+    def uncovered(self, reference: ReferenceMesh) -> Generator[float, None, list[tuple[Place, Contact]]]:
+        """Places on the border of a mesh beyond which the object goes on, each with a contact there.
+
+        Yields 1 after each.
+        """
         found = []
         for place in border_places(reference.mesh):
             contacts = [
@@ -174,15 +178,20 @@ class Frontier:
                 for share in REACHES
             ]
             # Across a notch the finger meets the mesh again.
-            if contacts[0] is not None and reference.away(contacts[0][0]) > OFF * reference.mesh.edge:
+            if contacts[0] is not None and reference.away(contacts[0][0]) > OFF * reference.edge:
                 found.append((place, next(contact for contact in contacts[::-1] if contact is not None)))
+            yield 1.0
         return found
 
-    def _forget_covered(self) -> None:
-        """Takes the places that patches now cover out of the queue."""
-        places = np.array([(place.point, place.normal) for _, _, place in self.queue]).reshape(-1, 2, 3)
-        still = self._free(places)
-        self.queue = [entry for entry, free in zip(self.queue, still, strict=True) if free]
+    def _forget_covered(self) -> Generator[None, None, None]:
+        """Takes the places that patches now cover out of the queue; yields between its steps."""
+        still: list[tuple[float, int, Place]] = []
+        for start in range(0, len(self.queue), PLACES_AT_ONCE):
+            some = self.queue[start : start + PLACES_AT_ONCE]
+            free = self._free(np.array([(place.point, place.normal) for _, _, place in some]))
+            still += [entry for entry, is_free in zip(some, free, strict=True) if is_free]
+            yield
+        self.queue = still
         heapq.heapify(self.queue)
 
     def beyond(self, places: Sequence[Place]) -> list[Next | None]:

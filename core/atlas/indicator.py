@@ -99,6 +99,7 @@ def solved(points: Array, areas: Array, cell: float, thinnest: float) -> Generat
             yield 0.0
     found = Indicator(values, low, cell, size, thinnest)
     values -= np.average(found.at(points), weights=np.linalg.norm(areas, axis=1))
+    yield 0.0
     return found
 
 

@@ -95,20 +95,22 @@ def _joined_table(
 
 def agreed(charts: Charts) -> Joining:
     """The patches moved onto the blend of all of them, as often as ROUNDS; yields 1 after each part."""
-    from scipy.ndimage import spline_filter
+    from scipy.ndimage import spline_filter1d
 
     x, y = charts.knots().reshape(2, -1)
-    node = np.repeat(np.arange(len(charts.radii)), SIDE**2)
-    asked = np.flatnonzero(charts.shares(x, y, node) < KNOTS_WITHIN)
+    asked = np.flatnonzero(charts.inside(KNOTS_WITHIN))
+    yield 1.0
     for _ in range(ROUNDS):
         moves = np.zeros(charts.heights.shape)
         for start in range(0, len(asked), PLACES_AT_ONCE):
             some = asked[start : start + PLACES_AT_ONCE]
-            moves.ravel()[some] = _move(charts, node[some], x[some], y[some])
+            moves.ravel()[some] = _move(charts, some // SIDE**2, x[some], y[some])
             yield 1.0
         # The outermost knots are beyond the spline, without a height: they move like those beside them.
-        every = (np.pad(move[1:-1, 1:-1], 1, mode="edge") for move in moves)
-        change = np.array([spline_filter(move, order=3, mode="mirror") for move in every])
+        change = np.pad(moves[:, 1:-1, 1:-1], ((0, 0), (1, 1), (1, 1)), mode="edge")
+        for axis in (1, 2):
+            change = spline_filter1d(change, order=3, axis=axis, mode="mirror")
+            yield 1.0
         charts = replace(charts, heights=charts.heights + change)
     return charts
 

@@ -25,6 +25,11 @@ WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most so often.
 MISSED = 3.0  # Contacts are off a patch, in the median, by at most so many times what is expected.
 PATCHES_APART = 0.6  # Patches are so many radii from each other.
 NEIGHBORS = 16  # The plane of so many neighbors gives the normal of a contact where none was measured.
+ABREAST = 8  # So many neighbors of each contact are to face the same way.
+ALIKE = (
+    2.0  # Neighbors share a place if they are apart by up to so many times what others are, in the median.
+)
+OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 
 
@@ -41,8 +46,8 @@ def atlas_of(
     tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
     noise : standard deviation of a contact; None for the contours' own
 
-    Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, and if no
-    contacts carry a patch.
+    Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, for normals
+    that contradict each other, and if no contacts carry a patch.
     """
     steps = cover_contacts(contours_or_strokes, outward=outward, tolerance=tolerance, noise=noise)
     atlas: Atlas = result_of(steps)
@@ -65,8 +70,14 @@ def cover_contacts(
     points, normals, own = _contacts(contours_or_strokes, outward)
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
     noise = own if noise is None else number("noise", noise, least=0.0)
+    size = float(np.ptp(points, axis=0).max())
+    if noise > size:
+        raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
+    cloud = _Cloud(points, normals, cKDTree(points), noise, largest)
+    if outward is None:
+        cloud.require_one_side()
     yield 0.0
-    found = yield from _patches(_Cloud(points, normals, cKDTree(points), noise, largest))
+    found = yield from _patches(cloud)
     charts = charts_of(found)
     steps = surfaced(found, charts, largest)
     while True:
@@ -114,6 +125,26 @@ class _Cloud(NamedTuple):
     tree: Any
     noise: float
     largest: float | None
+
+    def require_one_side(self) -> None:
+        """Raises ValueError if many neighbors face opposite ways in one place.
+
+        The normals of two places on a sphere have a sum across the chord between them, and so have nearly
+        those of neighbors on any smooth surface; with the second normal reversed if one of them is wrong.
+        On the two sides of a wall this leaves its thickness.
+        """
+        near = self.tree.query(self.points, min(ABREAST + 1, len(self.points)))[1][:, 1:]
+        chords, others = self.points[near] - self.points[:, None], self.normals[near]
+        facing = np.einsum("nki,ni->nk", others, self.normals)
+        sums = self.normals[:, None] + np.copysign(1.0, facing)[..., None] * others
+        apart = np.abs(np.einsum("nki,nki->nk", chords, sums))
+        alike = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
+        wrong = (facing < -FACING) & (apart <= ALIKE * alike)
+        if wrong.mean() > OPPOSITE:
+            raise ValueError(
+                "normals: expected those of neighboring contacts on one side, got opposite ones at "
+                f"{np.count_nonzero(wrong.any(axis=1))} of {len(wrong)} contacts: turn all outward"
+            )
 
     def patch(self, i: int, radius: float) -> Reconstruction | None:
         """The patch of those contacts around contact i that face the same way, or None if they carry none."""

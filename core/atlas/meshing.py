@@ -6,7 +6,7 @@ Tetrahedra on the indicator's surface are cut, which is closed by construction. 
 patches that face as the indicator does. Triangles where no patch is are left out.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator a
 # Vertices that were off by more cells, or are of folded triangles, are moved again, so often.
 FAR, STEPS = 0.05, 4
 WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none is lost between them.
+CONTINUED_STD = 0.25  # The deviation of what is continued beyond all patches is this share of the way there.
 ROOM = 5.0  # The surface is within so many cells of the level of the indicator.
 HALVINGS = 5  # So many halvings of an edge of the lattice find the level.
 LATTICE_AT_ONCE = 100_000  # A step takes so many points of the lattice,
@@ -67,31 +68,41 @@ class Mesh(NamedTuple):
     @property
     def border(self) -> Indices:
         """The edges (k, 2) of one triangle only, each as this triangle has it."""
-        ends, first, counts = self._edges
-        return ends[first[counts == 1]]
+        sides, keys, once, _ = self._sides
+        return sides[once][np.argsort(keys[once])]
 
     @property
     def sides_on_border(self) -> Indices:
         """The number of sides (m,) of each triangle that are on the border."""
-        _, first, counts = self._edges
-        return np.bincount(first[counts == 1] // 3, minlength=len(self.triangles))
+        found: Indices = self._sides[2].reshape(-1, 3).sum(axis=1)
+        return found
 
     def chosen(self, which: NDArray[np.bool_]) -> "Mesh":
         """Some of the triangles, and their vertices."""
-        used, index = np.unique(self.triangles[which], return_inverse=True)
-        return Mesh(self.vertices[used], index.reshape(-1, 3), self.std[used], self.patch[used])
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.triangles[which]] = True
+        index = np.cumsum(used) - 1
+        return Mesh(self.vertices[used], index[self.triangles[which]], self.std[used], self.patch[used])
 
     @property
-    def _edges(self) -> tuple[Indices, Indices, Indices]:
-        """The edges (3 m, 2) of all triangles; the first of each that are the same, and their number."""
-        ends = self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        keys = ends.min(axis=1) * len(self.vertices) + ends.max(axis=1)
-        return ends, *np.unique(keys, return_index=True, return_counts=True)[1:]
+    def _sides(self) -> tuple[Indices, Indices, NDArray[np.bool_], bool]:
+        """The sides (3 m, 2) of all triangles, and numbers (3 m,) that are equal for the same edge.
+
+        Also which sides (3 m,) no other triangle has, and whether each edge belongs to exactly two.
+        """
+        sides = self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        keys = sides.min(axis=1) * len(self.vertices) + sides.max(axis=1)
+        order = np.sort(keys)
+        first = np.flatnonzero(np.diff(order, prepend=-1))
+        counts = np.diff(first, append=len(order))
+        once = order[first[counts == 1]]
+        at = np.searchsorted(once, keys)
+        return sides, keys, np.append(once, -1)[at] == keys, bool((counts == 2).all())
 
     @property
     def is_closed(self) -> bool:
         """Whether there are triangles, and each edge belongs to exactly two."""
-        return len(self.triangles) > 0 and bool((self._edges[2] == 2).all())
+        return len(self.triangles) > 0 and self._sides[3]
 
 
 def memory_of(vertices: Array, triangles: Indices, edge: float, lattice: float = np.inf) -> float:
@@ -117,10 +128,16 @@ def lattice_of(indicator: Indicator, edge: float) -> tuple[float, int]:
     return size, halvings
 
 
-def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float, None, Mesh]:
+def meshed(
+    charts: Charts,
+    indicator: Indicator,
+    edge: float,
+    ended: Callable[[Array], NDArray[np.bool_]] | None = None,
+) -> Generator[float, None, Mesh]:
     """The mesh of the surface; yields the share that is done.
 
     edge : about the length of its edges, which are shorter than a quarter of the thinnest wall
+    ended : which of places (n, 3) are beyond the ends of a mesh of the surface that was made before
     """
     edge = min(edge, WALL * indicator.resolved)
     size, halvings = lattice_of(indicator, edge)
@@ -133,8 +150,9 @@ def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float
         yield 0.7
         vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
     found = yield from creased(charts, vertices, triangles, surface.normal, edge)
-    at = np.append(np.arange(len(vertices)), found.parents)
-    return _felt(found.vertices, found.triangles, surface.chosen(at), indicator.cell)
+    surface = surface.chosen(np.append(np.arange(len(vertices)), found.parents))
+    surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * found.unfelt))
+    return (yield from _felt(found.vertices, found.triangles, surface, indicator.cell, ended))
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -181,12 +199,11 @@ def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]
     # A cell of the grid is in at most two cubes along an axis, or three.
     ways = (0.0, 1.0) if size >= indicator.cell else (0.0, 0.5, 1.0)
     ends = [np.floor((low + way * indicator.cell) / size).astype(np.intp) for way in ways]
-    parts = []
+    cells = ends[0]
     for which in np.ndindex(3 * (len(ways),)):
-        parts.append(unique(np.stack([ends[i][:, axis] for axis, i in enumerate(which)], axis=1)))
+        beside = unique(np.stack([ends[i][:, axis] for axis, i in enumerate(which)], axis=1))
+        cells = unique(np.vstack([cells, beside]))
         yield 0.0
-    cells = unique(np.vstack(parts))
-    yield 0.0
     beside = np.vstack([np.zeros((1, 3), dtype=np.intp), np.eye(3, dtype=np.intp), -np.eye(3, dtype=np.intp)])
     return unique((cells[:, None] + beside).reshape(-1, 3))
 
@@ -240,11 +257,17 @@ def _onto(
     return surface
 
 
-def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) -> Mesh:
-    """The mesh without triangles where nothing was felt.
+def _felt(
+    vertices: Array,
+    triangles: Indices,
+    surface: Surface,
+    cell: float,
+    ended: Callable[[Array], NDArray[np.bool_]] | None,
+) -> Generator[float, None, Mesh]:
+    """The mesh without triangles where nothing was felt; yields the share that is done.
 
     Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
-    as small as some cells of the indicator is bridged.
+    as small as some cells of the indicator is bridged; a later mesh ends where the first one did.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -254,11 +277,19 @@ def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) ->
     beyond = triangles[~inside[triangles].all(axis=1)]
     links = np.ones(2 * len(beyond)), (beyond[:, :2].ravel(), beyond[:, 1:].ravel())
     count, piece = connected_components(coo_matrix(links, (len(vertices),) * 2))
-    a, b, c = vertices[beyond].transpose(1, 0, 2)
-    # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
-    far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
-    areas = np.bincount(piece[beyond[:, 0]], far, count)
+    yield 0.9
     beside = np.bincount(piece[inside], minlength=count) > 0
-    gone = ~inside & ((areas > BRIDGED * cell**2) | ~beside)[piece]
+    gone = ~inside & ~beside[piece]
+    if ended is None:
+        a, b, c = vertices[beyond].transpose(1, 0, 2)
+        # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
+        far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
+        gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * cell**2)[piece]
+    else:
+        outer = np.flatnonzero(~inside & ~gone)
+        for start in range(0, len(outer), PLACES_AT_ONCE):
+            some = outer[start : start + PLACES_AT_ONCE]
+            gone[some] = ended(vertices[some])
+            yield 0.9
     std = np.where(surface.node < 0, cell, surface.std)
     return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))

@@ -93,6 +93,7 @@ class Atlas:
     check : contacts from outside that the patches do not have; None if there were none
     taps : contacts between the curves of each patch, to which the joined patches are fitted, too
     border : where a finger felt the surface end; None if there was none
+    is_cut_short : whether touches ended because no more were allowed, or were stopped
     """
 
     patches: tuple[Reconstruction, ...]
@@ -103,6 +104,7 @@ class Atlas:
     check: Check | None = None
     taps: tuple[Contour, ...] = ()
     border: Border | None = None
+    is_cut_short: bool = False
 
     @cached_property
     def edges(self) -> list[Edge]:
@@ -140,9 +142,14 @@ class Atlas:
         count = len(self.uncovered)
         if count:
             places = "one place" if count == 1 else f"{count} places"
+            if self.is_cut_short:
+                return "uncertain", (
+                    f"The patches end at {places} where the object goes on: allow more touches or a larger "
+                    "tolerance."
+                )
             return "uncertain", (
-                f"The patches end at {places} where the object goes on: allow more touches or a larger "
-                "tolerance."
+                f"The patches end at {places} where the object goes on, and touches found no patch there: "
+                "use a smaller tolerance."
             )
         inside = self.reference.indicator
         if inside.thinnest < THIN * inside.resolved:
@@ -183,14 +190,14 @@ class Atlas:
         distance, std = self._contacts
         explained = np.maximum(OFF_STDS * std, OFF_TOLERANCES * (self.tolerance or 0.0))
         # The mesh may end an edge or so before a border of the object.
-        explained[np.isinf(std)] = BORDER * self.reference.mesh.edge
+        explained[np.isinf(std)] = BORDER * self.reference.edge
         return np.abs(distance) > explained
 
-    def widened(self) -> "Atlas":
+    def widened(self) -> Generator[float, None, "Atlas"]:
         """The atlas with deviations so large that 90 % of its check's contacts are in the 90 % interval.
 
         Those that contradict the surface do not count: they are of something else. What patches differ by is
-        a part of a deviation and does not grow with theirs, so they grow more than once.
+        a part of a deviation and does not grow with theirs, so they grow more than once. Yields 1 each time.
         """
         found, within = self, ~self.contradicting
         for _ in range(WIDENINGS):
@@ -199,13 +206,16 @@ class Atlas:
             if not felt.any():
                 break
             stds = np.abs(distance[felt]) / np.maximum(std[felt], LEAST_DIVISOR)
-            factor = max(1.0, float(np.quantile(stds, 0.9)) / WITHIN_90)
+            factor = float(np.quantile(stds, 0.9)) / WITHIN_90
+            if factor <= 1.0:
+                break
             mesh = found.reference.mesh
             found = replace(
                 found,
                 charts=replace(found.charts, stds=factor * found.charts.stds),
                 reference=replace(found.reference, mesh=mesh._replace(std=factor * mesh.std)),
             )
+            yield 1.0
         return found
 
     def _checked(self) -> tuple[str, str]:
@@ -213,9 +223,9 @@ class Atlas:
         missed = 0 if self.check is None else len(self.check.missed)
         wrong, count = int(self.contradicting.sum()) + missed, len(self._contacts[0]) + missed
         if wrong:
+            advice = "allow more touches" if self.is_cut_short else "use a smaller tolerance"
             return "uncertain", (
-                f"{wrong} of {count} rays from outside meet something else than the surface: allow more "
-                "touches or use a smaller tolerance."
+                f"{wrong} of {count} rays from outside meet something else than the surface: {advice}."
             )
         return "ok", "The object was felt everywhere a finger could reach."
 
@@ -300,7 +310,7 @@ class Atlas:
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
                 f"{edge:.3g}, which takes {1e-9 * memory:.3g} GB: use a longer one"
             )
-        mesh = yield from meshed(self.charts, self.reference.indicator, edge)
+        mesh = yield from meshed(self.charts, self.reference.indicator, edge, self.reference.ended)
         return mesh if self.border is None else bordered(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:

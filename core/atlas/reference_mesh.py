@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Signed distances from the surface of an object: the nearest place on its mesh, moved onto the patches."""
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,9 +14,9 @@ from ..arguments import Array
 from ..contours.contour import Vector
 from ..patch.tetrahedra import Indices
 from .charts import Charts
-from .field import Surface, surface_at
+from .field import Surface, patched
 from .indicator import Indicator
-from .meshing import LEAST_DIVISOR, ROOM, Mesh
+from .meshing import LEAST_DIVISOR, Mesh
 
 # python -m benchmarks.atlas judges these.
 NEAREST = 3  # The nearest triangle is looked for at so many of the nearest vertices.
@@ -52,6 +53,11 @@ class ReferenceMesh:
         return found
 
     @cached_property
+    def edge(self) -> float:
+        """The median length of the edges."""
+        return self.mesh.edge
+
+    @cached_property
     def normals(self) -> Array:
         """Unit normals of the triangles, (m, 3)."""
         a, b, c = self.mesh.vertices[self.mesh.triangles].transpose(1, 0, 2)
@@ -64,6 +70,12 @@ class ReferenceMesh:
         found = np.zeros(len(self.mesh.vertices), dtype=bool)
         found[self.mesh.border] = True
         return found
+
+    def prepared(self) -> Generator[float, None, None]:
+        """Finds what distances need, in steps; yields 1 after each."""
+        for name in ("tree", "fans", "edge", "normals", "is_open"):
+            getattr(self, name)
+            yield 1.0
 
     def feet(self, points: Array) -> tuple[Array, Indices, Array, NDArray[np.bool_]]:
         """The nearest places (n, 3) on the mesh; triangles, deviations, and whether it ends there, (n,).
@@ -85,6 +97,10 @@ class ReferenceMesh:
         std = np.einsum("ni,ni->n", weights[row, best], self.mesh.std[corners])
         return feet[row, best], triangle, std, ends
 
+    def ended(self, points: Array) -> NDArray[np.bool_]:
+        """Which of points (n, 3) are beyond where the mesh ends."""
+        return self.feet(points)[3]
+
     def away(self, point: Vector) -> float:
         """The distance of a point from the triangles."""
         return float(np.linalg.norm(self.feet(np.array([point]))[0] - point))
@@ -99,9 +115,7 @@ class ReferenceMesh:
         away = np.linalg.norm(off, axis=1)
         # A triangle is a chord: the foot of its plane is a little beside that of the surface.
         across = off - ahead[:, None] * surface.normal
-        some = np.flatnonzero(
-            (np.abs(ahead) > AHEAD * away) & (np.linalg.norm(across, axis=1) < self.mesh.edge)
-        )
+        some = np.flatnonzero((np.abs(ahead) > AHEAD * away) & (np.linalg.norm(across, axis=1) < self.edge))
         there, tried = self._settled(charts, feet[some] + across[some], up[some])
         left = np.linalg.norm(points[some] - tried, axis=1)
         nearer = (left < away[some]) & (np.abs(there.distance) < there.std)
@@ -117,11 +131,10 @@ class ReferenceMesh:
 
     def _settled(self, charts: Charts, places: Array, up: Array) -> tuple[Surface, Array]:
         """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""
-        room = max(ROOM * self.indicator.cell, self.mesh.edge)
-        first = surface_at(charts, self.indicator, places, up, room)
-        places = places - first.distance[:, None] * first.normal
-        surface = surface_at(charts, self.indicator, places, up, room)
-        return surface, places - surface.distance[:, None] * surface.normal
+        for _ in range(2):  # Farther away than an edge there is only another part of the surface.
+            surface = patched(charts, self.indicator, places, up, self.edge)
+            places = places - surface.distance[:, None] * surface.normal
+        return surface, places
 
 
 def closest(triangles: Array, points: Array) -> tuple[Array, Array]:

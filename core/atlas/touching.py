@@ -53,6 +53,7 @@ class Progress(NamedTuple):
     done : number of touches
     uncovered : number of places that are known to be uncovered
     found : the touches since the last Progress
+    rims : how far the finger feels each of their patches all round, (AZIMUTHS,), a length
     joining : share of joining the patches to one surface that is done; None while the object is touched
     """
 
@@ -60,6 +61,7 @@ class Progress(NamedTuple):
     uncovered: int
     found: tuple[Exploration, ...] = ()
     joining: float | None = None
+    rims: tuple[Array, ...] = ()
 
 
 Steps = Generator[Progress, object, Atlas]
@@ -184,7 +186,9 @@ class _Run:
 
     def now(self, joining: float | None = None, new: Sequence[Exploration] = ()) -> Progress:
         """The Progress so far, with the new touches."""
-        return Progress(self.done, len(self.frontier.queue), tuple(new), joining)
+        assert self.frontier.charts is not None
+        rims = (self.frontier.charts.rims * self.frontier.charts.radii[:, None])[-len(new) :] if new else ()
+        return Progress(self.done, len(self.frontier.queue), tuple(new), joining, tuple(rims))
 
     def touch(
         self, contacts: Sequence[Contact], farthest: float, least: Sequence[float]
@@ -271,25 +275,28 @@ class _Run:
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
             border = yield from _part(steps, 1.0, 1.0)
             reference = replace(reference, mesh=bordered(reference.mesh, border))
+        yield from reference.prepared()
         check = self.check(reference)
         yield 1.0
-        uncovered = self.frontier.uncovered(reference)
+        uncovered = yield from self.frontier.uncovered(reference)
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
-        atlas = Atlas(patches, charts, reference, self.tolerance, places, check, taps, border)
-        off, atlas = atlas.contradicting, atlas.widened()
+        cut_short = self.done >= self.most
+        atlas = Atlas(patches, charts, reference, self.tolerance, places, check, taps, border, cut_short)
+        off = atlas.contradicting
         yield 1.0
+        atlas = yield from atlas.widened()
         contacts: list[Contact] = [contact for _, contact in uncovered]
         contacts += zip(check.points[off], check.normals[off], strict=True)
         return atlas, contacts + self.rough(atlas.reference.mesh)
 
     def rough(self, mesh: Mesh) -> list[Contact]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
-        left = np.flatnonzero(mesh.std > LIMIT * self.tolerance)
+        left, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
         found: list[Contact] = []
         assert self.frontier.charts is not None
         while len(left):
             worst = left[np.argmax(mesh.std[left])]
-            point, normal = vector_of(mesh.vertices[worst]), vector_of(mesh.normals[worst])
+            point, normal = vector_of(mesh.vertices[worst]), vector_of(normals[worst])
             contact = self.frontier.finger.near(point, normal, self.frontier.near)
             found += [contact] if contact else []
             apart = ROUGH_APART * self.frontier.charts.radii[mesh.patch[worst]]
@@ -308,7 +315,7 @@ def _joined(run: _Run, more: bool) -> Steps:
         more = yield from run.going_on(contacts, float(atlas.charts.radii.max()))
         if len(run.found) == before:
             break
-    return atlas
+    return atlas if more else replace(atlas, is_cut_short=True)
 
 
 def _part(steps: Generator[float, None, Any], start: float, end: float) -> Generator[float, None, Any]:

@@ -26,6 +26,12 @@ def unique(rows: Indices) -> Indices:
     return rows[np.unique(_keys(rows), return_index=True)[1]]
 
 
+def _different(numbers: Indices) -> Indices:
+    """The different ones among whole numbers, in order; numpy's own way is ten times as slow."""
+    order = np.sort(numbers, axis=None)
+    return order[np.diff(order, prepend=order[:1] - 1) > 0]
+
+
 def _keys(rows: Indices) -> Indices:
     """A number (n,) for each of the rows (n, 3) of whole numbers, equal only for equal rows."""
     low = rows.min(axis=0)
@@ -37,34 +43,26 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
 
     Yields 0 between its parts.
     """
-    corners = []
-    numbers = _keys(np.vstack([cells, cells.min(axis=0) - 1, cells.max(axis=0) + 1]))[:-2]
-    across = cells.max(axis=0) - cells.min(axis=0) + 3
-    order = np.argsort(numbers)
-    steps = (across[1] * across[2], across[2], 1)
-    for axis in range(3):
-        at = np.searchsorted(numbers[order], numbers + steps[axis])
-        both = numbers[order][np.minimum(at, len(numbers) - 1)] == numbers + steps[axis]
-        center = 2 * cells[both] + 1
-        ahead = np.eye(3, dtype=np.intp)[axis]
-        e1, e2 = np.eye(3, dtype=np.intp)[[(axis + 1) % 3, (axis + 2) % 3]]
-        face = [center + ahead + i * e1 + j * e2 for i, j in FACE_CORNERS]
-        corners += [
-            np.stack([center, center + 2 * ahead, face[k], face[(k + 1) % 4]], axis=1) for k in range(4)
-        ]
-    yield 0.0
     low = 2 * cells.min(axis=0)
-    shape, keys, different = tuple(2 * cells.max(axis=0) + 4 - low), [], []
-    for some in corners:
-        keys.append(np.ravel_multi_index(tuple((some - low).reshape(-1, 3).T), shape))
-        different.append(np.unique(keys[-1]))
-        yield 0.0
-    known, index = np.unique(np.concatenate(different)), []
+    shape = tuple(2 * cells.max(axis=0) + 4 - low)
+    strides = np.array([shape[1] * shape[2], shape[2], 1])
+    # A lattice point is a number, so all corners of a tetrahedron are at fixed offsets from a center.
+    centers = (2 * cells + 1 - low) @ strides
+    order, keys, known = np.sort(centers), [], np.zeros(0, dtype=np.intp)
+    for ahead, e1, e2 in (np.roll(strides, -axis) for axis in range(3)):
+        at = np.minimum(np.searchsorted(order, centers + 2 * ahead), len(order) - 1)
+        some = centers[order[at] == centers + 2 * ahead, None]
+        face = ahead + FACE_CORNERS @ (e1, e2)
+        for k in range(4):
+            keys.append(some + np.array([0, 2 * ahead, face[k], face[(k + 1) % 4]]))
+            known = _different(np.concatenate([known, _different(keys[-1])]))
+            yield 0.0
+    index = []
     for each in keys:
         index.append(np.searchsorted(known, each))
         yield 0.0
     points: Indices = np.stack(np.unravel_index(known, shape), axis=1) + low
-    return points, np.concatenate(index).reshape(-1, 4)
+    return points, np.concatenate(index)
 
 
 def cut(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
@@ -78,8 +76,9 @@ def cut(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
     corners = [tetrahedra[case == code][:, table[code]].reshape(-1, 2) for code in range(1, 15)]
     ends = np.sort(np.concatenate(corners), axis=1)
     keys = ends[:, 0] * len(values) + ends[:, 1]
-    _, first, index = np.unique(keys, return_index=True, return_inverse=True)
-    return ends[first], index.reshape(-1, 3)
+    known = _different(keys)
+    crossed: Indices = np.stack(np.divmod(known, len(values)), axis=1)
+    return crossed, np.searchsorted(known, keys).reshape(-1, 3)
 
 
 @cache
@@ -129,7 +128,7 @@ def evened(vertices: Array, normal: Array, triangles: Indices) -> Array:
 def sides_of(triangles: Indices, count: int) -> Indices:
     """The different edges (n, 2) of triangles (m, 3) between `count` vertices."""
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    keys = np.unique(ends.min(axis=1) * count + ends.max(axis=1))
+    keys = _different(ends.min(axis=1) * count + ends.max(axis=1))
     return np.stack(np.divmod(keys, count), axis=1)
 
 

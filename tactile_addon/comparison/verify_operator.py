@@ -11,7 +11,7 @@ from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
-from ..scene import mesh_data, patch_object, patch_record
+from ..scene import mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import judgment
 from .verification_wording import verification_summary
@@ -72,7 +72,8 @@ class Verification:
         deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
         mesh_data.own_mesh(patch)
         mesh_data.write(patch.data, "deviation", "FLOAT", deviations)
-        patch_object.recolor(patch)
+        shown.recolor(patch)
+        shown.share_range(patch)
         record["verification"] = {"target": self.target, **self._found}
         if record["status"] != "outdated":
             mean = self._found.get("vertex_distance_mean", 0.0)
@@ -154,6 +155,7 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
 
     def _finish(self, context):
         record = self._verification.write()
+        probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
         self.report({"WARNING"} if doubt else {"INFO"}, summary)
         return {"FINISHED"}

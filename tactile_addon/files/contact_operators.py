@@ -16,6 +16,7 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper
 
+from ... import core
 from ..probes.in_slices import InSlices
 from ..probes.operators import is_in_object_mode, make_active, report_error
 from ..scene import patch_object
@@ -24,7 +25,7 @@ from ..touch.units import length
 from ..touch.wording import fit_summary, many
 from ..whole_object import whole_mesh
 from ..whole_object.object_report import object_summary
-from . import contact_file, measured
+from . import measured
 
 UNIT_ITEMS = [
     (
@@ -33,7 +34,7 @@ UNIT_ITEMS = [
         "Use the unit that the columns name; without one, use the numbers as they are",
     ),
     ("NONE", "As They Are", "Use the numbers as lengths of the scene, whatever the file says"),
-    *((unit, unit, f"Numbers are lengths in {unit}") for unit in contact_file.UNIT_METERS),
+    *((unit, unit, f"Numbers are lengths in {unit}") for unit in core.UNIT_METERS),
 ]
 
 

@@ -20,9 +20,9 @@ FLAT = 0.02  # A surface whose |k1 + k2| is less, in unit radius, bulges to no s
 
 
 def read(paths, unit, meters, whole=False):
-    """The contact_file.Contacts of files whose curves belong together.
+    """The core.Contacts of files whose curves belong together.
 
-    unit : of the numbers, as in contact_file.UNIT_METERS; "FILE" for the unit that each file names; "NONE" to
+    unit : of the numbers, as in core.UNIT_METERS; "FILE" for the unit that each file names; "NONE" to
         take numbers as they are, as is done for a file that names no unit
     meters : length of the world's unit in meters
     whole : whether they belong to one object and not to one patch, so that each may have its own point
@@ -34,7 +34,7 @@ def read(paths, unit, meters, whole=False):
     for path in paths:
         curves, named, point, outward, beside = contact_file.read(path)
         named = {"FILE": named, "NONE": ""}.get(unit, unit)
-        factor = contact_file.UNIT_METERS[named] / meters if named else 1.0
+        factor = core.UNIT_METERS[named] / meters if named else 1.0
         # Quotients such as 1 / 0.1 are not exact, but a file in the world's unit must stay as it is.
         factor = 1.0 if math.isclose(factor, 1.0, rel_tol=1e-6) else factor
         contours += [_scaled(curve, factor) for curve in curves]
@@ -47,7 +47,7 @@ def read(paths, unit, meters, whole=False):
     if any(np.dot(direction, directions[0]) <= 0.0 for direction in directions):
         directions = []  # They belong to different sides of the object.
     point, outward = (given[0] if given else None for given in (points, directions))
-    return contact_file.Contacts(contours, found, point, outward, tuple(strokes))
+    return core.Contacts(contours, found, point, outward, tuple(strokes))
 
 
 class MeasuredObject:
@@ -58,7 +58,7 @@ class MeasuredObject:
     """
 
     def __init__(self, contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
-        """Prepares contact_file.Contacts.
+        """Prepares core.Contacts.
 
         outward : direction to the outer side of all contacts; None for the measured normals, or for that of
             the files; `flip` takes the other side
@@ -133,7 +133,7 @@ def fit(
     radius=0.0,
     **options,
 ):
-    """The patch that contact_file.Contacts show, as a Touched without a surface.
+    """The patch that core.Contacts show, as a Touched without a surface.
 
     point : where the curves meet, exactly; None for the point of the file, or core.common_point. For strokes
         alone, a place among them; None for the point of the file, or their mean

@@ -56,9 +56,10 @@ def add(path, empty=False):
 
 def _require_readable(path):
     """Raises OSError for a file that would end Blender, or of which Blender would read something else."""
-    if path.suffix.lower() == ".ply" and not _has_header(path):
-        raise _unreadable(path)
-    wrong = mesh_numbers.unreadable(path)
+    try:
+        wrong = mesh_numbers.unreadable(path)
+    except ValueError as error:
+        raise _unreadable(path) from error
     if wrong:
         raise OSError(
             f'"{path.name}" has vertices whose coordinates are not finite in single precision, {wrong} of '
@@ -68,12 +69,6 @@ def _require_readable(path):
 
 def _unreadable(path):
     return OSError(f'no mesh could be read from "{path.name}": is the file complete?')
-
-
-def _has_header(path):
-    """Whether the header of a .ply file has an end; without one the importer would end Blender."""
-    with path.open("rb") as file:
-        return b"end_header" in file.read(HEADER)
 
 
 def write(path, obj):

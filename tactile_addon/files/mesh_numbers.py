@@ -4,11 +4,12 @@
 
 import numpy as np
 
+from ...core.contact_data.rows import POINT_COLUMNS
 from . import ply_contacts
-from .contact_rows import POINT_COLUMNS
 
 STL_HEAD = 84  # The head of a binary .stl has so many bytes, the last four of which number its triangles.
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+PLY_LINE = 65_000  # Longer lines in a .ply would end Blender.
 AFTER_WORD = (1, 2, 3)  # These words follow the one that begins the line of a vertex.
 LARGEST = float(np.finfo(np.float32).max)
 
@@ -16,17 +17,23 @@ LARGEST = float(np.finfo(np.float32).max)
 def unreadable(path):
     """The number of vertices in a .ply, .stl or .obj file whose coordinates are no finite float32 numbers.
 
-    It is 0 for a file that is broken otherwise, which importers find.
+    It is 0 for a .stl or .obj file that is broken otherwise, which importers find. Raises ValueError for a
+    .ply file of whose vertices an importer might read something else.
     """
     data = path.read_bytes()
+    if path.suffix.lower() == ".ply":
+        return _of_ply(data)
     try:
-        return {".ply": _of_ply, ".stl": _of_stl, ".obj": _of_obj}[path.suffix.lower()](data)
+        return {".stl": _of_stl, ".obj": _of_obj}[path.suffix.lower()](data)
     except (ValueError, IndexError):
         return 0
 
 
 def _of_ply(data):
     rows, fields, is_text = ply_contacts.vertex_rows("", data)
+    lines = np.frombuffer(data, np.uint8, len(data) if is_text else data.find(b"end_header"))
+    if np.diff(np.flatnonzero(lines == ord("\n")), prepend=-1, append=len(lines)).max() > PLY_LINE:
+        raise ValueError
     if not is_text:
         return _of_numbers(np.stack([rows[key] for key in POINT_COLUMNS], axis=1))
     names = [name for name, _ in fields]

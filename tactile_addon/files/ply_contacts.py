@@ -5,11 +5,13 @@
 Blender's own import keeps these attributes, too, but in single precision, and reads NaN and words as 0.
 """
 
+import itertools
+
 import numpy as np
 
 from ...core.arguments import LARGEST
-from . import contact_rows
-from .contact_rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
+from ...core.contact_data import rows as contact_rows
+from ...core.contact_data.rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
 PLY_ROWS = 1000  # So many rows of a .ply are read together.
 PLY_TYPES = {
@@ -58,19 +60,47 @@ def vertex_rows(name, data):
     """
     end = data.find(b"end_header", 0, contact_rows.LONGEST_LINE)
     lines = [line.split() for line in data[: max(end, 0)].decode("latin-1").splitlines()]
-    order = PLY_ORDERS.get(lines[1][1]) if len(lines) > 1 and len(lines[1]) > 1 else None
+    kind = next((line[1] for line in lines if line[:1] == ["format"] and len(line) > 1), None)
+    order = PLY_ORDERS.get(kind)
     if not data.startswith(b"ply") or end < 0 or order is None:
         raise ValueError(f"{name}: expected the complete header of a .ply file, got something else")
     below = data.find(b"\n", end) + 1 or len(data)
     before, count, fields = _ply_vertices(name, lines, order)
-    text = data[below:].splitlines() if lines[1][1] == "ascii" else None
-    sizes = [number * (1 if text is not None else np.dtype(kinds).itemsize) for kinds, number in before]
-    start, size = sum(sizes), 1 if text is not None else np.dtype(fields).itemsize
-    if (len(data) - below if text is None else len(text)) < start + count * size:
+    if kind == "ascii":
+        text, start = data[below:].splitlines(), sum(number for _, number in before)
+        size, room = 1, len(text)
+    else:
+        start = below
+        for kinds, number in before:
+            start = _after(data, start, kinds, number)
+        size, room = np.dtype(fields).itemsize, len(data)
+    if room < start + count * size:
         raise ValueError(f"{name}: expected {count} contacts, got a file that ends earlier: is it complete?")
-    if text is None:
-        return np.frombuffer(data, fields, count, below + start), fields, 0
+    if kind != "ascii":
+        return np.frombuffer(data, fields, count, start), fields, 0
     return text[start : start + count], fields, len(lines) + 2 + start
+
+
+def _after(data, start, fields, count):
+    """The place after so many rows with these fields from `start` on, or one beyond the data."""
+    lists, skipped = [], 0  # The bytes before each list, and the types of its length and of its items.
+    for _, kind in fields:
+        if isinstance(kind, str):
+            skipped += np.dtype(kind).itemsize
+        else:
+            lists.append((skipped, *(np.dtype(part).itemsize for part in kind)))
+            skipped = 0
+    if not lists:
+        return start + count * skipped
+    order = "big" if fields[0][1][0].startswith(PLY_ORDERS["binary_big_endian"]) else "little"
+    for _ in range(count):
+        for before, length, item in lists:
+            start += before + length
+            start += item * int.from_bytes(data[start - length : start], order)
+        start += skipped
+        if start > len(data):
+            break
+    return start
 
 
 def _in_order(labels):
@@ -84,30 +114,33 @@ def _in_order(labels):
 
 def _ply_vertices(name, lines, order):
     """(fields, number) of the rows before the vertices, the number of vertices, and their fields."""
+    elements = _elements(name, lines, order)
+    places = [place for place, (element, *_) in enumerate(elements) if element == "vertex"]
+    _, count, fields = elements[places[0]] if len(places) == 1 else ("", 0, [])
+    # The words of a line have their places up to its first list.
+    plain = dict(itertools.takewhile(lambda field: isinstance(field[1], str), fields))
+    is_fixed = order == PLY_ORDERS["ascii"] or len(plain) == len(fields)
+    if count < 1 or not is_fixed or not {*POINT_COLUMNS} <= {*plain} or len(dict(fields)) < len(fields):
+        raise ValueError(f"{name}: expected vertices with the properties x, y and z, got none of that kind")
+    return [(kinds, number) for _, number, kinds in elements[: places[0]]], count, fields
+
+
+def _elements(name, lines, order):
+    """The name, number and fields of each element; a list has the types of its length and items."""
     elements = []
-    for line in lines[2:]:
+    for line in lines:
         try:
             if line[:1] == ["element"]:
                 elements.append((line[1], int(line[2]), []))
+                if elements[-1][1] < 0:
+                    raise ValueError
             elif line[:1] == ["property"]:
-                elements[-1][2].append(
-                    (line[-1].lower(), "list" if line[1] == "list" else PLY_TYPES[line[1]])
-                )
+                kinds = [order + PLY_TYPES[word] for word in line[1:-1] if word != "list"]
+                (kind,) = [tuple(kinds)] if line[1] == "list" else kinds
+                elements[-1][2].append((line[-1].lower(), kind))
         except (IndexError, ValueError, KeyError):
             raise ValueError(f'{name}: expected an element or a property, got "{" ".join(line)}"') from None
-    before = []
-    for element, count, properties in elements:
-        has_list = any(kind == "list" for _, kind in properties)
-        is_line = order == PLY_ORDERS["ascii"] and element != "vertex"  # However long its lists are.
-        if count < 0 or (has_list and not is_line):
-            break
-        fields = [(key, order + kind) for key, kind in properties]
-        if element == "vertex":
-            if not {*POINT_COLUMNS} <= {*dict(fields)} or count < 1 or len(dict(fields)) < len(fields):
-                break
-            return before, count, fields
-        before.append((fields, count))
-    raise ValueError(f"{name}: expected vertices with the properties x, y and z, got none of that kind")
+    return elements
 
 
 def _ply_rows(name, first, lines, fields):

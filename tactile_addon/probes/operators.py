@@ -20,7 +20,9 @@ from ..touch.settings import (
 from ..touch.touch_object import completed, touch
 from ..touch.wording import fit_summary, sentence
 from .number_fields import fields
-from .probe import lock_of, patch_near, probe_of, record_of
+from .probe import is_result, lock_of, patch_near, probe_of, record_of
+
+NO_MESH = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
 
 
 class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
@@ -133,6 +135,14 @@ def is_in_object_mode(operator, context, what):
     return False
 
 
+def has_mesh(operator, context):
+    """Whether the view layer has a mesh that can be touched; if not, the operator's poll says so."""
+    found = any(obj.type == "MESH" and not is_result(obj) for obj in context.view_layer.objects)
+    if not found:
+        operator.poll_message_set(NO_MESH)
+    return found
+
+
 def has_target(operator, context):
     """Whether the active object of a viewport can be touched or leads to one that can; poll says why not."""
     if context.area is None or context.area.type != "VIEW_3D":  # A script may name one.
@@ -140,7 +150,8 @@ def has_target(operator, context):
     try:
         obj = target_object(context, "")
     except ValueError as error:
-        operator.poll_message_set(sentence(error))
+        if has_mesh(operator, context):
+            operator.poll_message_set(sentence(error))
         return False
     if obj.type != "MESH":
         operator.poll_message_set("Select the mesh object to touch")

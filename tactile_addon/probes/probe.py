@@ -18,7 +18,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..scene import patch_object, patch_record
+from ..scene import patch_object, patch_record, shown
 from ..scene.family import children_of
 from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, changed, is_silent
 from . import anchor, number_fields
@@ -202,8 +202,11 @@ def make(context, target):
 def _show(obj):
     """Colors a patch by the quantity it is set to show now, without the range of the one before."""
     obj.pop(patch_record.RANGE, None)
+    obj.pop(patch_record.COMMON_RANGE, None)
     if obj.is_editable and patch_record.is_colored(obj):  # If not, verifying and exporting say so.
-        patch_object.recolor(obj)
+        shown.recolor(obj)
+        if patch_record.RECORD in obj:
+            shown.share_range(obj)
 
 
 def _show_contours(patch, shown):

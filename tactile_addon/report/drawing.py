@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of a report as SVG, without a renderer: colored triangles and dots, histograms, scales."""
+"""The pictures of a report as SVG, without a renderer: colored triangles, histograms, scales."""
 
 import numpy as np
 
@@ -19,15 +19,6 @@ def triangles(points, corners, colors, marks=()):
     ]
     shapes += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in place(np.reshape(marks, (-1, 2)))]
     return _picture(shapes)
-
-
-def dots(points, colors):
-    """A picture of dots at points (n, 2), later ones above earlier ones, in colors (n, 3 or 4)."""
-    place, radius = _fitted(points), max(2.0, 0.9 * PIXELS / np.sqrt(max(len(points), 1)))
-    return _picture(
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{_hex(color)}"/>'
-        for (x, y), color in zip(place(points), colors, strict=True)
-    )
 
 
 def histogram(values, weights, limit, label):

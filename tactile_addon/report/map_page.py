@@ -40,7 +40,7 @@ def _legend(painted, record, unit):
     title = next(words for key, words, *_ in map_object.MAP_QUANTITIES if key == shown)
     low = "1" if shown in map_object.LOGARITHMIC else "0"
     high = units.say(record["color_limit"], map_object.MAP_POWERS[shown], unit)
-    return page.words(f"{title}: white at {low}, dark red from {high} on.") + swatches
+    return page.words(f"{title}: pale green at {low}, dark red from {high} on.") + swatches
 
 
 def _errors(mesh, record, unit):

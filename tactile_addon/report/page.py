@@ -14,7 +14,7 @@ body {{ max-width: 64rem; margin: 2rem auto; padding: 0 1rem; font: 1rem/1.5 san
 figure {{ display: inline-block; margin: 0 1rem 1rem 0; vertical-align: top; }}
 figcaption {{ font-size: .875rem; color: #555; max-width: 20rem; }}
 svg {{ max-width: 100%; font: 11px sans-serif; }}
-table {{ border-collapse: collapse; }}
+table {{ border-collapse: collapse; display: block; overflow-x: auto; }}
 td, th {{ padding: .2rem 1.2rem .2rem 0; text-align: left; vertical-align: top; }}
 tr {{ border-bottom: 1px solid #ddd; }}
 @media print {{ body {{ margin: 0; }} figure, table {{ break-inside: avoid; }} }}

@@ -17,6 +17,7 @@ SHARES = (0.005, 0.01, 0.02, 0.05)  # The bands, as shares of the radius of a pa
 # Deviations, and a normal distribution's share within.
 NORMAL_SHARES = ((1.0, 0.68), (2.0, 0.95), (3.0, 0.997))
 LEAST_RANGE = 1e-12
+WORDS = {"most": "most touches"}  # Settings whose names are no words.
 MANIFEST = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
 
 
@@ -67,7 +68,7 @@ def label(power, unit):
 def _settings(record):
     names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
     rows = [
-        (name, f"{record[name]:.4g}" if isinstance(record[name], float) else record[name])
+        (WORDS.get(name, name), f"{record[name]:.4g}" if isinstance(record[name], float) else record[name])
         for name in names
         if name in record
     ]

@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The diverging colors of curvature: blue below zero, white at zero, red above."""
+"""The diverging colors of curvature: blue below zero, pale green at zero, red above."""
 
 import numpy as np
 
-# ColorBrewer's RdBu in nine steps (sRGB), which color-blind readers can tell apart.
+# ColorBrewer's RdBu in nine steps (sRGB), which color-blind readers can tell apart. Its middle is not white
+# but pale green, because a flat patch would look like the gray mesh around it.
 COLOR_STOPS = np.array([
-    (33, 102, 172), (67, 147, 195), (146, 197, 222), (209, 229, 240), (247, 247, 247),
+    (33, 102, 172), (67, 147, 195), (146, 197, 222), (209, 229, 240), (225, 250, 220),
     (253, 219, 199), (244, 165, 130), (214, 96, 77), (178, 24, 43),
 ]) / 255.0  # fmt: skip
 

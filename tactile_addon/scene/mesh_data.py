@@ -7,6 +7,7 @@ import numpy as np
 
 from .undo import note_copied
 
+ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn.
 ATTRIBUTE_KEYS = {
     "FLOAT": "value",
     "INT": "value",
@@ -71,7 +72,11 @@ def _has_triangles(mesh, count, triangles):
 
 
 def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0)):
-    """The material of this name, made if missing, which shows a color attribute or one color as it is."""
+    """The material of this name, made if missing, which shows a color attribute or one color as it is.
+
+    Eevee and Cycles draw what has it above the mesh in which it lies, by the object's length ABOVE. Solid
+    shading draws it in front instead, and neither changes its geometry.
+    """
     material = bpy.data.materials.get(name)
     if material is None:
         material = bpy.data.materials.new(name)
@@ -90,4 +95,17 @@ def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0)):
             source.layer_name = attribute
             links.new(source.outputs["Color"], emission.inputs["Color"])
         output.location, emission.location = (200, 0), (0, 0)
+        _draw_above(material, output)
     return material
+
+
+def _draw_above(material, output):
+    """Moves what has the material along its normals where it is drawn, by the object's length ABOVE."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    length, move = nodes.new("ShaderNodeAttribute"), nodes.new("ShaderNodeDisplacement")
+    length.attribute_type, length.attribute_name = "OBJECT", ABOVE
+    move.inputs["Midlevel"].default_value, move.inputs["Scale"].default_value = 0.0, 1.0
+    links.new(length.outputs["Fac"], move.inputs["Height"])
+    links.new(move.outputs["Displacement"], output.inputs["Displacement"])
+    material.displacement_method = "DISPLACEMENT"
+    move.location, length.location = (0, -200), (-200, -200)

@@ -9,19 +9,13 @@ import numpy as np
 from mathutils import Matrix
 
 from ... import core
-from . import colors
 from .contour_mesh import fill_contours
 from .family import add
-from .mesh_data import emission, fill, own_mesh, values, write
+from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
 from .patch_record import (
-    ATLAS_RECORD,
     COLOR,
     CONTOURS,
-    CURVATURE_STD,
-    CURVATURES,
-    POWERS,
     QUANTITIES_OF_A_FIT,
-    RANGE,
     RECONSTRUCTION,
     RECORD,
     VERDICT,
@@ -30,13 +24,14 @@ from .patch_record import (
     matrix_of,
     place,
 )
+from .shown import recolor, settle
 from .undo import note_added
 from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 NORMAL, PLACE = "custom_normal", "domain_place"  # Attributes: normals for shading; places on the unit disk.
-WHITE_RANGE = 1e-3  # The range of colors is no smaller, in unit radius, so that a plane is white.
+DRAWN_ABOVE = 5e-3  # It is drawn this share of its radius above the mesh, as a stability map is.
 
 
 def insert(scene, touched, parent=None, lines=None):
@@ -95,42 +90,22 @@ def rewrite(patch, touched):
         _place_contours(lines)
         names["contours"] = lines.name
     place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
+    for obj in filter(None, (patch, lines)):
+        obj[ABOVE] = DRAWN_ABOVE * touched.result.radius
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
     patch.pop(VERDICT, None)
     if touched.report["is_verified"]:
         patch[RECONSTRUCTION] = json.dumps(core.to_dict(touched.result), allow_nan=False)
     recolor(patch)
+    if touched.report["is_verified"]:
+        settle(patch)
 
 
 def meshes(patch):
     """The meshes of a patch object and of its contours; an empty list if `patch` is None."""
     objects = [] if patch is None else [patch, contours_of(patch)]
     return [obj.data for obj in objects if obj is not None]
-
-
-def recolor(patch):
-    """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record.
-
-    What is unknown of a whole object is gray, and does not count in the range.
-    """
-    own_mesh(patch)
-    shown, mesh = patch.tactile_colors, patch.data
-    shades, record = values(mesh, shown), patch[RECORD if RECORD in patch else ATLAS_RECORD]
-    floor = WHITE_RANGE * record["radius"] ** POWERS[shown]
-    unknown = _unknown(mesh) if shown in CURVATURES else []
-    limit = patch.get(RANGE) or colors.symmetric_range(np.delete(shades, unknown), floor)
-    rgba = colors.diverging(shades, limit, unknown)
-    mesh.attributes[COLOR].data.foreach_set("color", rgba.ravel())
-    if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
-        mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
-    mesh.update()
-    record["color_limit"] = limit
-
-
-def _unknown(mesh):
-    """The indices of the vertices whose curvatures are unknown; a patch has none."""
-    return np.flatnonzero(np.isinf(values(mesh, CURVATURE_STD))) if CURVATURE_STD in mesh.attributes else []
 
 
 def collection(scene):

@@ -17,6 +17,7 @@ RECONSTRUCTION = "tactile_reconstruction"  # Its core.to_dict as JSON, once a ge
 VERDICT = "tactile_verdict"  # Its status and message, while the report says that it is outdated.
 COLOR = "curvature_color"
 RANGE = "tactile_color_range"  # The range of its colors, if that is given.
+COMMON_RANGE = "tactile_common_range"  # The range that suits all patches of its mesh.
 MAP_RECORD = "tactile_map"  # The report of a stability map.
 ATLAS_RECORD = "tactile_object"  # The report of a whole object.
 GRAPH = "tactile_graph"  # The graph of a whole object, core.Atlas.to_dict as JSON.

@@ -9,6 +9,7 @@ from ..comparison.register_operator import TACTILE_OT_register
 from ..comparison.verification_wording import verification_rows, verification_table
 from ..comparison.verify_operator import TACTILE_OT_verify
 from ..probes import number_fields, probe
+from ..probes.operators import NO_MESH
 from ..probes.probe_operators import (
     TACTILE_OT_add_plane,
     TACTILE_OT_add_subdivision,
@@ -28,13 +29,15 @@ from ..touch.settings import draw_chosen, draw_sensor, draw_solver
 from ..touch.wording import registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
-from ..whole_object.object_report import object_rows
+from ..whole_object.object_report import farthest, object_rows, object_verdict
+from ..whole_object.surface_operators import TACTILE_OT_look_farthest, TACTILE_OT_mesh_again
 from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
 TAB = "Tactile"
 HELP = "Click on a mesh: a probe feels its surface there and keeps a patch of it with its curvatures"
+OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
 
 
@@ -53,10 +56,17 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
     bl_label = "Tactile Probe"
 
     def draw_active(self, context, layout, obj):
+        if context.mode != "OBJECT":
+            draw_sentence(context, layout, OTHER_MODE, "INFO")
+            layout.operator(
+                "object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE"
+            ).mode = "OBJECT"
         found = probe.probe_of(obj)
         if found is None:
             layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
-            if obj is None or not probe.is_result(obj):
+            if not any(each.type == "MESH" for each in context.view_layer.objects):
+                draw_sentence(context, layout, NO_MESH, "INFO")
+            elif obj is None or not probe.is_result(obj):
                 draw_sentence(context, layout, HELP, "INFO")
             return
         row = layout.row(align=True)
@@ -159,12 +169,18 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
         record = obj[patch_record.ATLAS_RECORD]
-        if "touches" in record:  # Measured contacts have no mesh to touch.
-            row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")
-            row.new = True
-        draw_sentence(context, layout, record["message"], ICONS.get(record["status"], "ERROR"))
+        draw_sentence(context, layout, object_verdict(record), ICONS.get(record["status"], "ERROR"))
         _draw_colors(context, layout, obj, "tactile_colors")
+        if patch_record.is_colored(obj):
+            _draw_range(context, layout, obj)
         draw_rows(context, layout.box(), object_rows(record))
+        if "touches" not in record:  # Measured contacts have no mesh to touch.
+            return
+        text = f"Largest Deviation: {farthest(record)}"
+        layout.operator(TACTILE_OT_look_farthest.bl_idname, text=text, icon="ZOOM_SELECTED", translate=False)
+        layout.operator(TACTILE_OT_mesh_again.bl_idname, icon="MOD_REMESH")
+        row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")
+        row.new = True
 
 
 class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
@@ -218,7 +234,8 @@ def _draw_range(context, layout, patch):
     symbol = units.symbol(power, unit)
     name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
     row.prop(patch, "tactile_range", text=f"{name} {symbol}".rstrip(), translate=False)
-    row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
+    if patch_record.RECORD in patch:
+        row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
 
 
 def _draw_shown(layout, found, patch):

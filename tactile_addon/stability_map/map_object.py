@@ -10,6 +10,7 @@ from bpy.props import EnumProperty
 
 from ..scene import colors, patch_object, patch_record
 from ..scene.mesh_data import emission
+from ..scene.shown import LEAST_RANGE
 from ..scene.viewports import show_colors
 from ..touch.settings import MOST_PLANES
 from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
@@ -115,7 +116,7 @@ def _limit(shown, values, spacing):
     """The end of the colors' range."""
     if shown == "blind_share":
         return 1.0
-    floor = 10.0 if shown in LOGARITHMIC else patch_object.WHITE_RANGE * spacing
+    floor = 10.0 if shown in LOGARITHMIC else LEAST_RANGE * spacing
     return colors.symmetric_range(values, floor) if len(values) else floor
 
 

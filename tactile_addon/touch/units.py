@@ -6,21 +6,14 @@ import math
 
 import bpy
 
-METERS = {
-    "KILOMETERS": ("km", 1e3),
-    "METERS": ("m", 1.0),
-    "CENTIMETERS": ("cm", 1e-2),
-    "MILLIMETERS": ("mm", 1e-3),
-    "MICROMETERS": ("µm", 1e-6),
-    "MILES": ("mi", 1609.344),
-    "FEET": ("ft", 0.3048),
-    "INCHES": ("in", 0.0254),
-    "THOU": ("thou", 2.54e-5),
-}
+from ... import core
+
 ADAPTIVE = {
     "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
 }
+# Symbol and meters of each unit, by Blender's name.
+METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
 LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
 SUPERSCRIPTS = {1: "", 2: "²"}
 

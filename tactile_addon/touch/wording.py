@@ -34,14 +34,14 @@ def readable_rows(report):
         ("point", f"{vector(np.divide(report['frame']['origin'], unit[1]))} {unit[0]}".rstrip()),
         ("normal", vector(report["frame"]["normal"])),
         ("direction d1", vector(report["frame"]["d1"])),
-        ("kappa1, kappa2", ", ".join(_measured(report, key, -1, unit) for key in ("k1", "k2"))),
+        ("principal curvatures", ", ".join(_measured(report, key, -1, unit) for key in ("k1", "k2"))),
         ("Gaussian curvature", _measured(report, "gaussian_curvature", -2, unit)),
         ("mean curvature", _measured(report, "mean_curvature", -1, unit)),
         ("shape index", f"{report['shape_index']:.3f}"),
         ("curvedness", say(report["curvedness"], -1, unit)),
         ("residual", _shared(report, "residual", unit)),
         ("fit error (6)", _shared(report, "fit_error", unit)),
-        ("height std", _shared(report, "height_std", unit)),
+        ("standard deviation of the height", _shared(report, "height_std", unit)),
         ("mesh to patch", _verification(report, unit)),
         *([("put onto", registration_summary(report["registration"]))] if "registration" in report else []),
         *_verified_rows(report.get("verification"), unit),
@@ -86,7 +86,8 @@ def _measured_contacts(report):
 
 def _tracked(report):
     stops = sorted({stop for pair in report["stops"] for stop in pair})
-    return f"{report['contacts']} on {len(report['planes'])} curves, ended by: {', '.join(stops)}"
+    where = ", ".join(ENDS.get(stop, stop) for stop in stops)
+    return f"{report['contacts']} on {len(report['planes'])} curves, which end {where}"
 
 
 def _lengths(report, unit):
@@ -127,10 +128,11 @@ def _verification(report, unit):
         return "there is none"
     if not report["vertices"]:
         return "no vertex of the mesh lies over the patch"
-    farthest = say(report["vertex_distance_max"], 1, unit)
-    return (
-        f"mean {_shared(report, 'vertex_distance_mean', unit)}; max {farthest}; {report['vertices']} vertices"
+    mean, farthest = (
+        _shared(report, "vertex_distance_mean", unit),
+        say(report["vertex_distance_max"], 1, unit),
     )
+    return f"mean {mean}; largest {farthest}; {report['vertices']} vertices"
 
 
 def _verified_rows(found, unit):
@@ -162,7 +164,7 @@ def _spread(found, what, unit):
 def _suggestion(plane, unit):
     return (
         f"azimuth {plane['azimuth']:.0f} degrees, along {vector(plane['tangent'])}; "
-        f"would take height std to {say(plane['expected_height_std'], 1, unit)}"
+        f"would take the standard deviation of the height to {say(plane['expected_height_std'], 1, unit)}"
     )
 
 

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is drawn over the viewport: the preview of a pick, the active sampling plane, and the legend."""
 
+import textwrap
+
 import blf
 import bpy
 import gpu
@@ -24,6 +26,7 @@ PLANE_COLORS = [
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.6)
 FONT = 0  # This is Blender's own font.
 LEGEND_STEPS = 65  # The legend's bar shows so many colors.
+LETTERS, BESIDE = 48, 16  # Words beside the mouse have lines of so many letters, so many pixels away from it.
 # Width and height of the legend's bar and of Blender's navigation buttons, in pixels at resolution scale 1.
 BAR, NAVIGATION_GIZMO = (150, 12), (50, 290)
 
@@ -37,6 +40,57 @@ def preview_lines(touched):
     pairs = zip(r.contours, PLANE_COLORS, strict=False)
     curves = [(contour.points, (*color, 1.0)) for contour, color in pairs]
     return [(np.vstack([edge, edge[:1]]), WHITE), (normal, WHITE), *curves]
+
+
+def draw_pick(seen):
+    """Draws what a pick has in `seen` from now on; returns the handles of the drawings.
+
+    touched : the touch whose preview is drawn, or None
+    refusal : why there is none, a sentence, or None
+    mouse : where the mouse is in the window
+    """
+    add = bpy.types.SpaceView3D.draw_handler_add
+    return [
+        add(draw_preview, (seen,), "WINDOW", "POST_VIEW"),
+        add(draw_key, (seen,), "WINDOW", "POST_PIXEL"),
+    ]
+
+
+def draw_key(seen):
+    """Draws what the lines of the preview are, or beside the mouse why there is none."""
+    context = bpy.context
+    if not _is_over(context.region, seen["mouse"]):
+        return
+    if seen["touched"] is not None:
+        count = len(seen["touched"].result.contours)
+        names = zip(range(1, count + 1), PLANE_COLORS, strict=False)
+        planes = [(f"Curve in Plane {number}", (*color, 1.0)) for number, color in names]
+        _draw_box(context, "Preview", 0.0, [], [("Rim and Normal of the Patch", WHITE), *planes])
+    elif seen["refusal"] is not None:
+        _draw_words(context, textwrap.wrap(seen["refusal"], LETTERS), seen["mouse"])
+
+
+def _is_over(region, mouse):
+    """Whether a place of the window is in a region."""
+    return 0 <= mouse[0] - region.x < region.width and 0 <= mouse[1] - region.y < region.height
+
+
+def _draw_words(context, lines, mouse):
+    """Draws lines of text in a box beside a place of the window, in the region that has it."""
+    region, scale = context.region, context.preferences.system.ui_scale
+    x, y = mouse[0] - region.x, mouse[1] - region.y
+    theme = context.preferences.themes[0].user_interface.wcol_tooltip
+    blf.size(FONT, 11.0 * scale)
+    blf.color(FONT, *theme.text, 1.0)
+    gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
+    wide = max(blf.dimensions(FONT, text)[0] for text in lines) + 2.0 * gap
+    high = len(lines) * (line + gap) + gap
+    left, right, bottom = _free_strip(context, high)
+    x = max(min(x + BESIDE * scale, right - gap - wide), left)
+    y = min(max(y - BESIDE * scale - high, bottom), region.height - high)
+    _fill_box(x, y, wide, high, (*theme.inner[:3], 0.9))
+    for number, text in enumerate(lines):
+        _write(text, x + gap, y + high - (number + 1) * (line + gap))
 
 
 def draw_preview(seen):
@@ -91,7 +145,7 @@ def draw_plane():
 def draw_legend():
     """Draws the legend of the active patch, whole object or map: quantity, unit and range."""
     context = bpy.context
-    if not shows_colors(context.space_data) or not _is_last_view(context):
+    if not shows_colors(context.space_data) or _is_picking(context) or not _is_last_view(context):
         return
     obj = _active(context)
     patch, record = probe.patch_near(obj), probe.record_of(obj)
@@ -121,6 +175,11 @@ def _is_last_view(context):
     """Whether the region is the only view of its area, or the one at the bottom right in a quad view."""
     views = [region for region in context.area.regions if region.type == "WINDOW"]
     return context.region == max(views, key=lambda region: (region.x, -region.y))
+
+
+def _is_picking(context):
+    """Whether a pick draws the key of its preview where the legend is."""
+    return any(operator.bl_idname == "TACTILE_OT_pick" for operator in context.window.modal_operators)
 
 
 def _scale(context, title, record, size, power, low):

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..probes import anchor, probe, touch_again
-from ..probes.operators import is_in_object_mode, make_active, report_error, target_object
+from ..probes.operators import has_mesh, is_in_object_mode, make_active, report_error, target_object
 from ..scene import patch_record
 from ..scene.viewports import show_colors
 from ..stability_map.map_object import inputs_of, touched_near
@@ -64,7 +64,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return is_in_object_mode(cls, context, "Points are picked")
+        return is_in_object_mode(cls, context, "Points are picked") and has_mesh(cls, context)
 
     def invoke(self, context, event):
         if context.area is None or context.area.type != "VIEW_3D":
@@ -80,10 +80,8 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         if self.at_once:
             return self._click(context, event)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
-        self._seen = {"touched": None}
-        self._drawing = bpy.types.SpaceView3D.draw_handler_add(
-            overlay.draw_preview, (self._seen,), "WINDOW", "POST_VIEW"
-        )
+        self._seen = {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}
+        self._drawings = overlay.draw_pick(self._seen)
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         context.window_manager.modal_handler_add(self)
@@ -99,10 +97,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         if event.type == "MOUSEMOVE":
             self._hover(context, event)
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            self._hover(context, event)
+            words = self._hover(context, event)
             if self._seen["touched"] is not None:
                 self.cancel(context)
                 return self._take(context)
+            self._seen["refusal"] = words
         return {"RUNNING_MODAL"}
 
     def _click(self, context, event):
@@ -124,7 +123,8 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
 
     def cancel(self, context):
         """Removes everything that shows that a pick is going on."""
-        bpy.types.SpaceView3D.draw_handler_remove(self._drawing, "WINDOW")
+        for drawing in self._drawings:
+            bpy.types.SpaceView3D.draw_handler_remove(drawing, "WINDOW")
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
         self._area.header_text_set(None)
@@ -197,8 +197,12 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         return moved
 
     def _hover(self, context, event):
-        """Touches below the mouse for the preview, and returns what the header says of it."""
-        self._seen["touched"], words = None, "Move over a mesh to touch it"
+        """Touches below the mouse for the preview, and returns what there is to say of it.
+
+        The header has no room for a sentence, so a refusal is drawn beside the mouse.
+        """
+        words = short = "Move over a mesh to touch it"
+        self._seen |= {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}
         try:
             self._read(context, names_below(context, event, self._unread))
             found = point_below(context, event)
@@ -212,10 +216,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
                 self._seen["touched"] = touched
                 unit = units.unit_of(context.scene, touched.result.radius)
                 k1, k2 = (units.say(k, -1, unit) for k in (touched.result.patch.k1, touched.result.patch.k2))
-                words = f"{touched.report['source']}: principal curvatures {k1} and {k2}"
+                words = short = f"{touched.report['source']}: principal curvatures {k1} and {k2}"
         except ValueError as error:
-            words = sentence(error)
-        self._area.header_text_set(f"Pick Reference Point     {words}")
+            words = self._seen["refusal"] = sentence(error)
+            short = "No touch is possible here"
+        self._area.header_text_set(f"Pick Reference Point     {short}")
         _redraw(context)
         return words
 

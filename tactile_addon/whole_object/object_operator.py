@@ -3,7 +3,7 @@
 """Touch All Over: touches that grow over an object by themselves; in slices if there is a window."""
 
 import bpy
-from bpy.props import FloatVectorProperty, IntProperty
+from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
 from ..probes import probe
 from ..probes.in_slices import InSlices
@@ -17,9 +17,17 @@ from ..probes.operators import (
 )
 from ..scene import patch_record
 from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
-from . import whole_mesh
+from ..touch.wording import sentence
+from . import kept, whole_mesh
+from .expected import Expected
 from .object_report import object_summary
 from .object_touches import ObjectTouches
+
+ACCURACIES = [
+    ("quick", "Quick", "A tolerance of 1/200 of the object's size: few touches, details are lost"),
+    ("normal", "Normal", "A tolerance of 1/500 of the object's size"),
+    ("fine", "Fine", "A tolerance of 1/1250 of the object's size: many touches"),
+]
 
 
 @dragged
@@ -39,7 +47,13 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     )
     tolerance: length_property(
         "Tolerance",
-        "Standard deviation to reach for the height of each patch; 0 uses 1/500 of the object's size",
+        "Standard deviation to reach for the height of each patch; 0 leaves it to the accuracy",
+    )
+    accuracy: EnumProperty(
+        name="Accuracy",
+        description="The tolerance as a share of the object's size, unless it is given",
+        items=ACCURACIES,
+        default="normal",
     )
     noise: NOISE
     seed: IntProperty(
@@ -58,7 +72,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
 
     stop = "Stop Touching and Keep"
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
-    _growing = None
+    _growing = _expected = None
 
     @classmethod
     def poll(cls, context):
@@ -80,7 +94,10 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
             target,
             context.evaluated_depsgraph_get(),
             location=location,
-            **{name: getattr(self, name) for name in ("tolerance", "noise", "seed", "most", "edge")},
+            **{
+                name: getattr(self, name)
+                for name in ("tolerance", "accuracy", "noise", "seed", "most", "edge")
+            },
         )
         self._steps = self._shown()
 
@@ -89,15 +106,15 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         shown = 0
         for _ in self._touches.steps():
             if self._growing is not None:
-                self._growing.add(self._touches.found[shown:])
+                self._growing.add(self._touches.found[shown:], self._touches.rims[shown:])
             shown = len(self._touches.found)
             yield
 
     def _done(self):
         if self._touches.is_stopped:
             self.stop = "Drop It"
-        words, share = self._touches.words, self._touches.share
-        return words if share is None else f"{words}: {share:.0%}", share
+        share = self._touches.share
+        return f"{self._touches.words}: {share:.0%}", share
 
     def _check(self, context):
         self._touches.surface.require_source(context)
@@ -119,16 +136,31 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     def _finish(self, context):
         target = self._touches.surface.require_same(context)
         made = whole_mesh.insert(context.scene, target.name, self._touches.whole, self._touches.report())
+        kept.keep(made, self._touches)
         make_active(context, made)
         record = made[patch_record.ATLAS_RECORD].to_dict()
         self.report({"INFO"} if record["status"] == "ok" else {"WARNING"}, object_summary(record))
         return {"FINISHED"}
 
+    def _about(self, context):
+        """What it will take, in a sentence, or why the object cannot be touched."""
+        if self._expected is None:
+            self._expected = Expected()
+        try:
+            target = target_object(context, self.target)
+            return self._expected.words(target, context, self.tolerance, self.accuracy, self.noise)
+        except ValueError as error:
+            return sentence(error)
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")
+        layout.label(text=self._about(context), translate=False)
         fields = fields_of(context, self.target)
+        row = layout.row()
+        row.active = not self.tolerance
+        row.prop(self, "accuracy", expand=True)
         draw_chosen(layout, self, "tolerance", fields=fields)
         draw_chosen(layout, self, "edge", fields=fields)
         layout.prop(self, "most")

@@ -8,6 +8,8 @@ import numpy as np
 from ..touch import units
 from ..touch.wording import many, table, vector
 
+ZERO = 1e-6  # A distance below this share of the size counts as 0.
+
 
 def unit_of(record):
     """The unit of a report, which has lengths from below the tolerance to far above it."""
@@ -27,26 +29,40 @@ def object_table_rows(record):
     )
     return _known(
         ("touched" if "touches" in record else "measured", f"{record['source']}, {how}"),
+        ("verdict", verdict_of(record)),
         ("surface", _surface(record)),
         ("message", record["message"]),
         ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
         ("edges of their graph", record["edges"]),
         ("tolerance", _tolerance(record)),
-        ("height std", units.say(record["height_std"], 1, unit)),
-        ("off the mesh", off and f"mean {off}; max {_off(record, 'max')}"),
-        ("farthest at", _place(record)),
-        ("mesh", f"{record['vertices']} vertices, {record['triangles']} triangles"),
+        ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
+        ("distance from the mesh", off and f"mean {off}; largest {_off(record, 'max')}"),
+        ("largest distance at", _place(record)),
+        ("surface's mesh", f"{record['vertices']} vertices, {record['triangles']} triangles"),
         ("curvatures", _unknown(record)),
     )
+
+
+def verdict_of(record):
+    """The verdict on a whole object in a word: "Good", "Doubtful" or "Incomplete"."""
+    if record["status"] == "ok":
+        return "Good"
+    return "Incomplete" if record.get("uncovered") else "Doubtful"
+
+
+def object_verdict(record):
+    """The verdict and what it rests on, for the panel."""
+    return f"{verdict_of(record)}. {record['message']}"
 
 
 def object_summary(record):
     """A sentence on what was found of a whole object."""
     std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
-        touches = many(record["touches"], "touch", "touches")
-        return f"{touches}; {_surface(record)}; {_off(record, 'mean')} off on average"
-    return f"{record['patches']} patches of {record['contacts']} contacts; {_surface(record)}; ± {std}"
+        touches, off = many(record["touches"], "touch", "touches"), _off(record, "mean")
+        return f"{verdict_of(record)}: {touches}; {_surface(record)}; {off} off the mesh on average"
+    patches = f"{record['patches']} patches of {record['contacts']} contacts"
+    return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {std}"
 
 
 def object_rows(record):
@@ -55,16 +71,20 @@ def object_rows(record):
         ("Touches", record.get("touches")),
         ("Contacts", record.get("contacts")),
         ("Surface", _ends(record)),
-        ("Rims Left", record.get("uncovered")),
+        ("Rims Left", record.get("uncovered") or None),
         ("Tolerance", _tolerance(record)),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
-        ("Off Mesh", _off(record, "mean")),
-        ("Farthest", _off(record, "max")),
+        ("Off the Mesh", _off(record, "mean")),
         ("Patches", record["patches"]),
         ("… in Doubt", record["in_doubt"]),
         ("Vertices", record["vertices"]),
         ("… without K", record.get("unknown_curvatures") or None),
     )
+
+
+def farthest(record):
+    """The largest distance between surface and mesh in words, or None if there was no mesh."""
+    return _off(record, "max")
 
 
 def _known(*rows):
@@ -99,7 +119,10 @@ def _tolerance(record):
 def _off(record, what):
     """The mean or largest deviation from the mesh in words, or None if there was no mesh."""
     off = record.get(f"deviation_{what}")
-    return None if off is None else units.say(off, 1, unit_of(record))
+    if off is None:
+        return None
+    # In single precision a little is left of 0.
+    return units.say(off if off > ZERO * record["size"] else 0.0, 1, unit_of(record))
 
 
 def _place(record):

@@ -3,6 +3,7 @@
 """Touches that grow over an object, step by step, with nothing changed in the scene."""
 
 from contextlib import suppress
+from copy import copy
 
 import numpy as np
 
@@ -12,13 +13,15 @@ from ..touch.touch_object import AWAY, nearest_point
 from ..touch.units import length
 from ..touch.wording import many
 from .both_ways import BothWays
+from .coverage import Coverage
 from .whole_surface import WholeSurface
 
 # These lengths are shares of the object's size.
-TOLERANCE_SHARE = 1.0 / 500.0  # The default tolerance.
+TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1250.0}
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 OFF_TOLERANCES = 3.0  # The surface is no good if it is off the mesh by more tolerances, as in core's check.
 STARTS = 20  # So many places to begin are tried if none is given.
+TOUCHED, JOINED = 0.5, 0.8  # Of all that is to be done, touching and joining are done at these shares.
 
 
 class ObjectTouches:
@@ -26,14 +29,17 @@ class ObjectTouches:
 
     surface : the mesh as it was, relative to its object's origin
     found : core.Reconstructions of the touches so far
+    rims : how far the finger feels each of their patches all round, (AZIMUTHS,), lengths
     done : the number of touches so far, including those that gave no patch
     uncovered : the number of places that are known to be uncovered
-    words, share : what is going on, and the share of it that is done, or None if that is unknown
+    words, share : what is going on, and the share of all that is done
     whole, compared : the WholeSurface, and its BothWays from the mesh, once the steps are done
     """
 
-    def __init__(self, obj, depsgraph, *, location, tolerance, noise, seed, most, edge):
+    def __init__(self, obj, depsgraph, *, location, tolerance, accuracy, noise, seed, most, edge):
         """The object chooses the `location` if it is None, and lengths if they are 0.
+
+        accuracy : one of TOLERANCE_SHARES, for a tolerance of 0
 
         Raises ValueError, with a sentence, for an object that cannot be touched and for bad settings.
         """
@@ -44,12 +50,13 @@ class ObjectTouches:
             if not value >= 0.0:  # NaN fails every comparison, so it is refused, too.
                 raise ValueError(f"The {name} is a length of 0 or more, got {length(value)}")
         self.surface = DetachedMesh(obj, depsgraph)
-        self.tolerance = tolerance or max(TOLERANCE_SHARE * self.surface.size, noise)
+        self.tolerance = tolerance or tolerance_of(self.surface.size, accuracy, noise)
         self._require_lengths(noise, edge)
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
-        self.found, self.done, self.uncovered = [], 0, 0
-        self.words, self.share = "Looking for a place to begin", None
+        self.found, self.rims, self.done, self.uncovered = [], [], 0, 0
+        self.words, self.share = "Looking for a place to begin", 0.0
         self.is_stopped = False
+        self._coverage = Coverage(self.surface, self.tolerance)
         self._rounds, self._is_joining = 0, False
         self._start = None
         if location is not None:
@@ -96,7 +103,7 @@ class ObjectTouches:
             except StopIteration as end:
                 self.whole = WholeSurface(end.value, self.surface.origin)
                 break
-        yield from self._shown()
+        yield from self.meshing(JOINED)
 
     def _started(self):
         """The steps of core, and the Progress of the first. Raises ValueError if touches cannot begin."""
@@ -128,12 +135,16 @@ class ObjectTouches:
                 yield self.surface.project(middle)[:2]
 
     def _note(self, state):
-        self.found += [exploration.result for exploration in state.found]
+        for exploration, rim in zip(state.found, state.rims, strict=True):
+            self.found.append(exploration.result)
+            self.rims.append(rim)
+            self._coverage.add(exploration.result, rim)
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
         self.words = f"{touches}, {places} to go on from"
         if state.joining is None:
             self._is_joining = False
+            self.share = max(self.share, TOUCHED * self._coverage.share)
             return
         self._rounds += not self._is_joining
         self._is_joining = True
@@ -141,19 +152,30 @@ class ObjectTouches:
         self.words = f"Joining {patches}" if state.joining < 1.0 else f"Checking the surface of {patches}"
         # Nobody knows how often it goes back to touching. Each round has half of what is left.
         left = 0.5**self._rounds
-        self.share = max(self.share or 0.0, 0.5 - left + 0.5 * left * state.joining)
+        self.share = max(self.share, TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - state.joining) * left))
 
-    def _shown(self):
+    def meshing(self, start=0.0):
+        """Makes the mesh and compares it in steps, from the share `start` of all on."""
         self.words, self.is_stopped = "Meshing", True
         for share in self.whole.steps(self.edge):
-            self.share = 0.5 + 0.3 * share
+            self.share = start + (1.0 - start) * 0.6 * share
             yield
         self.words = "Comparing"
         self.compared = BothWays(self.surface, self.whole.mesh, self.tolerance)
         for share in self.compared.steps():
-            self.share = 0.8 + 0.2 * share
+            self.share = start + (1.0 - start) * (0.6 + 0.4 * share)
             yield
         self.whole.deviation = self.compared.deviation
+
+    def again(self, edge):
+        """These touches, whose `meshing` makes the surface with edges of another length, or 0.
+
+        Raises ValueError, with a sentence, for a length that does not suit the object.
+        """
+        self._require_lengths(self.noise, edge)
+        again = copy(self)
+        again.edge, again.share, again.whole = edge, 0.0, WholeSurface(self.whole.atlas, self.surface.origin)
+        return again
 
     def stop(self):
         """Makes the steps touch no more, and join the patches so far."""
@@ -168,19 +190,32 @@ class ObjectTouches:
             "deviation_mean": self.compared.mean,
             "deviation_max": self.compared.largest,
             "deviation_place": (self.surface.origin + self.compared.place).tolist(),
+            "origin": self.surface.origin.tolist(),
             "size": self.surface.size,
             "tolerance": self.tolerance,
             "noise": self.noise,
             "seed": self.seed,
             "most": self.most,
         }
-        if found["status"] == "ok" and self.compared.largest > OFF_TOLERANCES * self.tolerance:
-            found["status"], found["message"] = self._off()
+        if found["status"] == "ok":
+            found["status"], found["message"] = self._verdict(found)
         return found
 
-    def _off(self):
-        """The verdict on a surface that is farther off the mesh than its tolerance explains."""
-        return "uncertain", (
-            f"The surface is up to {length(self.compared.largest)} off the object, which the tolerance does "
-            "not explain: use a smaller tolerance, or close the holes of its mesh."
-        )
+    def _verdict(self, found):
+        """The status and the message of a surface that its atlas says is ok."""
+        if self.compared.largest > OFF_TOLERANCES * self.tolerance:
+            return "uncertain", (
+                f"The surface is up to {length(self.compared.largest)} off the object, which the tolerance "
+                "does not explain: use a smaller tolerance, or close the holes of its mesh."
+            )
+        if found["height_std"] > self.tolerance:
+            return "uncertain", (
+                f"Heights are accurate to {length(found['height_std'])} on average, and the tolerance is "
+                f"{length(self.tolerance)}: use a larger tolerance."
+            )
+        return found["status"], found["message"]
+
+
+def tolerance_of(size, accuracy, noise):
+    """The tolerance for an object of this size; it is not below the noise."""
+    return max(TOLERANCE_SHARES[accuracy] * size, noise)

@@ -3,17 +3,22 @@
 """What touches all over an object put into the scene: patches while they grow, then one surface."""
 
 import math
+from itertools import pairwise
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ..scene import colors, patch_object, patch_record, undo
-from ..scene.mesh_data import emission, fill
+from ..scene.mesh_data import ABOVE, emission, fill, own_mesh
+from ..scene.shown import recolor
 from ..scene.viewports import show_colors
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
-RINGS, SPOKES = (0.5, 1.0), 24  # While a patch is one of many, it is drawn with these rings and spokes.
+# While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
+RINGS, SPOKES = (0.3, 0.65, 0.95, 1.0), 48
+RIM_COLOR = (0.02, 0.02, 0.02, 1.0)
+DRAWN_ABOVE = 5e-3  # It is drawn this share of the object's size above the mesh, in which it would lie.
 
 
 class GrowingPatches:
@@ -23,24 +28,26 @@ class GrowingPatches:
         """`surface` is the DetachedMesh that is touched."""
         mesh = bpy.data.meshes.new(f"{surface.name} Touches")
         obj = bpy.data.objects.new(mesh.name, mesh)
-        obj.show_in_front, obj.matrix_world = True, Matrix.Translation(surface.origin)
+        # It is not drawn in front: patches on the far side would show through.
+        obj.matrix_world = Matrix.Translation(surface.origin)
         scene.collection.objects.link(obj)  # A collection of its own might be left empty.
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
         obj.data.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
-        self._uid, self._patches = obj.session_uid, []
+        self._uid, self._patches, self._above = obj.session_uid, [], DRAWN_ABOVE * surface.size
         show_colors()
 
-    def add(self, found):
-        """Shows these core.Reconstructions, too, unless somebody has deleted the object."""
+    def add(self, found, rims):
+        """Shows these core.Reconstructions, too, up to their rims, unless somebody has deleted the object."""
         obj = self._object()
         if obj is None or not found:
             return
-        self._patches += [_disk(r) for r in found]
+        self._patches += [_disk(r, rim, self._above) for r, rim in zip(found, rims, strict=True)]
         points, curvatures = (np.concatenate(parts) for parts in zip(*self._patches, strict=True))
         count = 1 + SPOKES * len(RINGS)
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         shades = colors.diverging(curvatures, colors.symmetric_range(curvatures, 1e-30))
+        shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
         fill(obj.data, points, triangles, [(patch_record.COLOR, "FLOAT_COLOR", shades)])
 
     def remove(self):
@@ -53,35 +60,49 @@ class GrowingPatches:
         return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
 
 
-def _disk(r):
-    """Points (n, 3) of a patch, on rings around its middle, and their Gaussian curvatures (n,)."""
+def _disk(r, rim, above):
+    """Points (n, 3) of a patch, on rings around its middle, and their Gaussian curvatures (n,).
+
+    rim : (k SPOKES,), the radii of the patch all round, where the finger felt it end
+    above : the points are so far above the patch
+    """
     angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
-    unit = np.column_stack([np.cos(angles), np.sin(angles)])
-    x, y = r.domain.points_at(np.vstack([np.zeros((1, 2)), *(share * unit for share in RINGS)])).T
-    return r.frame.to_world(np.column_stack([x, y, r.height(x, y)])), r.patch.gaussian_curvature(x, y)
+    edge = rim[:: len(rim) // SPOKES, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    x, y = np.vstack([np.zeros((1, 2)), *(share * edge for share in RINGS)]).T
+    d = r.geometry.derivatives(x, y)
+    points = np.column_stack([x, y, d.z]) + above * d.normal
+    return r.frame.to_world(points), r.patch.gaussian_curvature(x, y)
 
 
 def _fan():
     """The triangles (m, 3) between the points of a disk."""
     a, b = np.arange(SPOKES), np.roll(np.arange(SPOKES), -1)
-    inner, outer = 1 + a, 1 + SPOKES + a
-    return np.vstack(
-        [
-            np.column_stack([np.zeros_like(a), inner, 1 + b]),
-            np.column_stack([inner, outer, 1 + SPOKES + b]),
-            np.column_stack([inner, 1 + SPOKES + b, 1 + b]),
+    rings = [(1 + SPOKES * i + a, 1 + SPOKES * i + b) for i in range(len(RINGS))]
+    parts = [np.column_stack([np.zeros_like(a), *rings[0]])]
+    for (inner, inner_next), (outer, outer_next) in pairwise(rings):
+        parts += [
+            np.column_stack([inner, outer, outer_next]),
+            np.column_stack([inner, outer_next, inner_next]),
         ]
-    )
+    return np.vstack(parts)
 
 
 def insert(scene, name, whole, report):
     """Adds a WholeSurface of the object with this name to the scene, and returns the new object."""
-    mesh = bpy.data.meshes.new(f"{name} {'Touched' if 'touches' in report else 'Joined'}")
+    mesh = bpy.data.meshes.new(f"{name} Surface")
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin), True
     patch_object.collection(scene).objects.link(obj)
     mesh.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
-    found = whole.mesh
+    rewrite(obj, whole, report | {"source": name})
+    show_colors()
+    return obj
+
+
+def rewrite(obj, whole, report):
+    """Gives the object of a whole surface the mesh, the report and the graph of a WholeSurface."""
+    own_mesh(obj)
+    mesh, found = obj.data, whole.mesh
     attributes = [
         *((key, "FLOAT", values) for key, values in whole.curvatures.items()),
         ("height_std", "FLOAT", found.std),
@@ -92,8 +113,7 @@ def insert(scene, name, whole, report):
     fill(mesh, found.vertices, found.triangles, attributes)
     mesh.shade_smooth()
     mesh.set_sharp_from_angle(angle=SHARP)
-    obj[patch_record.ATLAS_RECORD] = report | {"source": name, "object": obj.name}
+    obj[patch_record.ATLAS_RECORD] = report | {"object": obj.name}
     obj[patch_record.GRAPH] = whole.graph
-    patch_object.recolor(obj)
-    show_colors()
-    return obj
+    obj[ABOVE] = DRAWN_ABOVE * float(np.ptp(found.vertices, axis=0).max())
+    recolor(obj)

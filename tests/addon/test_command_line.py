@@ -38,7 +38,7 @@ def test_every_option_arrives(command, files):
     arguments = (*PLACE, *options, "--json", path, "--output", output)
     code, out, err = command("reconstruct", files / "ball.blend", *arguments)
     assert (code, err) == (0, "")
-    assert "kappa1, kappa2" in out
+    assert "principal curvatures" in out
     report = json.loads(path.read_text())
     assert [report[key] for key in ("method", "degree", "seed")] == ["quadratic-variation", 5, 4]
     assert report["step"] == pytest.approx(0.05)
@@ -89,7 +89,7 @@ def test_every_option_of_a_map_arrives_and_the_copy_is_saved(command, files):
     arguments = ("map", files / "ball.blend", "--spacing", 1.5, *options)
     code, out, err = command(*arguments, "--json", path, "--output", blend)
     assert (code, err) == (0, "")
-    assert "median height_std" in out
+    assert "median standard deviation" in out
     report = json.loads(path.read_text())
     assert [report[key] for key in ("method", "degree", "seed")] == ["bayes", 5, 4]
     assert [report[key] for key in ("spacing", "extent", "step")] == pytest.approx([1.5, 0.6, 0.05])
@@ -128,18 +128,18 @@ def test_lengths_are_said_in_the_unit_of_the_scene(command, files):
     out = command("reconstruct", files / "ball.blend", *PLACE)[1]
     rows = dict(line.split("  ", 1) for line in out.splitlines() if "  " in line)
     rows = {label.strip(): value.strip() for label, value in rows.items()}
-    assert re.fullmatch(r"-0\.5\S* ± \S+ 1/m, -0\.[45]\S* ± \S+ 1/m", rows["kappa1, kappa2"])
+    assert re.fullmatch(r"-0\.5\S* ± \S+ 1/m, -0\.[45]\S* ± \S+ 1/m", rows["principal curvatures"])
     assert re.fullmatch(r"0\.2\d* ± \S+ 1/m²", rows["Gaussian curvature"])
-    assert re.fullmatch(r"\S+ \w*m, \S+ % of the radius", rows["height std"])
+    assert re.fullmatch(r"\S+ \w*m, \S+ % of the radius", rows["standard deviation of the height"])
     assert re.fullmatch(r"\S+ m, 0.6 m, \S+ m", rows["step, extent, radius"])
     assert rows["point"].endswith(" m")
     bpy.context.scene.unit_settings.system = "NONE"
     bpy.ops.wm.save_as_mainfile(filepath=str(files / "none.blend"))
     out = command("reconstruct", files / "none.blend", *PLACE)[1]
-    assert re.search(r"kappa1, kappa2 +-0\.5\S* ± \S+, -0\.[45]\S* ± \S+\n", out)
+    assert re.search(r"principal curvatures +-0\.5\S* ± \S+, -0\.[45]\S* ± \S+\n", out)
     out = command("map", files / "ball.blend", "--spacing", 1)[1]
-    assert re.search(r"median height_std +\S+ \S*m\n", out)
-    assert re.search(r"median blind_share +[\d.]+\n", out)
+    assert re.search(r"median standard deviation +\S+ \S*m\n", out)
+    assert re.search(r"median blind share +[\d.]+\n", out)
 
 
 def test_strokes_are_fitted_around_a_place(command, empty, tmp_path):
@@ -308,6 +308,79 @@ def test_numbers_that_blender_reads_as_0_are_found_wherever_vertices_are(command
         + "\n".join(["end_header", *lines[-len(FACES) :], *lines[: -len(FACES)], ""])
     )
     assert "1 of them: correct or delete these" in command("map", tmp_path / "text.ply")[2]
+
+
+def rearranged(kind, change, word="nan"):
+    """A .ply of `mesh_data` whose head and rows were changed by a function of both."""
+    head, rows = mesh_data(kind, word).split(b"end_header\n")
+    head, rows = change(head.decode(), rows)
+    return head.encode() + b"end_header\n" + rows
+
+
+def faces_first(head, rows):
+    vertices, faces, size = head.index("element vertex"), head.index("element face"), len(FACES) * 13
+    strips = "element strip 2\nproperty double width\nproperty list ushort short at\n"
+    data = bytes(8) + b"\2\0" + bytes(4) + bytes(10)
+    return head[:vertices] + strips + head[faces:] + head[vertices:faces], data + rows[-size:] + rows[:-size]
+
+
+def comment_first(head, rows):
+    return head.replace("ply\n", "ply\ncomment of a scanner\n", 1), rows
+
+
+def listed_before(head, rows):
+    words = [(b"1 7 " if i < len(VERTICES) else b"") + line for i, line in enumerate(rows.split(b"\n"))]
+    return head.replace("5\n", "5\nproperty list uchar int group\n"), b"\n".join(words)
+
+
+def twice(head, rows):
+    words = [line + (b" 0.5" if i < len(VERTICES) else b"") for i, line in enumerate(rows.split(b"\n"))]
+    return head.replace("element face", "property float x\nelement face"), b"\n".join(words)
+
+
+def listed(head, rows):
+    words = [line + (b" 2 7 7" if i < len(VERTICES) else b"") for i, line in enumerate(rows.split(b"\n"))]
+    return head.replace("element face", "property list uchar int group\nelement face"), b"\n".join(words)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("binary.ply", faces_first),
+        ("binary.ply", comment_first),
+        ("text.ply", comment_first),
+        ("text.ply", listed),
+    ],
+)
+def test_numbers_that_blender_reads_as_0_are_found_below_any_header(command, empty, tmp_path, kind, change):
+    path = tmp_path / kind
+    path.write_bytes(rearranged(kind, change, "0.1"))
+    assert "not finite" not in command("map", path)[2]
+    path.write_bytes(rearranged(kind, change))
+    assert "1 of them: correct or delete these" in command("map", path)[2]
+
+
+def long_line(head, rows):
+    return head, rows.replace(b"3 0 1 2", b"3 0 1 2" + 70_000 * b" ")
+
+
+def long_comment(head, rows):
+    return head.replace("element face", f"comment {70_000 * 'a'}\nelement face"), rows
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("text.ply", twice),
+        ("text.ply", listed_before),
+        ("text.ply", long_line),
+        ("text.ply", long_comment),
+        ("binary.ply", long_comment),
+    ],
+)
+def test_a_ply_that_blender_reads_otherwise_or_ends_over_is_refused(command, empty, tmp_path, kind, change):
+    (tmp_path / kind).write_bytes(rearranged(kind, change, "0.1"))
+    assert f'no mesh could be read from "{kind}"' in command("map", tmp_path / kind)[2]
 
 
 def test_where_curves_meet_is_told_in_double_precision(command, empty, tmp_path):

@@ -54,6 +54,10 @@ def test_what_cannot_run_says_why(empty):
             getattr(empty.ops.tactile, name)()
         return str(caught.value).partition(".poll() ")[2]
 
+    for obj in list(empty.data.objects):
+        empty.data.objects.remove(obj)
+    said = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
+    assert refused("pick") == said
     on_probes = ("add_plane", "add_planes", "remove_plane", "update", "delete")
     assert {refused(name) for name in on_probes} == {"Select a probe, or pick a reference point first"}
     assert refused("show_colors") == "Use it in a 3D viewport"

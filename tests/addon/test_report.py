@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The report is one whole page, and its figures are those of the patch or map."""
 
+import base64
 import json
 import re
+import struct
+import zlib
 from html.parser import HTMLParser
 
 import numpy as np
@@ -14,7 +17,7 @@ from scenes import made
 
 TOUCH = {"location": (0.3, -0.2, 1.9), "extent": 0.6, "step": 0.06}
 PLACE = ("--location", 0.3, -0.2, 1.9, "--extent", 0.6)
-VOID = ("meta", "path", "circle", "rect", "br")
+VOID = ("meta", "path", "circle", "rect", "br", "img")
 
 
 class Page(HTMLParser):
@@ -49,6 +52,22 @@ def band(page, name):
     """The share within a band of this name, in %."""
     (row,) = [row for row in page.rows if row[0] == name]
     return float(next(cell for cell in row[1:] if cell.endswith(" %")).removesuffix(" %"))
+
+
+def pixels(address):
+    """Which pixels of a picture within the page are covered, and whether there are gaps between these."""
+    data, lines = base64.b64decode(address.removeprefix("data:image/png;base64,")), b""
+    at = 8
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        lines += data[at + 8 : at + 8 + length] if data[at + 4 : at + 8] == b"IDAT" else b""
+        at += 12 + length
+    rows = np.frombuffer(zlib.decompress(lines), dtype=np.uint8).reshape(480, -1)
+    assert (rows[:, 0] == 2).all()  # Each line is the difference from the one above.
+    covered = np.cumsum(rows[:, 1:], axis=0, dtype=np.uint8).reshape(480, 480, 4)[:, :, 3] > 0
+    first, last = covered.argmax(axis=1), 479 - covered[:, ::-1].argmax(axis=1)
+    inside = [row[a : b + 1].all() for row, a, b in zip(covered, first, last, strict=True) if row.any()]
+    return covered, not all(inside)
 
 
 def test_the_page_of_a_patch_is_whole_and_its_shares_are_those_of_its_area(empty, ball, tmp_path):
@@ -102,9 +121,13 @@ def test_the_page_of_a_map(command, files, tmp_path):
     text = (tmp_path / "map.html").read_text(encoding="utf-8")
     page = Page(text)
     assert page.counts["figure"] == 4  # three views and the histogram
-    assert 1000 < page.counts["circle"] <= 3 * 4000
+    assert len(page.addresses) == page.counts["img"] == 3
+    for address in page.addresses:
+        wide, gaps = pixels(address)
+        assert wide.mean() == pytest.approx(np.pi / 4.0, abs=0.03)  # a ball that fills the picture
+        assert not gaps
     assert band(page, "± 5 % of the extent") == 100.0
-    assert "Error: white at 0, dark red from " in text
+    assert "Error: pale green at 0, dark red from " in text
     assert re.search(r"(\d+) patches at \1 points, 0 in doubt", text)
 
 

@@ -445,6 +445,20 @@ def test_a_worker_whose_run_is_gone_finishes_the_file_that_it_writes(objects, pl
         hand._said.close()
 
 
+def test_blender_leaves_no_folder_of_its_own(objects, plain, tmp_path, monkeypatch):
+    from cluster.data_set import manifest
+    from cluster.worker.process import HandProcess
+
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    hands = [HandProcess(), HandProcess()]
+    for hand in hands:
+        assert hand.ask(100.0, "survey", str(objects / "pebble.ply"), manifest.versions())[0] == "done"
+    os.kill(hands[0]._process.pid, signal.SIGKILL)
+    for hand in hands:
+        hand.close()
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("ended", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_ends_cleanly_and_goes_on_later(command, objects, plain, tmp_path, ended):
     run = started(objects, *FEW, "--output", tmp_path, "--workers", "1")

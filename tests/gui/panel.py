@@ -58,6 +58,44 @@ def first():
     check("a click on the name of a number copies it", " ± " in copied and copied.endswith("1/m"), copied)
 
 
+def refused():
+    """Where there can be no touch, words beside the mouse say why, and a click does not end the pick."""
+    mesh = bpy.data.meshes.new("Spikes")
+    mesh.from_pydata(
+        [(0, 0, 1), (1, 0, 0), (-0.5, 0.8, 0), (-0.5, -0.8, 0)], [], [(0, 1, 2), (0, 2, 3), (0, 3, 1)]
+    )
+    spike = bpy.data.objects.new("Spike", mesh)
+    bpy.context.collection.objects.link(spike)
+    others = [obj for obj in bpy.data.objects if obj != spike and obj.visible_get()]
+    for obj in others:
+        obj.hide_set(True)
+    activate(spike)
+    look(Vector((0.0, 0.0, 0.5)), (1.0, 0.1, 1.0), 4.0)
+    yield 0.5
+    before = set(bpy.data.objects)
+    gui.click(*PICK_BUTTON)
+    yield 0.5
+    x, y = (round(v) for v in gui.view_point((0.004, 0.0, 0.996)))
+    gui.xdo("mousemove", x - 20, y + 9, "sleep", 0.3, "mousemove", x, y)
+    yield 1
+    picture("panel_refused")
+    gui.xdo("click", 1)
+    yield 1
+    picture("panel_refused_click")
+    check("a click where no touch is possible makes nothing", set(bpy.data.objects) == before, before)
+    picks = any(op.bl_idname == "TACTILE_OT_pick" for op in bpy.context.window.modal_operators)
+    check("... and the pick goes on", picks)
+    gui.xdo("key", "Escape")
+    yield 0.5
+    bpy.ops.object.mode_set(mode="SCULPT")
+    yield 0.5
+    picture("panel_sculpt")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.data.objects.remove(spike)
+    for obj in others:
+        obj.hide_set(False)
+
+
 def numbers():
     """Numbers are not dragged here, as Blender then takes the pointer back, and xdotool moves it away."""
     settings = probe().tactile_probe
@@ -158,6 +196,9 @@ def large():
 def steps():
     yield from open_tab()
     yield from first()
+    yield from refused()
+    activate(probe())
+    yield 1
     yield from numbers()
     yield from hidden()
     yield from on_map()

@@ -85,9 +85,13 @@ def make_target():
     obj.data.shade_smooth()
     obj.name = "Target"
     bpy.context.view_layer.update()
+    make_view(obj)
+    bpy.ops.ed.undo_push(message="Target")
+
+
+def make_view(obj):
     corners = [obj.matrix_world @ corner for corner in map(Vector, obj.bound_box)]
     look(sum(corners, Vector((0, 0, 0))) / 8, (1.0, -0.3, 0.5), 2.2 * max(obj.dimensions))
-    bpy.ops.ed.undo_push(message="Target")
 
 
 def by_dialog():
@@ -96,8 +100,14 @@ def by_dialog():
     check("the dialog starts it", running())
     yield from until(lambda: any("Touches" in obj.name for obj in bpy.data.objects), 20)
     yield 1
+    off = grown_off()
+    check("while they grow, patches end where the object does", off < 0.02, off)
     picture("whole_growing")
     yield from until(lambda: not running(), 120)
+    told = [words for words in WORDS if words[0].isdigit()]
+    check("... with the share that is done", all(words.endswith("%") for words in told), told[-3:])
+    shares = [int(words.rpartition(" ")[2].removesuffix("%")) for words in told]
+    check("... which grows", shares == sorted(shares) and shares[-1] >= 40, shares[-3:])
     (surface,) = surfaces() or [None]
     if not check("it ends by itself with a surface", surface is not None, data_blocks()):
         return
@@ -126,6 +136,47 @@ def by_dialog():
     gui.xdo("key", "ctrl+shift+z")
     yield 1
     check("Ctrl Shift Z brings it again", data_blocks() == full, data_blocks())
+
+
+def grown_off():
+    """How far the patches that grow are off the target at most, as a share of its size."""
+    target = bpy.data.objects["Target"]
+    grown = next(obj for obj in bpy.data.objects if obj.name.endswith("Touches"))
+    to_target = target.matrix_world.inverted() @ grown.matrix_world
+    points = [to_target @ vertex.co for vertex in grown.data.vertices]
+    return max((target.closest_point_on_mesh(p)[1] - p).length for p in points) / max(target.dimensions)
+
+
+def meshed_again():
+    """Another edge length without touches, and a look at the largest deviation."""
+    (surface,) = surfaces()
+    before, window, area, region = surface["tactile_object"].to_dict(), *gui.find()
+    edge = before["size"] / 20
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.mesh_again("INVOKE_DEFAULT", True, edge=edge)
+    yield 1
+    picture("whole_edge_dialog")
+    gui.xdo("key", "Return")
+    yield from until(lambda: surfaces()[0]["tactile_object"]["vertices"] != before["vertices"], 30)
+    (surface,) = surfaces()
+    record = surface["tactile_object"].to_dict()
+    check("another edge length makes another mesh", record["vertices"] < before["vertices"], record)
+    check("... of the same touches", record["touches"] == before["touches"], record)
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.look_farthest("INVOKE_DEFAULT", True)
+    yield 1
+    picture("whole_farthest")
+    seen = area.spaces.active.region_3d.view_location
+    off = (seen - Vector(record["deviation_place"])).length
+    check("the largest deviation is looked at", off < 1e-4 * record["size"], off)
+    check("... with its vertex selected", sum(v.select for v in surface.data.vertices) == 1)
+    for _ in range(2):
+        gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+        yield 1
+    count = surfaces()[0]["tactile_object"]["vertices"]
+    check("Ctrl Z brings the first mesh back", count == before["vertices"], count)
+    make_view(bpy.data.objects["Target"])
+    yield 0.5
 
 
 def by_click():
@@ -239,6 +290,7 @@ def steps():
     measure_slices()
     yield 1
     yield from by_dialog()
+    yield from meshed_again()
     yield from by_click()
     yield from by_escape()
     yield from while_it_is_meshed()

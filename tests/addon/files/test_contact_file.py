@@ -102,7 +102,7 @@ def test_curves_named_strokes_run_beside_the_point(contact_file, read, tmp_path)
 @pytest.mark.parametrize("curves", [0, 1, 2])
 def test_strokes_are_written_as_they_are_read(contact_file, tmp_path, curves):
     every = [Contour(curve, noise=0.1 * (i + 1)) for i, curve in enumerate(WANTED)]
-    given = contact_file.Contacts(every[:curves], "mm", [0.0, 1.0, 2.0], None, tuple(every[curves:]))
+    given = core.Contacts(every[:curves], "mm", [0.0, 1.0, 2.0], None, tuple(every[curves:]))
     contact_file.write(tmp_path / "all.csv", given)
     found = contact_file.read(tmp_path / "all.csv")
     assert found.point == given.point
@@ -189,7 +189,7 @@ def test_files_that_are_none(contact_file, read, tmp_path):
 def test_what_the_tracker_made_comes_back_as_it_was(contact_file, tmp_path):
     s = surfaces.pear()
     contours = s.track(surfaces.planes((0, 60, 120)), noise=0.05, rng=1)
-    given = contact_file.Contacts(contours, "mm", [0.1, 1 / 3, 2e-17], [0.6, 0.0, -0.8])
+    given = core.Contacts(contours, "mm", [0.1, 1 / 3, 2e-17], [0.6, 0.0, -0.8])
     contact_file.write(tmp_path / "out.csv", given)
     found = contact_file.read(tmp_path / "out.csv")
     assert found[1:] == given[1:]
@@ -248,7 +248,7 @@ def test_comments_that_are_not_ours_say_nothing(contact_file, tmp_path):
 def test_any_numbers_come_back_as_they_were(contact_file, tmp_path_factory, coordinates, unit):
     path = tmp_path_factory.getbasetemp() / "any.csv"
     contours = [Contour(coordinates[:2]), Contour(coordinates[2:])]
-    contact_file.write(path, contact_file.Contacts(contours, unit))
+    contact_file.write(path, core.Contacts(contours, unit))
     contours, found = contact_file.read(path)[:2]
     assert found == unit
     assert np.array_equal(np.vstack([c.points for c in contours]), coordinates)
@@ -368,13 +368,13 @@ def rows_of(count, digits=17):
 
 
 @pytest.mark.parametrize("change", [("c,", "c,"), ("c,", '"c",'), ("c,", " c , "), (".", ",")])
-def test_rows_are_read_many_at_a_time_and_take_little_memory(read, contact_file, monkeypatch, change):
+def test_rows_are_read_many_at_a_time_and_take_little_memory(read, extension, monkeypatch, change):
     """A row is looked at by itself only where an error has to name it."""
     count = 50_000
     points, text = rows_of(count)
     text = text.replace(",", ";").replace(".", ",") if change[0] == "." else text.replace(*change)
     looked = []
-    monkeypatch.setattr(contact_file.contact_rows.Rows, "_row", lambda *_: looked.append(1))
+    monkeypatch.setattr(extension.core.contact_data.rows.Rows, "_row", lambda *_: looked.append(1))
     header = "curve;x;y;z\n" if change[0] == "." else "curve,x,y,z\n"
     tracemalloc.start()
     try:
@@ -408,11 +408,11 @@ def test_a_line_of_millions_of_words_is_refused_before_it_takes_memory(read, dat
     assert peak < 10 * len(data)
 
 
-def test_one_bad_row_costs_no_more_than_its_neighbors(read, contact_file, monkeypatch):
+def test_one_bad_row_costs_no_more_than_its_neighbors(read, extension, monkeypatch):
     count, looked = 50_000, []
-    row = contact_file.contact_rows.Rows._row
+    row = extension.core.contact_data.rows.Rows._row
     monkeypatch.setattr(
-        contact_file.contact_rows.Rows, "_row", lambda *given: looked.append(1) or row(*given)
+        extension.core.contact_data.rows.Rows, "_row", lambda *given: looked.append(1) or row(*given)
     )
     _, text = rows_of(count)
     with pytest.raises(ValueError, match=f'line {count + 2}, column "y": expected a number, got "three"'):
@@ -420,8 +420,8 @@ def test_one_bad_row_costs_no_more_than_its_neighbors(read, contact_file, monkey
     assert len(looked) < 3000
 
 
-def test_empty_lines_are_not_looked_at_one_by_one(read, contact_file, monkeypatch):
-    rows, seen = contact_file.contact_rows, []
+def test_empty_lines_are_not_looked_at_one_by_one(read, extension, monkeypatch):
+    rows, seen = extension.core.contact_data.rows, []
     says = rows._says
     monkeypatch.setattr(rows, "_says", lambda line: seen.append(1) or says(line))
     for blank in ("\n", " \n", "\r\n"):
@@ -458,10 +458,10 @@ def test_numbers_that_no_curve_can_have_are_refused_with_their_place(read, data,
         read(data, name)
 
 
-def test_a_file_beyond_memory_is_a_sentence(read, contact_file, monkeypatch):
+def test_a_file_beyond_memory_is_a_sentence(read, extension, monkeypatch):
     def exhausted(*_):
         raise MemoryError
 
-    monkeypatch.setattr(contact_file.contact_rows, "contours", exhausted)
+    monkeypatch.setattr(extension.core.contact_data.rows, "contours", exhausted)
     with pytest.raises(ValueError, match=r'"contacts.csv": expected contacts that fit into memory, got more'):
         read(PLAIN)

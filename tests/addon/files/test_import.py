@@ -12,7 +12,7 @@ pytest.importorskip("bpy", reason="needs Blender as a Python module: run make te
 import surfaces
 from scenes import PLACE, datablocks, made, positions, values
 
-from core import Contour, from_dict
+from core import Contacts, Contour, from_dict
 
 SURFACE = surfaces.torus(40, 20, 0.6)
 HIDDEN = surfaces.graph({(2, 1): 3.0 / 900.0, (0, 3): -1.0 / 900.0})
@@ -35,7 +35,7 @@ def measured(extension, empty, tmp_path):
                 object.__setattr__(c, "points", np.random.default_rng(0).permutation(c.points))
             object.__setattr__(c, "noise", None)
         contact_file = extension.tactile_addon.files.contact_file
-        contact_file.write(tmp_path / name, contact_file.Contacts(contours, unit))
+        contact_file.write(tmp_path / name, Contacts(contours, unit))
         return str(tmp_path / name)
 
     return write
@@ -116,7 +116,7 @@ def wiped(extension, path, marked, noise=0.02, also=()):
         rows += [Contour(c.points[i::3] - 1e-3 * i) for i in range(3)]
     contact_file = extension.tactile_addon.files.contact_file
     contours, strokes = ([*also], rows) if marked else ([*also, *rows], [])
-    contact_file.write(path, contact_file.Contacts(contours, "", None, None, tuple(strokes)))
+    contact_file.write(path, Contacts(contours, "", None, None, tuple(strokes)))
     return str(path)
 
 
@@ -165,7 +165,7 @@ def test_strokes_that_carry_no_patch_are_refused_with_a_sentence(extension, empt
     line = np.column_stack([np.linspace(-9, 9, 50), np.zeros((50, 2))])
     contact_file = extension.tactile_addon.files.contact_file
     path = tmp_path / "line.csv"
-    contact_file.write(path, contact_file.Contacts([], "", None, None, (Contour(line),)))
+    contact_file.write(path, Contacts([], "", None, None, (Contour(line),)))
     before = datablocks(empty)
     with pytest.raises(RuntimeError, match="The strokes run along a line, two lines or a ring"):
         empty.ops.tactile.import_contacts(filepath=str(path))

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 from scenes import datablocks, made, positions, values
 
-from core import Contour, atlas_of
+from core import Contacts, Contour, atlas_of
 
 CENTER, RADIUS = np.array([40.0, -3.0, 7.0]), 2.0
 GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
@@ -40,7 +40,7 @@ def write(extension, empty, tmp_path):
 
     def write(name, strokes, **told):
         contact_file = extension.tactile_addon.files.contact_file
-        contact_file.write(tmp_path / name, contact_file.Contacts([], "", strokes=tuple(strokes), **told))
+        contact_file.write(tmp_path / name, Contacts([], "", strokes=tuple(strokes), **told))
         return tmp_path / name
 
     return write
@@ -185,3 +185,20 @@ def test_normals_without_a_direction_are_named(empty, write):
     path = write("ball.csv", [Contour(points, normals=0.0 * normals)])
     with pytest.raises(RuntimeError, match=r"Normals: expected vectors with a direction, got \(0, 0, 0\)"):
         joined(empty, [path])
+
+
+def test_normals_that_contradict_each_other_are_refused_before_anything_is_joined(empty, command, write):
+    points, normals = ball()
+    half = [Contour(points[i::2], normals=(1 - 2 * i) * normals[i::2]) for i in (0, 1)]
+    paths = [write(f"half{i}.csv", [some]) for i, some in enumerate(half)]
+    before = datablocks(empty)
+    sentence = "ormals: expected those of neighboring contacts on one side, got opposite ones at 29"
+    with pytest.raises(RuntimeError, match=sentence):
+        joined(empty, paths)
+    assert datablocks(empty) == before
+    code, _, err = command("join", *paths)
+    assert code == 1
+    assert sentence in err
+    code, _, err = command("join", paths[0], "--noise", 5)
+    assert code == 1
+    assert "oise: expected less than the size of what was felt, 4, got 5" in err

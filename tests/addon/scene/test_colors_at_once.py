@@ -42,22 +42,53 @@ def test_patches_share_a_range_and_may_be_given_one(empty, ball):
     empty.context.scene.unit_settings.length_unit = "MILLIMETERS"
     ball.scale = (1.0, 1.0, 0.5)
     empty.context.view_layer.update()
-    patches = [touch(empty, location) for location in ((0, 0, 0.5), (1, 0, 0))]
+    patches = [touch(empty, (0, 0, 0.5))]
+    own = [patches[0]["tactile"]["color_limit"]]
+    patches.append(touch(empty, (1, 0, 0)))
     other = touch(empty, (0, 1, 0))
     other.tactile_colors = "mean_curvature"
-    own = [patch["tactile"]["color_limit"] for patch in patches]
+    own.append(patches[1]["tactile"]["color_limit"])
     assert own[1] > 2.0 * own[0]
+    assert patches[0]["tactile"]["color_limit"] == own[1]  # They share it without being asked.
+    empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, location=(9, 0, 0))
+    empty.context.object.name = "Alone"
+    empty.ops.tactile.reconstruct(target="Alone", location=(9, 0, 1), extent=0.4)
+    assert empty.context.object["tactile"]["color_limit"] < own[1]  # Another object has a range of its own.
     empty.context.view_layer.objects.active = patches[0]
     assert empty.ops.tactile.share_range() == {"FINISHED"}  # and says: 2 patches have one range of colors
     assert [patch["tactile"]["color_limit"] for patch in patches] == [max(own)] * 2
+    assert empty.data.objects["Alone Patch"]["tactile"]["color_limit"] == max(own)
     assert "tactile_color_range" not in other
     patches[0].tactile_range = 2e-6  # in 1/mm², as the legend has it
     assert patches[0]["tactile"]["color_limit"] == pytest.approx(2.0, rel=1e-6)
     assert patches[0].tactile_range == pytest.approx(2e-6, rel=1e-6)
     patches[0].tactile_range = 0.0
-    assert patches[0]["tactile"]["color_limit"] == own[0]
+    assert patches[0]["tactile"]["color_limit"] == own[1]
     patches[1].tactile_colors = "mean_curvature"  # this quantity has another range
     assert "tactile_color_range" not in patches[1]
+    assert patches[1]["tactile"]["color_limit"] == other["tactile"]["color_limit"]
+
+
+def test_patches_over_each_other_do_not_flicker(empty, ball):
+    """The second is drawn above the first, but not where it is rendered or exported."""
+    first, second = touch(empty, (0, 0, 1)), touch(empty, (0.1, 0, 0.995))
+    below = touch(empty, (0, 0, -1))
+    assert [len(patch.modifiers) for patch in (first, second, below)] == [0, 1, 0]
+    shown = second.evaluated_get(empty.context.evaluated_depsgraph_get()).data
+    lifted = (positions(shown) - positions(second.data))[:, 2]
+    assert (lifted > 1e-3 * second["tactile"]["radius"]).all()
+    assert not second.modifiers[0].show_render
+    empty.data.objects.remove(first)
+    third = touch(empty, (0, 0.1, 0.995))
+    assert len(third.modifiers) == 0
+
+
+def test_eevee_draws_a_patch_above_the_mesh_it_lies_in(empty, ball):
+    patch = touch(empty, (0, 0, 1))
+    for obj in (patch, *patch.children):
+        (material,) = obj.data.materials
+        assert material.displacement_method == "DISPLACEMENT"
+        assert 1e-3 < obj["tactile_above"] < 1e-2
 
 
 def test_a_flat_patch_has_a_rim_that_lies_in_it(empty):

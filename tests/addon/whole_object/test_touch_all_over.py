@@ -120,6 +120,10 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     assert record["deviation_max"] > 1.0
     assert np.linalg.norm(record["deviation_place"]) == pytest.approx(2.0, abs=0.01)
     assert np.abs(values(surface.data, "deviation")).max() < 0.1
+    report = extension.tactile_addon.whole_object.object_report
+    assert report.object_verdict(record).startswith("Incomplete. The patches end at ")
+    assert "allow more touches" in record["message"]
+    assert report.object_summary(record).startswith("Incomplete: 3 touches; ")
 
 
 def faces_of(bpy, vertices, faces):

@@ -12,6 +12,7 @@ from core.atlas.frontier import Frontier, _between
 from core.atlas.meshing import Mesh
 from core.atlas.reference_mesh import ReferenceMesh
 from core.contours.finger import Finger
+from core.exploration.side_by_side import result_of
 from tests import solids
 
 BALL, NEAR = solids.ball(), 0.03
@@ -164,14 +165,14 @@ def cap(height):
 
 def test_beyond_a_border_the_object_goes_on_unless_it_ends_there(frontier):
     reference = ReferenceMesh(cap(0.2), None)
-    found = frontier.uncovered(reference)
+    found = result_of(frontier.uncovered(reference))
     assert len(found) > 4
     for place, (point, normal) in found:
         assert abs(place.point[2] - 0.2) < 0.02
         assert point[2] < place.point[2]
         assert point == pytest.approx(normal, abs=1e-6)
     frontier.finger = Finger(Nothing(), 1.0)
-    assert frontier.uncovered(reference) == []
+    assert result_of(frontier.uncovered(reference)) == []
 
 
 def test_a_patch_that_faces_inward_is_no_touch(monkeypatch):

@@ -69,6 +69,7 @@ def test_contours_with_normals_need_no_direction():
         ([1e-200 * np.vstack(raster())], (0, 0, 1), "use another unit of length"),
         ([1e14 + np.vstack(raster())], (0, 0, 1), "are 0.016 apart in double precision, too coarse"),
         ([core.Contour(row, normals=0.0 * row) for row in raster()], None, "normals: expected vectors with"),
+        ([core.Contour(np.vstack(raster()), noise=2.1)], (0, 0, 1), "noise: expected less than the size"),
     ],
 )
 def test_what_carries_no_atlas_gets_a_sentence(given, outward, message):
@@ -76,12 +77,60 @@ def test_what_carries_no_atlas_gets_a_sentence(given, outward, message):
         core.atlas_of(given, outward=outward)
 
 
+def ball(count=600):
+    """Contacts all over a ball, which are its normals."""
+    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    return np.stack([np.sqrt(1.0 - z**2) * np.cos(turn), np.sqrt(1.0 - z**2) * np.sin(turn), z], axis=1)
+
+
 def ball_atlas(scale=1.0, length=1.0):
     """The atlas of contacts on a ball, with normals of this length."""
-    z = 1.0 - (2.0 * np.arange(600) + 1.0) / 600
-    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(600)
-    points = np.stack([np.sqrt(1.0 - z**2) * np.cos(turn), np.sqrt(1.0 - z**2) * np.sin(turn), z], axis=1)
-    return core.atlas_of([core.Contour(scale * points, normals=length * points)])
+    return core.atlas_of([core.Contour(scale * ball(), normals=length * ball())])
+
+
+@pytest.mark.parametrize("noise", [2.1, 10.0, 1e9])
+def test_noise_beyond_the_size_of_the_object_is_refused(noise):
+    with pytest.raises(ValueError, match="noise: expected less than the size of what was felt, 2, got "):
+        core.atlas_of([core.Contour(ball(), normals=ball())], noise=noise)
+
+
+def second(normals, _):
+    return np.where(np.arange(len(normals))[:, None] % 2, -normals, normals)
+
+
+def twentieth(normals, rng):
+    return np.where(rng.random((len(normals), 1)) < 0.05, -normals, normals)
+
+
+def random(normals, rng):
+    return rng.normal(size=normals.shape)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.02])
+@pytest.mark.parametrize("wrong", [second, twentieth, random])
+def test_normals_that_contradict_their_neighbors_are_refused_at_once(wrong, noise):
+    rng = np.random.default_rng(0)
+    points = ball() + rng.normal(0.0, noise, (600, 3))
+    steps = core.cover_contacts([core.Contour(points, normals=wrong(ball(), rng))])
+    with pytest.raises(ValueError, match="normals: expected those of neighboring contacts on one side, got"):
+        next(steps)
+
+
+def test_planes_of_neighbors_are_no_measured_normals_and_contradict_nothing():
+    steps = core.cover_contacts([random(ball(), np.random.default_rng(0))], outward=(0, 0, 1))
+    assert next(steps) == 0.0
+
+
+@pytest.mark.parametrize(("thickness", "noise"), [(0.05, 0.01), (0.01, 0.002), (1e-6, 0.0)])
+def test_the_two_sides_of_a_thin_plate_and_of_a_gap_contradict_nothing(thickness, noise):
+    rng = np.random.default_rng(0)
+    flat = rng.uniform(-1.0, 1.0, (3000, 2))
+    up = np.where(rng.random(3000) < 0.5, 1.0, -1.0)
+    points = np.column_stack([flat, 0.5 * thickness * up]) + rng.normal(0.0, noise, (3000, 3))
+    normals = np.column_stack([np.zeros((3000, 2)), up])
+    for outward in (normals, -normals):
+        assert next(core.cover_contacts([core.Contour(points, normals=outward)])) == 0.0
 
 
 @pytest.mark.parametrize(("scale", "length"), [(1e-48, 1.0), (1e49, 1.0), (1.0, 1e200), (1.0, 1e-200)])

@@ -16,6 +16,7 @@ from tests import solids
 BLOCK = solids.block()
 HALF = np.array([1.0, 0.7, 0.5])
 CORNERS = HALF * (np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3))
+CONE = solids.cone()
 TOLERANCE = 8e-3
 
 
@@ -84,6 +85,29 @@ def test_edges_are_straight_to_half_a_tolerance(block):
             feet, _ = closest(triangles[near], points[:, None])
             off = np.linalg.norm(feet - points[:, None], axis=2).min(axis=1)
             assert np.percentile(off, 95) < 0.5 * TOLERANCE
+
+
+@pytest.fixture(scope="module")
+def cone():
+    return core.explore_object(CONE, CONE.start, CONE.outward, tolerance=TOLERANCE, noise=5e-4, rng=1)
+
+
+def test_a_tip_that_no_patch_reaches_is_where_the_planes_of_walls_meet(cone):
+    tip = cone.reference.mesh.vertices[cone.reference.mesh.vertices[:, 2].argmax()]
+    assert tip == pytest.approx((0.0, 0.0, 1.0), abs=TOLERANCE)
+    points = np.random.default_rng(0).uniform((-0.5, -0.5, -0.1), (0.5, 0.5, 1.1), (6000, 3))
+    distance, std = cone.distance(points)
+    off = np.abs(distance - CONE.distances(points))
+    assert np.isfinite(std).all()
+    assert np.mean((off > 8.0 * std) & (off > 5e-3)) <= 1e-3
+    assert np.mean(off <= 1.645 * std) > 0.85
+
+
+@pytest.mark.parametrize("edge", [0.03, 0.012, 0.008, 0.006])
+def test_what_is_closed_at_one_length_of_edges_is_so_at_another(cone, edge):
+    assert cone.status == "ok"
+    assert cone.reference.mesh.is_closed
+    assert solids.topology(cone.mesh(edge).triangles) == solids.Topology(0, 0, 2, 1)
 
 
 @pytest.mark.parametrize("name", ["block", "room"])

@@ -11,6 +11,7 @@ import pytest
 import core
 from core.atlas.boundaries import gaussian_curvature_of
 from core.atlas.object_atlas import Check
+from core.exploration.side_by_side import result_of
 from tests import solids
 
 RING = solids.ring(small=0.5)
@@ -177,6 +178,7 @@ def test_progress_can_end_it_with_what_is_there():
     atlas = explored(solid, progress=progress)
     assert 5 <= len(atlas.patches) <= 8
     assert told[-1][0] == len(atlas.patches)
+    assert "allow more touches" in atlas.message
     assert solids.topology(atlas.mesh(0.1).triangles).open > 0
 
 
@@ -193,6 +195,7 @@ def test_a_small_budget_leaves_places_uncovered_and_says_where_to_go_on():
     assert len(atlas.patches) <= 4
     assert atlas.status == "uncertain"
     assert "places where the object goes on: allow more touches" in atlas.message
+    assert "touches found no patch there: use a smaller" in replace(atlas, is_cut_short=False).message
     touch = atlas.next_touch()
     assert abs(solid.distance(*touch.point)) < 0.05
     assert touch.outward @ touch.point > 0.9
@@ -248,14 +251,16 @@ def test_contacts_off_the_surface_put_it_in_doubt(ball):
     beside = ways * np.where(np.arange(50) < 20, 1.004, 1.0)[:, None]
     loose = replace(ball, check=Check(beside, ways, np.zeros((0, 3))))
     assert not loose.contradicting.any()
-    wide = loose.widened()
+    wide = result_of(loose.widened())
     distance, std = wide.distance(beside)
     assert np.mean(np.abs(distance) <= 1.645 * std * 1.001) >= 0.9
     assert wide.charts.stds == pytest.approx(
         loose.charts.stds * (std / loose.distance(beside)[1])[0], rel=0.01
     )
-    assert right.widened().distance(ways)[1] == pytest.approx(right.distance(ways)[1], rel=0.5)
-    assert wrong.widened().distance(ways)[1] == pytest.approx(right.widened().distance(ways)[1], rel=0.1)
+    assert result_of(right.widened()).distance(ways)[1] == pytest.approx(right.distance(ways)[1], rel=0.5)
+    assert result_of(wrong.widened()).distance(ways)[1] == pytest.approx(
+        result_of(right.widened()).distance(ways)[1], rel=0.1
+    )
 
 
 def test_walls_that_the_cells_do_not_resolve_put_it_in_doubt(ball):

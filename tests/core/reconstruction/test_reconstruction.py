@@ -3,6 +3,7 @@
 """The whole way from contours to a patch: exactness, equivariance, and what is refused."""
 
 import importlib
+import math
 import subprocess
 import sys
 from dataclasses import replace
@@ -197,6 +198,11 @@ GOOD = track(
         ({"method": np.array(["bayes", "tagc"])}, "method: expected one of"),
         ({"degree": np.array([4, 5])}, "degree: expected a whole number"),
         ({"weight": np.array([1.0])}, r"weight: expected a finite number above 0, got array\(\[1.\]\)"),
+        ({"weight": np.ma.masked}, "weight: expected a finite number above 0, got masked"),
+        (
+            {"noise": np.ma.array(1.0, mask=True)},
+            "noise: expected a finite number of 0 or more, got masked_array",
+        ),
         ({"weight": 10**400}, "weight: expected a finite number above 0, got 1000"),
         ({"weight": 1e60}, r"weight: expected a number up to 1e\+50, got 1e\+60"),
         ({"contours": None}, "contours: expected a list, got None"),
@@ -208,6 +214,12 @@ def test_bad_arguments_are_named(change, message):
     with pytest.raises(ValueError, match=message) as caught:
         reconstruct(**(given | change))
     assert "\n" not in str(caught.value)
+
+
+def test_a_unit_vector_stays_as_it_is_to_the_last_bit():
+    for vector in np.random.default_rng(0).normal(size=(50, 3)):
+        unit = vector / math.hypot(*vector)
+        assert Contour(np.eye(3), plane_normal=unit).plane_normal.tolist() == unit.tolist()
 
 
 def test_a_touch_without_curves_and_whole_numbers_of_numpy():

@@ -4,12 +4,14 @@
 
 import csv
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ... import core
-from ...core.arguments import LARGEST
+from ..arguments import LARGEST, Array
+from ..contours.contour import Contour
 
 POINT_COLUMNS, NORMAL_COLUMNS = ("x", "y", "z"), ("nx", "ny", "nz")
 LETTERS_AT_ONCE = 1 << 16  # So many letters are read together.
@@ -17,16 +19,23 @@ LONGEST_LINE = 1 << 20  # Lines have at most so many letters, for the words of o
 
 
 class Contacts(NamedTuple):
-    """What a file holds: contours, strokes, its unit or "", the point and the outward direction or None."""
+    """Contact data of one object.
 
-    contours: list
+    contours : curves through the reference point
+    unit : of all lengths, such as "mm"; "" if it is not known
+    point : the reference point, three numbers, or None
+    outward : a direction to the outer side, three numbers, or None
+    strokes : curves beside the reference point
+    """
+
+    contours: list[Contour]
     unit: str
-    point: list | None = None
-    outward: list | None = None
-    strokes: tuple = ()
+    point: list[float] | None = None
+    outward: list[float] | None = None
+    strokes: tuple[Contour, ...] = ()
 
 
-def blocks(text, start=0, number=1):
+def blocks(text: str, start: int = 0, number: int = 1) -> Iterator[tuple[int, int, str]]:
     """(place, line number, some lines in one string) from a place of the text on, without empty blocks."""
     while start < len(text):
         end = text.find("\n", start + LETTERS_AT_ONCE) + 1 or len(text)
@@ -37,7 +46,7 @@ def blocks(text, start=0, number=1):
         start = end
 
 
-def require_short_lines(name, text):
+def require_short_lines(name: str, text: str) -> None:
     """Raises ValueError for the first line that is too long to be taken apart."""
     for _, number, block in blocks(text):
         above = block.rfind("\n", 0, -1) + 1  # Only the last line of a block may be long.
@@ -50,7 +59,7 @@ def require_short_lines(name, text):
             )
 
 
-def header_of(text):
+def header_of(text: str) -> tuple[str, int, int] | None:
     """The first line that is neither empty nor a comment, its number, and the place of the next; or None."""
     for start, number, block in blocks(text):
         for line in block.split("\n"):
@@ -61,7 +70,7 @@ def header_of(text):
     return None
 
 
-def _says(line):
+def _says(line: str) -> bool:
     words = line.lstrip()
     return bool(words) and not words.startswith("#")
 
@@ -70,15 +79,18 @@ class Rows:
     """The rows of a table, which are added in blocks; `contours` makes curves of all of them.
 
     columns : the places of the known columns, by name
+    unit : that of the coordinates, or ""
     """
 
-    def __init__(self, name, separator, width, columns):
+    def __init__(self, name: str, separator: str, width: int, columns: Mapping[str, int], unit: str) -> None:
         self._name, self._separator, self._width, self._columns = name, separator, width, columns
+        self.unit = unit
         self._keys = [key for key in (*POINT_COLUMNS, *NORMAL_COLUMNS, "time") if key in columns]
-        self._curves, self._measured = {}, {}  # The curves by their labels, and whether they have normals.
+        self._curves: dict[str, int] = {}  # The curves by their labels,
+        self._measured: dict[str, bool] = {}  # and whether they have normals.
         self._numbers, self._labels = [np.empty((0, len(self._keys)))], [np.empty(0, dtype=np.intp)]
 
-    def add(self, number, block):
+    def add(self, number: int, block: str) -> None:
         """Adds lines from this number on. Raises ValueError with line and column if one is no contact."""
         try:
             labels, numbers = self._together(block)
@@ -89,11 +101,11 @@ class Rows:
         self._numbers.append(numbers)
 
     @property
-    def labels(self):
+    def labels(self) -> list[str]:
         """The names of the curves, in the order of `contours`."""
         return list(self._curves)
 
-    def contours(self):
+    def contours(self) -> list[Contour]:
         """The contours of all rows, in the order of `labels`. Raises ValueError if there are none."""
         numbers, labels = np.vstack(self._numbers), np.concatenate(self._labels)
         if not len(numbers):
@@ -108,7 +120,7 @@ class Rows:
             self.labels,
         )
 
-    def _together(self, block):
+    def _together(self, block: str) -> tuple[list[str], Array]:
         """The labels and numbers (n, k) of rows without any exception. Raises ValueError for other rows."""
         lines = filter(_says if "#" in block else str.strip, block.split("\n"))
         if '"' in block:
@@ -130,7 +142,7 @@ class Rows:
             raise ValueError
         return labels, numbers
 
-    def _one_by_one(self, number, block):
+    def _one_by_one(self, number: int, block: str) -> tuple[list[str], Array]:
         labels, numbers = [], []
         for place, line in enumerate(block.split("\n"), number):
             at = f"{self._name}, line {place}"
@@ -141,7 +153,7 @@ class Rows:
                 numbers.append(values)
         return labels, np.array(numbers).reshape(-1, len(self._keys))
 
-    def _row(self, at, fields):
+    def _row(self, at: str, fields: list[str]) -> tuple[str, list[float]]:
         if any(fields[self._width :]):
             raise ValueError(
                 f"{at}: expected {self._width} fields, got {len(fields)}: decimal commas need semicolons or "
@@ -159,29 +171,41 @@ class Rows:
             values += [self._value(at, row, key) if measured else math.nan for key in NORMAL_COLUMNS]
         return label, [*values, *([self._value(at, row, "time")] if "time" in row else [])]
 
-    def _value(self, at, row, key):
+    def _value(self, at: str, row: Mapping[str, str], key: str) -> float:
         return number_of(f'{at}, column "{key}"', row[key], LARGEST if key in POINT_COLUMNS else math.inf)
 
 
-def contours(name, labels, points, normals, times, titles):
+def contours(
+    name: str,
+    labels: NDArray[np.intp],
+    points: Array,
+    normals: Array | None,
+    times: Array | None,
+    titles: Sequence[object],
+) -> list[Contour]:
     """A contour for each label 0, 1, ..., with its contacts sorted by time, if there is one.
 
+    labels, points, times : (n,), (n, 3), (n,)
     normals : (n, 3), NaN along curves without any; None if there are none at all
     titles : the name of each label
+
+    Raises ValueError with `name` and the curve that Contour refuses.
     """
     order = np.argsort(labels, kind="stable") if times is None else np.lexsort((times, labels))
     found = []
     for rows in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
         some = normals is not None and not np.isnan(normals[rows[0]]).all()
         try:
-            found.append(core.Contour(points[rows], normals=normals[rows] if some else None))
+            found.append(
+                Contour(points[rows], normals=None if normals is None or not some else normals[rows])
+            )
         except ValueError as error:
             at = f'{name}, curve "{titles[labels[rows[0]]]}"'
             raise ValueError(f"{at}: {error}") from None
     return found
 
 
-def fields_of(at, line, separator):
+def fields_of(at: str, line: str, separator: str) -> list[str]:
     """The fields of a line, without spaces around them. Raises ValueError that names the place `at`."""
     try:
         (fields,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
@@ -190,7 +214,7 @@ def fields_of(at, line, separator):
     return [field.strip() for field in fields]
 
 
-def numbers_of(texts):
+def numbers_of(texts: Sequence[str]) -> Array:
     """The numbers of many words, with decimal points or commas. Raises ValueError if one is no number."""
     if "_" in "".join(texts):  # Python would ignore it.
         raise ValueError
@@ -204,7 +228,7 @@ def numbers_of(texts):
     return numbers
 
 
-def number_of(at, text, largest=math.inf):
+def number_of(at: str, text: str, largest: float = math.inf) -> float:
     """The number of a word. Raises ValueError that names the place `at` for none, or beyond +-`largest`."""
     try:
         (value,) = numbers_of([text])

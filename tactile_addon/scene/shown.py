@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How patches and whole objects are shown: their colors, and patches that are beside or over each other."""
+
+import bpy
+import numpy as np
+
+from . import colors
+from .mesh_data import own_mesh, values
+from .patch_record import (
+    ATLAS_RECORD,
+    COLOR,
+    COMMON_RANGE,
+    CURVATURE_STD,
+    CURVATURES,
+    POWERS,
+    RANGE,
+    RECORD,
+    is_colored,
+)
+
+LEAST_RANGE = 1e-3  # The range of colors is no smaller, in unit radius, so that a plane is pale green.
+LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
+ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
+LAYER_HEIGHT = 3e-3  # this share of its radius for each; two in one place would flicker.
+ALIKE = 0.5  # Patches overlap only if the cosine between their normals is more.
+
+
+def recolor(obj):
+    """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record.
+
+    What is unknown of a whole object is gray, and does not count in the range.
+    """
+    own_mesh(obj)
+    shown, mesh = obj.tactile_colors, obj.data
+    shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
+    floor = LEAST_RANGE * record["radius"] ** POWERS[shown]
+    unknown = _unknown(mesh) if shown in CURVATURES else []
+    record["own_limit"] = colors.symmetric_range(np.delete(shades, unknown), floor)
+    limit = obj.get(RANGE) or max(record["own_limit"], obj.get(COMMON_RANGE, 0.0))
+    rgba = colors.diverging(shades, limit, unknown)
+    mesh.attributes[COLOR].data.foreach_set("color", rgba.ravel())
+    if mesh.color_attributes.active_color_name != COLOR or mesh.color_attributes.default_color_name != COLOR:
+        mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = COLOR
+    mesh.update()
+    record["color_limit"] = limit
+
+
+def _unknown(mesh):
+    """The indices of the vertices whose curvatures are unknown; a patch has none."""
+    return np.flatnonzero(np.isinf(values(mesh, CURVATURE_STD))) if CURVATURE_STD in mesh.attributes else []
+
+
+def settle(patch):
+    """Gives a patch one range of colors with others of its mesh, and draws it above those it overlaps."""
+    others = _others(patch)
+    share_range(patch, others)
+    _draw_above(patch, others)
+
+
+def share_range(patch, others=None):
+    """Gives all patches of its mesh that show what a patch shows the largest of their own ranges."""
+    same = [
+        obj
+        for obj in (_others(patch) if others is None else others)
+        if obj[RECORD]["source"] == patch[RECORD]["source"] and obj.tactile_colors == patch.tactile_colors
+    ]
+    common = max(obj[RECORD].get("own_limit", 0.0) for obj in (patch, *same))
+    for obj in (patch, *same):
+        if obj.get(COMMON_RANGE) != common:
+            obj[COMMON_RANGE] = common
+            recolor(obj)
+
+
+def _draw_above(patch, others):
+    """Draws a patch above those that it overlaps, by a modifier that rendering and most exports leave out."""
+    taken = {obj.get(LAYER, 0) for obj in others if _overlap(patch[RECORD], obj[RECORD])}
+    patch[LAYER] = next(number for number in range(len(taken) + 1) if number not in taken)
+    modifier = patch.modifiers.get(ABOVE_OTHERS)
+    if patch[LAYER] == 0:
+        if modifier is not None:
+            patch.modifiers.remove(modifier)
+        return
+    if modifier is None:
+        modifier = patch.modifiers.new(ABOVE_OTHERS, "DISPLACE")
+    modifier.mid_level, modifier.show_render = 0.0, False
+    modifier.strength = LAYER_HEIGHT * patch[LAYER] * patch[RECORD]["radius"]
+
+
+def _overlap(a, b):
+    """Whether the patches of two reports may lie over each other."""
+    apart = np.subtract(a["frame"]["origin"], b["frame"]["origin"])
+    alike = np.dot(a["frame"]["normal"], b["frame"]["normal"])
+    return alike > ALIKE and np.linalg.norm(apart) < a["radius"] + b["radius"]
+
+
+def _others(patch):
+    """All other patches whose colors can be changed without a copy of their meshes."""
+    return [
+        obj
+        for obj in bpy.data.objects
+        if RECORD in obj and obj != patch and obj.is_editable and is_colored(obj) and obj.data.users == 1
+    ]

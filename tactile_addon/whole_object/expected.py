@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How many touches a whole object will take, and how long, as a few touches of it show."""
+
+from time import perf_counter
+
+import numpy as np
+
+from ... import core
+from ..touch import units
+from ..touch.detached_mesh import DetachedMesh
+from ..touch.wording import many
+from .object_touches import tolerance_of
+
+TRIED, SEED = 12, 0  # So many touches are made to know.
+# A touch with its part of joining takes so many times as long as one that is tried, and a mesh as long as
+# so many of these: python -m benchmarks.add_menu.
+JOINING, MESHING = 3.3, 60.0
+
+
+class Expected:
+    """What is expected of an object, kept until it or a number changes, because a dialog draws it often."""
+
+    def __init__(self):
+        self._given, self._words, self._mesh = None, "", None
+
+    def words(self, target, context, tolerance, accuracy, noise):
+        """A sentence on the tolerance, the touches and the seconds of an object that will be touched.
+
+        Raises ValueError, with a sentence, for an object that cannot be touched.
+        """
+        given = target.session_uid, tolerance, accuracy, noise
+        if given != self._given:
+            if self._given is None or self._given[0] != target.session_uid:
+                self._mesh = DetachedMesh(target, context.evaluated_depsgraph_get())
+            tolerance = tolerance or tolerance_of(self._mesh.size, accuracy, noise)
+            touches, seconds = expected(self._mesh, tolerance, noise)
+            self._given = given
+            about = f"{many(touches, 'touch', 'touches')}, {_time(seconds)}"
+            self._words = f"Tolerance {units.length(tolerance)}: about {about}"
+        return self._words
+
+
+def expected(mesh, tolerance, noise):
+    """About how many touches a DetachedMesh takes, and seconds. Raises ValueError if none is possible."""
+    begin = perf_counter()
+    a, b, c = mesh.points[mesh.triangles].transpose(1, 0, 2)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    points, normals = core.scattered(mesh.points, mesh.triangles, TRIED, np.random.default_rng(SEED))
+    touches = core.expected_touches(mesh, points, normals, area, tolerance=tolerance, noise=noise, rng=SEED)
+    each = (perf_counter() - begin) / TRIED
+    return _rounded(touches), (MESHING + JOINING * touches) * each
+
+
+def _rounded(number):
+    """A number with one significant digit, as an estimate has it."""
+    return int(float(f"{number:.0e}"))
+
+
+def _time(seconds):
+    return f"{_rounded(max(seconds, 1.0))} s" if seconds < 60.0 else f"{_rounded(seconds / 60.0)} min"

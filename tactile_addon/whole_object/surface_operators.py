@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel's buttons for the surface of a whole object: where it is farthest off, and another mesh of it."""
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ..probes.in_slices import InSlices
+from ..probes.number_fields import dragged, fields
+from ..probes.operators import is_in_object_mode, make_active, report_error
+from ..scene import patch_record
+from ..scene.mesh_data import own_mesh
+from ..touch.settings import draw_chosen, length_property
+from . import kept, whole_mesh
+from .object_report import object_summary
+
+SEEN = 0.4  # The view is as wide as this share of the object's size.
+
+
+def surface_of(context):
+    """The active object if it is a whole object, or None."""
+    obj = context.view_layer.objects.active
+    return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
+
+
+class TACTILE_OT_look_farthest(bpy.types.Operator):
+    """Look where surface and mesh are farthest apart, select the vertex there, and put the 3D cursor there"""
+
+    bl_idname = "tactile.look_farthest"
+    bl_label = "Look at Largest Deviation"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        obj = surface_of(context)
+        if obj is None or "deviation_place" not in obj[patch_record.ATLAS_RECORD]:
+            cls.poll_message_set("Select the surface of a whole object that was touched")
+            return False
+        return is_in_object_mode(cls, context, "Surfaces are looked at")
+
+    def execute(self, context):
+        obj = surface_of(context)
+        try:
+            patch_record.require_colored(obj)
+        except ValueError as error:
+            return report_error(self, error)
+        record = obj[patch_record.ATLAS_RECORD].to_dict()
+        place = Vector(np.subtract(record["deviation_place"], record["origin"]))
+        own_mesh(obj)
+        nearest = _select_nearest(obj.data, place)
+        make_active(context, obj)
+        place, turn = obj.matrix_world @ place, obj.matrix_world.to_quaternion()
+        context.scene.cursor.location = place
+        view = context.region_data
+        if view is not None:
+            view.view_perspective = "ORTHO" if view.view_perspective == "ORTHO" else "PERSP"
+            view.view_location = place
+            view.view_rotation = (turn @ nearest.normal).to_track_quat("Z", "Y")
+            view.view_distance = SEEN * record["size"] * obj.matrix_world.median_scale
+        return {"FINISHED"}
+
+
+def _select_nearest(mesh, place):
+    """Selects the vertex nearest to a place, and nothing else, and returns it."""
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    nearest = int(np.argmin(((points - np.array(place)) ** 2).sum(axis=1)))
+    for parts in (mesh.vertices, mesh.edges, mesh.polygons):
+        parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
+    mesh.vertices[nearest].select = True
+    mesh.update()
+    return mesh.vertices[nearest]
+
+
+@dragged
+class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
+    """Make the surface again with edges of another length, from the same touches"""
+
+    bl_idname = "tactile.mesh_again"
+    bl_label = "Change Edge Length"
+    bl_options = {"UNDO"}
+
+    edge: length_property(
+        "Edge Length", "Length of the edges of the surface's triangles; 0 chooses it by the curvature"
+    )
+
+    stop = "Keep It as It Was"
+
+    @classmethod
+    def poll(cls, context):
+        if kept.touches_of(surface_of(context)) is None:
+            cls.poll_message_set("Only the last surface that was touched has its touches in memory")
+            return False
+        return is_in_object_mode(cls, context, "Surfaces are made")
+
+    def invoke(self, context, event):
+        if bpy.app.background:
+            return self.execute(context)
+        self._in_window = True
+        return context.window_manager.invoke_props_dialog(self, confirm_text="Mesh Again")
+
+    def _begin(self, context):
+        obj = surface_of(context)
+        patch_record.require_colored(obj)
+        self._uid, self._name = obj.session_uid, obj.name
+        self._touches = kept.touches_of(obj).again(self.edge)
+        self._steps = self._touches.meshing()
+
+    def _object(self, context):
+        """The object of the surface. Raises ValueError, with a sentence, if it is gone or may be edited."""
+        found = next((obj for obj in context.view_layer.objects if obj.session_uid == self._uid), None)
+        if found is None:
+            raise ValueError(f'"{self._name}" is gone, so it was not meshed again')
+        if context.mode != "OBJECT":
+            raise ValueError("Meshing was stopped because Object Mode was left: start it again")
+        return found
+
+    def _check(self, context):
+        self._object(context)
+
+    def _done(self):
+        share = self._touches.share
+        return f"{self._touches.words}: {share:.0%}", share
+
+    def _stopped(self, context):
+        self._leave(context)
+        self.report({"INFO"}, "Stopped: the surface stays as it was")
+        return {"CANCELLED"}
+
+    def _finish(self, context):
+        obj = self._object(context)
+        source = obj[patch_record.ATLAS_RECORD]["source"]
+        whole_mesh.rewrite(obj, self._touches.whole, self._touches.report() | {"source": source})
+        kept.keep(obj, self._touches)
+        self.report({"INFO"}, object_summary(obj[patch_record.ATLAS_RECORD].to_dict()))
+        return {"FINISHED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        size = surface_of(context)[patch_record.ATLAS_RECORD]["size"]
+        draw_chosen(layout, self, "edge", fields=fields(size))
+
+
+CLASSES = (TACTILE_OT_look_farthest, TACTILE_OT_mesh_again)

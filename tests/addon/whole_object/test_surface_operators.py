@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What can be done with the surface of a whole object: another mesh of it, its range, its farthest place."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
+from scenes import made, positions, values
+
+
+@pytest.fixture
+def surface(empty, ball):
+    return made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.02)[0]
+
+
+def edges(mesh):
+    ends = np.array([edge.vertices for edge in mesh.edges])
+    return np.linalg.norm(np.diff(positions(mesh)[ends], axis=1), axis=2)
+
+
+def test_another_edge_length_needs_no_touches(empty, surface):
+    before, graph = surface["tactile_object"].to_dict(), surface["tactile_graph"]
+    surface.tactile_range = 0.5
+    objects = len(empty.data.objects)
+    assert empty.ops.tactile.mesh_again(edge=0.2) == {"FINISHED"}
+    assert len(empty.data.objects) == objects
+    record = surface["tactile_object"].to_dict()
+    assert np.median(edges(surface.data)) == pytest.approx(0.2, rel=0.3)
+    assert record["vertices"] == len(surface.data.vertices) < 0.5 * before["vertices"]
+    for name in ("touches", "tolerance", "source", "patches", "is_closed"):
+        assert record[name] == before[name]
+    assert record["color_limit"] == 0.5
+    assert surface["tactile_graph"] == graph
+    assert record["deviation_max"] >= np.abs(values(surface.data, "deviation")).max() * (1.0 - 1e-6) > 0.0
+    assert empty.ops.tactile.mesh_again() == {"FINISHED"}
+    assert surface["tactile_object"]["vertices"] == before["vertices"]
+
+
+def test_an_edge_length_that_does_not_suit_the_object_changes_nothing(empty, surface):
+    before = surface["tactile_object"].to_dict()
+    with pytest.raises(RuntimeError, match="The edge length 5 m is larger than 2 m"):
+        empty.ops.tactile.mesh_again(edge=5.0)
+    assert surface["tactile_object"].to_dict() == before
+
+
+def test_only_the_last_surface_can_be_meshed_again(empty, surface, ball):
+    empty.context.view_layer.objects.active = ball
+    made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.05, most=2)
+    assert empty.ops.tactile.mesh_again(edge=0.3) == {"FINISHED"}
+    empty.context.view_layer.objects.active = surface
+    with pytest.raises(RuntimeError, match="Only the last surface that was touched"):
+        empty.ops.tactile.mesh_again(edge=0.3)
+
+
+def test_a_range_is_given_in_the_unit_of_the_legend(surface):
+    own = surface["tactile_object"]["color_limit"]
+    surface.tactile_range = 2.0
+    assert surface["tactile_object"]["color_limit"] == pytest.approx(2.0)
+    surface.tactile_range = 0.0
+    assert surface["tactile_object"]["color_limit"] == own
+
+
+def test_the_farthest_place_is_shown_where_the_surface_is_now(empty, surface):
+    record = surface["tactile_object"].to_dict()
+    surface.location.x += 3.0
+    empty.context.view_layer.update()
+    assert empty.ops.tactile.look_farthest() == {"FINISHED"}
+    place = np.add(record["deviation_place"], (3.0, 0.0, 0.0))
+    assert tuple(empty.context.scene.cursor.location) == pytest.approx(tuple(place), abs=1e-5)
+    (nearest,) = np.flatnonzero([vertex.select for vertex in surface.data.vertices])
+    found = positions(surface.data)[nearest] + np.array(surface.location)
+    assert np.linalg.norm(found - place) < 0.1
+    assert empty.context.view_layer.objects.active == surface
+
+
+def test_quick_and_fine_have_other_tolerances(empty, ball):
+    for accuracy, share in (("quick", 200), ("normal", 500), ("fine", 1250)):
+        empty.context.view_layer.objects.active = ball
+        options = {"accuracy": accuracy, "most": 1}
+        _, record = made(empty.ops.tactile.touch_all_over, "tactile_object", **options)
+        assert record["tolerance"] == pytest.approx(4.0 / share)
+
+
+def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball):
+    expected = extension.tactile_addon.whole_object.expected.Expected()
+    words = expected.words(ball, empty.context, 0.02, "normal", 0.0)
+    assert words.startswith("Tolerance 2 cm: about ") and " touches, " in words
+    count = int(words.split()[4])
+    record = made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.02)[1]
+    assert 0.5 < count / record["touches"] < 2.0
+    assert expected.words(ball, empty.context, 0.005, "normal", 0.0) != words
