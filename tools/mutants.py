@@ -37,7 +37,7 @@ TESTS = {  # The tests of each module of core; those that fail soonest come firs
     "bayes/rough_fit": "residual",
     "bayes/roughness": "roughness exploration",
     "contours/common_point": "common_point",
-    "contours/contour": "tracking order reconstruction measured_normals",
+    "contours/contour": "tracking order reconstruction measured_normals exploration",
     "contours/curves": "local_geometry reconstruction status measured_normals",
     "contours/local_geometry": "local_geometry reconstruction",
     "contours/thinning": "thinning order",

@@ -267,7 +267,8 @@ def _felt(
     """The mesh without triangles where nothing was felt; yields the share that is done.
 
     Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
-    as small as some cells of the indicator is bridged; a later mesh ends where the first one did.
+    as small as some cells of the indicator is bridged. A later mesh ends where the first one did,
+    where most of what lies beyond patches is off the first.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -286,10 +287,11 @@ def _felt(
         far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
         gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * cell**2)[piece]
     else:
-        outer = np.flatnonzero(~inside & ~gone)
+        outer, off = np.flatnonzero(~inside & ~gone), np.zeros(count)
         for start in range(0, len(outer), PLACES_AT_ONCE):
             some = outer[start : start + PLACES_AT_ONCE]
-            gone[some] = ended(vertices[some])
+            off += np.bincount(piece[some], np.where(ended(vertices[some]), 1.0, -1.0), count)
             yield 0.9
+        gone[outer] = off[piece[outer]] > 0.0
     std = np.where(surface.node < 0, cell, surface.std)
     return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))

@@ -22,7 +22,7 @@ from ..arguments import (
 # Coordinates that are rounded by more than this share of a curve's size say nothing about curvature.
 CURVE_ROUNDING = 0.01
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
-UNEXPLAINED = "not explained"
+UNEXPLAINED = "fit no longer matched"
 BRINKS = (NO_CONTACT, CREASE)  # The surface ends at these stops.
 
 Vector = tuple[float, float, float]

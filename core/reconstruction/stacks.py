@@ -21,7 +21,7 @@ from ..patch.geometry import Geometry
 from ..patch.monge import DEGREE, MongePatch
 from ..patch.residual import Residual
 from .result import Reconstruction
-from .start import Given, Start, curves_start, domain_of, levels, strokes_start
+from .start import Given, Start, away_from, curves_start, domain_of, levels, strokes_start
 
 
 class Options(NamedTuple):
@@ -186,7 +186,7 @@ def _result(
     touch: _Parts, contours: Sequence[Contour], outward: Array, options: Options
 ) -> Reconstruction | DegenerateCurvesError:
     if touch.frame.axes[:, 2] @ outward <= 0.0:
-        return DegenerateCurvesError(
+        return away_from(touch.frame.origin, contours) or DegenerateCurvesError(
             "the contacts show a surface that faces away from the outward direction: give the direction to "
             "its outer side at the point, or move the point away from the edge"
         )

@@ -37,7 +37,7 @@ MAP_QUANTITIES = [
         "Factor by which plain least squares amplifies noise",
         0,
     ),
-    ("blind_share", "Blind Share", "Share of the coefficients that are invisible to the planes", 0),
+    ("blind_share", "Blind Share", "Share of the shape terms that the planes cannot show", 0),
     ("reason", "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.

@@ -80,8 +80,11 @@ def added_planes(report, unit):
 
 
 def _measured_contacts(report):
-    kinds = [f"{report[kind]} {kind}" for kind in ("curves", "strokes") if report[kind] or kind == "curves"]
-    return f"{report['contacts']} on {' and '.join(kinds)}"
+    kinds = " and ".join(f"{report[kind]} {kind}" for kind in ("curves", "strokes") if report[kind])
+    given, fitted = report.get("given_contacts", 0), report["contacts"]
+    if given <= fitted:  # The point of the file is one more.
+        return f"{fitted} on {kinds}"
+    return f"{given} on {kinds}, fitted as {fitted}"
 
 
 def _tracked(report):

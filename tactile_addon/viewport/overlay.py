@@ -171,15 +171,15 @@ def draw_legend():
         _draw_box(context, *bar, map_object.swatches(obj))
 
 
+def _is_picking(context):
+    """Whether a pick draws the key of its preview where the legend is."""
+    return any(operator.bl_idname == "TACTILE_OT_pick" for operator in context.window.modal_operators)
+
+
 def _is_last_view(context):
     """Whether the region is the only view of its area, or the one at the bottom right in a quad view."""
     views = [region for region in context.area.regions if region.type == "WINDOW"]
     return context.region == max(views, key=lambda region: (region.x, -region.y))
-
-
-def _is_picking(context):
-    """Whether a pick draws the key of its preview where the legend is."""
-    return any(operator.bl_idname == "TACTILE_OT_pick" for operator in context.window.modal_operators)
 
 
 def _scale(context, title, record, size, power, low):

@@ -6,7 +6,13 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..probes import anchor, probe, touch_again
-from ..probes.operators import has_mesh, is_in_object_mode, make_active, report_error, target_object
+from ..probes.operators import (
+    has_mesh,
+    is_in_object_mode,
+    make_active,
+    report_error,
+    target_object,
+)
 from ..scene import patch_record
 from ..scene.viewports import show_colors
 from ..stability_map.map_object import inputs_of, touched_near

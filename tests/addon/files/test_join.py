@@ -73,7 +73,7 @@ def joined(bpy, paths, **options):
 
 def test_contacts_of_three_files_become_one_closed_surface(empty, three_files):
     surface, record = joined(empty, three_files, tolerance=0.02)
-    assert surface.name == "part0.csv and 2 more Joined"
+    assert surface.name == "part0.csv and 2 more Surface"
     assert (record["source"], record["contacts"]) == ("part0.csv and 2 more", 3000)
     assert empty.context.view_layer.objects.active == surface
     assert record["is_closed"]

@@ -37,7 +37,7 @@ def record(status="ok", message="The patch describes its contacts.", **more):
 def test_the_verdict_says_good_and_how_good(wording):
     assert wording.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
     blind = record(
-        message="The patch describes its contacts. 3 of 28 coefficients are invisible to these planes."
+        message="The patch describes its contacts. These planes cannot show 3 of the 28 shape terms."
     )
     assert wording.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
 
@@ -54,7 +54,7 @@ def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
 def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     message = (
         "Heights are accurate to 5.3 % of the radius on average: use a shorter extent or add sampling planes."
-        " 3 of 28 coefficients are invisible to these planes. All half curves end at a crease."
+        " These planes cannot show 3 of the 28 shape terms. All half curves end at a crease."
     )
     words = wording.verdict(record(status, message), UNIT)
     assert words == "Doubtful: use a shorter extent or add sampling planes"
@@ -133,7 +133,11 @@ def test_every_row_says_what_it_is(said, extension, ball):
     _, report = ball
     addon = extension.tactile_addon
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT) + said.plane_rows(report, UNIT)
-    labels = [label for label, value in rows if value] + ["Error on 9 More", "Total |K|", "Would Bring"]
+    labels = [label for label, value in rows if value] + [
+        "Error on 9 More",
+        "Total |K|",
+        "Expected Accuracy with It",
+    ]
     assert not [
         label for label in labels if not re.match(r"[A-Z1\d].{15,}", addon.sidebar.rows.tip_of(label))
     ]

@@ -103,7 +103,7 @@ def test_while_a_gesture_goes_on_the_extent_is_that_of_its_end(empty, sheet, ext
     going, ended = (touch_at(probe, depsgraph, complete=complete).report for complete in (False, True))
     assert (going["extent"], going["message"]) == (ended["extent"], ended["message"])
     stops = {stop for pair in going["stops"] for stop in pair}
-    assert stops == {"not explained", "no contact"}
+    assert stops == {"fit no longer matched", "no contact"}
     assert re.search(r" \d of 6 half curves end (at|where) .*, \d (at|where) .*\.$", ended["message"])
 
 
