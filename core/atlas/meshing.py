@@ -117,10 +117,13 @@ def lattice_of(indicator: Indicator, edge: float) -> tuple[float, int]:
     return size, halvings
 
 
-def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float, None, Mesh]:
+def meshed(
+    charts: Charts, indicator: Indicator, edge: float, bridged: float = BRIDGED
+) -> Generator[float, None, Mesh]:
     """The mesh of the surface; yields the share that is done.
 
     edge : about the length of its edges, which are shorter than a quarter of the thinnest wall
+    bridged : the area up to which holes are bridged, in squares of the indicator's cells
     """
     edge = min(edge, WALL * indicator.resolved)
     size, halvings = lattice_of(indicator, edge)
@@ -134,7 +137,9 @@ def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float
         vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
     found = yield from creased(charts, vertices, triangles, surface.normal, edge)
     at = np.append(np.arange(len(vertices)), found.parents)
-    return _felt(found.vertices, found.triangles, surface.chosen(at), indicator.cell)
+    return _felt(
+        found.vertices, found.triangles, surface.chosen(at), indicator.cell, bridged * indicator.cell**2
+    )
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -198,8 +203,9 @@ def _settled(
 
     up : (k, 3), the way outward; room : a length within which the surface is
     """
-    for _ in range(2):
-        surface = yield from _onto(charts, indicator, vertices, up, room)
+    surface = yield from _onto(charts, indicator, vertices, up, room)
+    far = np.abs(surface.distance) > FAR * indicator.cell
+    yield from _again(charts, indicator, vertices, up, surface, far, room)
     for _ in range(SMOOTHINGS):
         vertices = evened(vertices, surface.normal, triangles)
         yield 0.5
@@ -209,12 +215,27 @@ def _settled(
         folded = _folded(vertices, surface.normal, triangles)
         if folded.any():
             vertices[folded] = evened(vertices, surface.normal, triangles)[folded]
-        some = np.flatnonzero(far | folded)
-        moved = vertices[some]
-        again = yield from _onto(charts, indicator, moved, up[some], room)
-        for old, new in zip((vertices, *surface), (moved, *again), strict=True):
-            old[some] = new
+        if not (far | folded).any():
+            break
+        yield from _again(charts, indicator, vertices, up, surface, far | folded, room)
     return vertices, surface
+
+
+def _again(
+    charts: Charts,
+    indicator: Indicator,
+    vertices: Array,
+    up: Array,
+    surface: Surface,
+    which: NDArray[np.bool_],
+    room: float,
+) -> Generator[float, None, None]:
+    """Moves some of the vertices (k, 3) onto the surface again, and changes both in place."""
+    some = np.flatnonzero(which)
+    moved = vertices[some]
+    again = yield from _onto(charts, indicator, moved, up[some], room)
+    for old, new in zip((vertices, *surface), (moved, *again), strict=True):
+        old[some] = new
 
 
 def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.bool_]:
@@ -240,8 +261,8 @@ def _onto(
     return surface
 
 
-def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) -> Mesh:
-    """The mesh without triangles where nothing was felt.
+def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float, bridged: float) -> Mesh:
+    """The mesh without triangles where nothing was felt, but with holes up to the area `bridged`.
 
     Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
     as small as some cells of the indicator is bridged.
@@ -259,6 +280,6 @@ def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) ->
     far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
     areas = np.bincount(piece[beyond[:, 0]], far, count)
     beside = np.bincount(piece[inside], minlength=count) > 0
-    gone = ~inside & ((areas > BRIDGED * cell**2) | ~beside)[piece]
+    gone = ~inside & ((areas > bridged) | ~beside)[piece]
     std = np.where(surface.node < 0, cell, surface.std)
     return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))

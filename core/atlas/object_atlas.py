@@ -21,7 +21,7 @@ from .charts import Charts
 from .curvature import Sheets, curvatures_of, sheets_of
 from .frontier import Place
 from .indicator import Indicator
-from .meshing import LEAST_DIVISOR, MOST_BYTES, WALL, Mesh, lattice_of, memory_of, meshed
+from .meshing import BRIDGED, LEAST_DIVISOR, MOST_BYTES, WALL, Mesh, lattice_of, memory_of, meshed
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
@@ -31,6 +31,7 @@ FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
 LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above so many tolerances.
 OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from so many of both away.
 THIN = 0.9  # Walls are resolved from this share of the thickness that cells are made for.
+WIDER = 2.0  # Other meshes bridge holes so many times as large, so that none has a hole that was not judged.
 BORDER = 2.0  # Beyond the border of the mesh it does from so many edges away.
 WITHIN_90 = 1.645  # So many deviations are a 90 % interval.
 WIDENINGS = 4  # Deviations grow so often until 90 % of the check's contacts are within.
@@ -151,13 +152,18 @@ class Atlas:
                 f"Walls or gaps of {thin:.2g} % of the size were felt, and what is thinner than "
                 f"{resolved:.2g} % may be bridged or pierced: touch such parts as objects of their own."
             )
-        rough, _ = self._rough
-        if rough > ROUGH:
+        if self.is_rough:
+            rough = 100.0 * self._rough[0]
             return "uncertain", (
-                f"The deviation is above the tolerance on {100.0 * rough:.0f} % of the surface: touch there "
+                f"The deviation is above the tolerance on {rough:.0f} % of the surface: touch there "
                 "again or use a larger tolerance."
             )
         return self._checked()
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether more of the surface than the share ROUGH is less certain than LIMIT tolerances."""
+        return self._rough[0] > ROUGH
 
     @cached_property
     def _rough(self) -> tuple[float, int]:
@@ -199,7 +205,9 @@ class Atlas:
             if not felt.any():
                 break
             stds = np.abs(distance[felt]) / np.maximum(std[felt], LEAST_DIVISOR)
-            factor = max(1.0, float(np.quantile(stds, 0.9)) / WITHIN_90)
+            factor = float(np.quantile(stds, 0.9)) / WITHIN_90
+            if factor <= 1.0:
+                break
             mesh = found.reference.mesh
             found = replace(
                 found,
@@ -225,10 +233,9 @@ class Atlas:
             place = max(self.uncovered, key=lambda place: place.radius)
             area = np.pi * place.radius**2
             return NextTouch(np.array(place.point), np.array(place.normal), area)
-        rough, vertex = self._rough
-        if rough <= ROUGH:
+        if not self.is_rough:
             return None
-        mesh = self.reference.mesh
+        vertex, mesh = self._rough[1], self.reference.mesh
         patch = self.patches[mesh.patch[vertex]]
         return NextTouch(mesh.vertices[vertex], mesh.normals[vertex], patch.domain.area)
 
@@ -300,7 +307,7 @@ class Atlas:
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
                 f"{edge:.3g}, which takes {1e-9 * memory:.3g} GB: use a longer one"
             )
-        mesh = yield from meshed(self.charts, self.reference.indicator, edge)
+        mesh = yield from meshed(self.charts, self.reference.indicator, edge, WIDER * BRIDGED)
         return mesh if self.border is None else bordered(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:
