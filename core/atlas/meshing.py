@@ -216,8 +216,9 @@ def _settled(
 
     up : (k, 3), the way outward; room : a length within which the surface is
     """
-    for _ in range(2):
-        surface = yield from _onto(charts, indicator, vertices, up, room)
+    surface = yield from _onto(charts, indicator, vertices, up, room)
+    far = np.abs(surface.distance) > FAR * indicator.cell
+    yield from _again(charts, indicator, vertices, up, surface, far, room)
     for _ in range(SMOOTHINGS):
         vertices = evened(vertices, surface.normal, triangles)
         yield 0.5
@@ -227,12 +228,27 @@ def _settled(
         folded = _folded(vertices, surface.normal, triangles)
         if folded.any():
             vertices[folded] = evened(vertices, surface.normal, triangles)[folded]
-        some = np.flatnonzero(far | folded)
-        moved = vertices[some]
-        again = yield from _onto(charts, indicator, moved, up[some], room)
-        for old, new in zip((vertices, *surface), (moved, *again), strict=True):
-            old[some] = new
+        if not (far | folded).any():
+            break
+        yield from _again(charts, indicator, vertices, up, surface, far | folded, room)
     return vertices, surface
+
+
+def _again(
+    charts: Charts,
+    indicator: Indicator,
+    vertices: Array,
+    up: Array,
+    surface: Surface,
+    which: NDArray[np.bool_],
+    room: float,
+) -> Generator[float, None, None]:
+    """Moves some of the vertices (k, 3) onto the surface again, and changes both in place."""
+    some = np.flatnonzero(which)
+    moved = vertices[some]
+    again = yield from _onto(charts, indicator, moved, up[some], room)
+    for old, new in zip((vertices, *surface), (moved, *again), strict=True):
+        old[some] = new
 
 
 def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.bool_]:
