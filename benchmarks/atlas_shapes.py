@@ -35,6 +35,7 @@ TOLERANCES = (0.002, 0.008)
 THINNEST = 10.0  # Objects are touched with a tolerance if no wall is thinner than so many of it.
 GAP = 10.0  # Two balls are so many tolerances from each other.
 SECTIONS = 128  # Round objects have so many facets around their axis.
+FILLET = 12  # A fillet has so many facets across.
 SHELLS = 160  # The hollow ball is touched at so many places.
 SAMPLES = 10_000
 SURE = 5.0
@@ -110,6 +111,31 @@ def box(a, b, c):
     return extruded([(0, 0), (a, 0), (a, b), (0, b)], [(0, 1, 2), (0, 2, 3)], c)
 
 
+def filleted(a, b, c, radius):
+    """A box whose edges and corners are rounded: a ball of FILLET facets a quarter, pulled apart."""
+    parts = FILLET + 1
+    quarters = np.repeat(np.arange(4), parts)
+    turns = 0.5 * np.pi * (quarters + np.tile(np.linspace(0.0, 1.0, parts), 4))
+    up, along = turns[: 2 * parts, None], turns[None]
+    ball = np.sin(up) * np.cos(along), np.sin(up) * np.sin(along), np.cos(up)
+    sides = np.pi * (0.5 * quarters + 0.25)
+    signs = np.cos(sides), np.sin(sides), np.cos(sides[: 2 * parts, None])
+    half = np.array([a, b, c]) / 2.0 - radius
+    parts_of = [np.sign(s) * h + radius * w for s, h, w in zip(signs, half, ball, strict=True)]
+    points = np.stack(np.broadcast_arrays(*parts_of), axis=-1).reshape(-1, 3)
+    index = np.arange(len(points)).reshape(2 * parts, 4 * parts)
+    low, high = index[:-1], index[1:]
+    low_next, high_next = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
+    halves = (low, high, high_next), (low, high_next, low_next)
+    walls = [np.stack(each, axis=-1).reshape(-1, 3) for each in halves]
+    (n, e, s, w), bottom = index[0, ::parts], index[-1, ::parts]
+    caps = [(n, e, s), (n, s, w), bottom[[2, 1, 0]], bottom[[3, 2, 0]]]
+    _, first, merged = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
+    triangles = merged.ravel()[np.vstack([*walls, caps])]
+    real = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return points[first], triangles[real]
+
+
 def angle(long, wide, depth):
     """An L."""
     polygon = [(0, 0), (long, 0), (long, wide), (wide, wide), (wide, long), (0, long)]
@@ -124,22 +150,22 @@ def tee(stem, long, width, high, depth):
     return extruded(polygon, cap, depth)
 
 
-def revolved(profile, is_ring=False):
+def revolved(profile, is_ring=False, sections=SECTIONS):
     """Vertices and triangles of a profile (n, 2) of radii and heights that turns around z.
 
     It goes up along the outside, from the axis to the axis; that of a ring ends where it began.
     """
     profile = np.array(profile, dtype=float)
-    turns = 2.0 * np.pi * np.arange(SECTIONS) / SECTIONS
+    turns = 2.0 * np.pi * np.arange(sections) / sections
     radius, height = profile.T
     vertices = np.column_stack(
         [
             np.outer(radius, np.cos(turns)).ravel(),
             np.outer(radius, np.sin(turns)).ravel(),
-            np.repeat(height, SECTIONS),
+            np.repeat(height, sections),
         ]
     )
-    index = np.arange(len(vertices)).reshape(-1, SECTIONS)
+    index = np.arange(len(vertices)).reshape(-1, sections)
     index[radius == 0.0] = index[radius == 0.0, :1]  # On the axis there is one vertex only.
     index = np.vstack([index, index[:1]]) if is_ring else index
     a, b = index[:-1], index[1:]
@@ -200,6 +226,10 @@ def made(tolerance):
     """Functions that make objects with walls of ten tolerances or more, by name."""
     every = {  # The thickness of the thinnest wall, as a share of the size, and the function.
         "box": (0.6, lambda: box(1, 0.8, 0.6)),
+        "fillet .05": (0.6, lambda: filleted(1, 0.8, 0.6, 0.05)),
+        "fillet .01": (0.6, lambda: filleted(1, 0.8, 0.6, 0.01)),
+        "prism 6": (0.8, lambda: revolved([(0, 0), (0.5, 0), (0.5, 0.8), (0, 0.8)], sections=6)),
+        "prism 8": (0.8, lambda: revolved([(0, 0), (0.5, 0), (0.5, 0.8), (0, 0.8)], sections=8)),
         "plate": (0.04, lambda: box(1, 0.7, 0.04)),
         "cylinder": (0.8, lambda: revolved([(0, 0), (0.4, 0), (0.4, 1), (0, 1)])),
         "cone": (0.8, lambda: revolved([(0, 0), (0.4, 0), (0, 1)])),

@@ -82,7 +82,7 @@ class Ties:
 
 
 def whole(thing, points, distances):
-    """(touches, ties, closed, mean distance in permille, field and deviations at places near points)."""
+    """(touches, ties, closed, mean distance in ‰, field and deviations at places near points)."""
     with Ties() as ties:
         atlas = core.explore_object(
             thing, thing.start, thing.outward, tolerance=TOLERANCE, noise=NOISE, rng=0
@@ -168,7 +168,7 @@ def objects_table(runs):
             off = (np.abs(other - distance) / std)[known].max()
             cells = [str(count), str(ties), "yes" if closed else "no", f"{mean:.4f}", f"{off:.1e}"]
             rows.append([name, kernel, *cells])
-    head = ["touches", "ties", "closed", "mean distance, permille", f"deviations from {first}"]
+    head = ["touches", "ties", "closed", "mean distance, ‰", f"deviations from {first}"]
     table(["object", "kernel", *head], rows, left=2)
 
 

@@ -8,7 +8,7 @@ prints Markdown tables:
 
 (a) Scans are touched without noise at random points (seeded, by area) with three to six planes, and half
     curves of 1/32, 1/16 and 1/8 of the object in twelve steps. The error is the mean |dz| over up to some 90
-    points of the mesh above the domain, in permille of the radius. With it come the share of these points
+    points of the mesh above the domain, in ‰ of the radius. With it come the share of these points
     within the 90 % interval, and the interval's mean score: its width, and twenty times what is beyond it.
 (b) The same error is set against the time of a fit and 300 heights.
 (c) Touches with three planes choose their extent and step: the table counts those that are sure, in doubt and
@@ -123,9 +123,9 @@ class Touch(NamedTuple):
 
 
 class Score(NamedTuple):
-    error: float  # In permille of the radius.
+    error: float  # In ‰ of the radius.
     covered: float = np.nan
-    interval: float = np.nan  # The score of the 90 % interval in permille.
+    interval: float = np.nan  # The score of the 90 % interval in ‰.
 
 
 @contextmanager
@@ -284,7 +284,7 @@ def time_table(scores, seconds):
 
 
 def automatic_row(scan, count):
-    """The numbers of a row of (c), the mean error in permille, and the worst sure error in deviations."""
+    """The numbers of a row of (c), the mean error in ‰, and the worst sure error in deviations."""
     planes = [SamplingPlane(math.pi * i / 3) for i in range(3)]
     sure, doubtful, refused, seconds = [], [], 0, []
     for point, normal in scan.places(count, 1):
@@ -342,10 +342,11 @@ def automatic_table(rows):
         "(c) Automatic touches. A doubt is right where the heights are off by over 2 % of the radius or three"
     )
     print(
-        "deviations, or the frame by 10 degrees where curvatures differ. Areas are in permille of the size "
-        "squared, the radius in permille of the size, times in ms of the processor.\n"
+        "deviations, or the frame by 10 degrees where curvatures differ. Areas are in ‰ of the size "
+        "squared, the radius in ‰ of the size, times in ms of the processor.\n"
     )
-    head = "scan|sure|in doubt|refused|doubts right|sure, off > 2 %|> 5 deviations|turned|all areas|radius|ms"
+    head = "scan|sure|in doubt|refused|justified warnings|sure, off > 2 %|> 5 deviations|turned"
+    head += "|all areas|radius|ms"
     total = [sum(row[i] for row in rows.values()) for i in range(8)]
     lines = [[name, *(f"{v:.0f}" for v in row[:9]), f"{row[9]:.1f}"] for name, row in rows.items()]
     table(head.split("|"), [*lines, ["all", *(f"{v:.0f}" for v in total), "", ""]])

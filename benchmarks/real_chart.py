@@ -21,7 +21,7 @@ def draw(scores, seconds, automatic):
     """Draws and saves the chart of touches with a given extent, and of automatic ones.
 
     scores : {scan: {(planes, extent): {method: Score}}}; seconds : {(method, planes): [seconds]}
-    automatic : (mean error in permille of the radius, milliseconds) of automatic touches
+    automatic : (mean error in ‰ of the radius, milliseconds) of automatic touches
     """
     methods = list(next(iter(next(iter(scores.values())).values())))
     counts = sorted({cell[0] for of in scores.values() for cell in of})
@@ -42,7 +42,7 @@ def draw(scores, seconds, automatic):
     axes[1].axhline(0.9, color=plot.BLACK, lw=0.8, ls=":")
     titles = "Error by planes", "Points within the 90 % interval", "Error by time"
     for ax, title in zip(axes, titles, strict=True):
-        ax.set(title=title, xlabel="sampling planes", ylabel="error, permille of the radius")
+        ax.set(title=title, xlabel="sampling planes", ylabel="error, ‰ of the radius")
     axes[1].set_ylabel("share of the points")
     for ax in axes[:2]:
         ax.set_xticks(counts)

@@ -338,9 +338,9 @@ UNTOLD = (
           lambda v: Setting(change=partial(turned_curve, v)), upright),
     Sweep("one of four curves turned by, degrees", (5, 15, 45, 90), (),
           lambda v: Setting((0, 45, 90, 135), (0, 0, 0, 0), change=partial(turned_curve, v)), upright),
-    Sweep("upside down of three curves", (0, 1), (),
+    Sweep("one of three curves flipped", (0, 1), (),
           lambda v: Setting(change=partial(upside_down, v)), upright),
-    Sweep("upside down of four curves", (0, 1), (),
+    Sweep("one of four curves flipped", (0, 1), (),
           lambda v: Setting((0, 45, 90, 135), (0, 0, 0, 0), change=partial(upside_down, v)), upright),
     Sweep("felt from end to end, late by, of the extent", LATE, (),
           lambda v: Setting(change=partial(late, v, False)), upright),
@@ -420,7 +420,7 @@ def rule_table(results):
             f"{100 * np.mean([f.status != 'ok' for f in benign]):.1f} %" if benign else "",
             f"{np.median(widths):.2f}",
         ])  # fmt: skip
-    table(["method", "cases", "due", "due, not given", "harmless", "warned of", "width"], rows)
+    table(["method", "cases", "needed", "needed but missing", "harmless", "warned of", "width"], rows)
     print("A warning was due and not given for:\n")
     for key, found in results.items():
         for method in METHODS:
@@ -449,7 +449,7 @@ def untold_table(results):
                 f"{sum(f.status != 'ok' for f in of)}",
                 *(f"{100.0 * np.median([getattr(f, what) for f in made]):.2f}" for what in ("error", "std")),
             ])  # fmt: skip
-    table(["beside", "value", "cases", "due", "due, not given", "told", "error", "stated"], rows)
+    table(["beside", "value", "cases", "needed", "needed but missing", "warned", "error", "stated"], rows)
 
 
 HEAD = [

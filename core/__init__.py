@@ -39,6 +39,7 @@ from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
+from .scan.facets import has_few_facets
 from .scan.pose_search import Pose, register
 from .scan.sampling import scattered, spaced, spaced_count
 from .scan.verification import reachable, verify, verifying
@@ -83,6 +84,7 @@ __all__ = [
     "exploring_many",
     "fit_error",
     "from_dict",
+    "has_few_facets",
     "height_error",
     "in_running_order",
     "judged_by_mesh",

@@ -50,7 +50,13 @@ def finite_array(
 
 
 def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:
-    """The list of `values`. Raises ValueError if they are no list, or one of them is of another kind."""
+    """The list of `values`. Raises ValueError if they are no list, or one of them is of another kind.
+
+    One array of contacts in place of a list of such arrays would be a list of its rows.
+    """
+    shape = getattr(values, "shape", ())
+    if len(shape) == 2:
+        raise ValueError(f"{name}: expected a list, got one array of shape {shape}: put it into a list")
     try:
         found = list(values)
     except TypeError:

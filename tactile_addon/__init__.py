@@ -12,7 +12,7 @@ from .files import contact_operators, export_operators
 from .probes import change_handlers, operators, probe, probe_operators
 from .report import report_operator
 from .scene import color_range
-from .sidebar import panel, preferences, rows
+from .sidebar import dots, panel, preferences, rows
 from .stability_map import map_object, map_operator
 from .viewport import drag, gizmos, overlay, pick, tool
 from .whole_object import kept, object_operator, surface_operators
@@ -50,6 +50,7 @@ def register():
     probe.register()
     color_range.register()
     map_object.register()
+    dots.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     tool.register()
@@ -76,6 +77,7 @@ def unregister():
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     kept.forget()
+    dots.unregister()
     map_object.unregister()
     color_range.unregister()
     probe.unregister()

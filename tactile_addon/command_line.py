@@ -100,7 +100,7 @@ def _add_contacts(add, help):
     add("--unit", choices=list(core.UNIT_METERS), help="unit of the numbers (the file's)")
     add("--outward", **VECTOR, help="a direction on the outer side (default: by the normals)")
     add("--flip", action="store_true", default=None, help="use the other side as the outer one")
-    add("--noise", type=float, help="least standard deviation of a contact")
+    add("--noise", type=float, help="noise floor: a contact has at least this standard deviation")
 
 
 def _add_join(command):

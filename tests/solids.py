@@ -78,6 +78,12 @@ def block(a=1.0, b=0.7, c=0.5):
     return Convex(distance, (0.05, 0.03, c), (0.0, 0.0, 1.0), walls)
 
 
+def rounded(radius, a=1.0, b=0.7, c=0.5):
+    """A block whose edges and corners are rounded."""
+    inner = block(a - radius, b - radius, c - radius)
+    return Solid(lambda x, y, z: inner.distance(x, y, z) - radius, (0.05, 0.03, c), (0.0, 0.0, 1.0))
+
+
 def prism(sides, radius=1.0, half=0.6):
     """A regular prism around z; its distance is that of the planes of its walls."""
     turns = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
@@ -116,6 +122,23 @@ class Convex(Solid):
     """
 
     walls: tuple
+
+    def edges(self, count):
+        """`count` points on each edge, (k, 3)."""
+        normals, sizes = (np.array(values) for values in zip(*self.walls, strict=True))
+        found = []
+        for i, j in zip(*np.triu_indices(len(sizes), 1), strict=True):
+            along = np.cross(normals[i], normals[j])
+            if np.linalg.norm(along) < 1e-9:
+                continue
+            rows = np.array([normals[i], normals[j], along])
+            middle = np.linalg.solve(rows, [sizes[i], sizes[j], 0.0])
+            room, slope = sizes - normals @ middle, normals @ along
+            ends = np.divide(room, slope, out=np.zeros(len(room)), where=np.abs(slope) > 1e-9)
+            low, high = ends[slope < -1e-9].max(), ends[slope > 1e-9].min()
+            if low < high and (room[np.abs(slope) <= 1e-9] > -1e-9).all():
+                found.append(middle + np.linspace(low, high, count)[:, None] * along)
+        return np.vstack(found)
 
     def ray_cast(self, origin, direction, distance):
         enters, leaves = (-math.inf, None), (math.inf, None)

@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SCANS = ROOT.parent / "shared" / "data" / "meshes"
 BUILD = ROOT / "build"
 WORDS = ("--touches", "200", "--block", "100", "--noise", "0.05%", "--workers", "2")
-TICKS = (0.1, 0.3, 1.0, 3.0, 10.0)  # In permille of an object's size.
+TICKS = (0.1, 0.3, 1.0, 3.0, 10.0)  # In ‰ of an object's size.
 
 
 def main():
@@ -95,7 +95,7 @@ def of_object(touches, facts):
 def print_table(found):
     """Prints a row for each object."""
     head = f"{'':24}{'ok':>6}{'doubt':>7}{'refused':>9}{'error':>7}"
-    print(f"\n{head}{'radius, %':>11}{'off, permille':>15}{'ms':>6}")
+    print(f"\n{head}{'radius, %':>11}{'off, ‰':>15}{'ms':>6}")
     for facts, patches in found:
         counts = f"{facts['ok']:6}{facts['in_doubt']:7}{facts['refused']:9}{facts['error']:7}"
         radius, off = 100.0 * np.median(patches["radii"]), 1e3 * np.median(patches["errors"])
@@ -128,7 +128,7 @@ def draw(found, path):
         place.set_axis_off()
     bar = figure.colorbar(shown, ax=axes, shrink=0.6, ticks=TICKS, format="%g")
     bar.minorticks_off()
-    bar.set_label("patch off the mesh, permille of the object's size")
+    bar.set_label("patch off the mesh, ‰ of the object's size")
     figure.savefig(path, dpi=110)
 
 

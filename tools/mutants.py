@@ -37,7 +37,7 @@ TESTS = {  # The tests of each module of core; those that fail soonest come firs
     "bayes/roughness": "roughness exploration",
     "bayes/sextic": "posterior measured_normals strokes",
     "contours/common_point": "common_point",
-    "contours/contour": "tracking order reconstruction measured_normals",
+    "contours/contour": "tracking order reconstruction measured_normals exploration",
     "contours/curves": "local_geometry reconstruction status measured_normals",
     "contours/local_geometry": "local_geometry reconstruction",
     "contours/thinning": "thinning order",

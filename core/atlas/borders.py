@@ -49,9 +49,10 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     """
     if mesh.is_closed:
         return Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
-    at, before, after, ways = _rim_of(mesh)
     yield 0.0
-    places, normals = mesh.vertices[at], mesh.normals[at]
+    at, before, after, ways, normals = _rim_of(mesh)
+    yield 0.0
+    places = mesh.vertices[at]
 
     def off(points: Array, which: Indices) -> Array:
         """How far the surface is above points (k, 3) beside some of the places, (k,); NaN where it is not."""
@@ -78,8 +79,11 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     return Border(np.stack([starts, ends], axis=1), beyond, c)
 
 
-def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array]:
-    """The vertices (n,) of a mesh's border, the first and last of each side (k,), and ways beyond (n, 3)."""
+def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array, Array]:
+    """The vertices (n,) of a mesh's border, and the first and last of each side (k,).
+
+    Also the ways beyond the border and the normals there, (n, 3) each.
+    """
     at, index = np.unique(mesh.border, return_inverse=True)
     before, after = index.reshape(-1, 2).T
     places = mesh.vertices[at]
@@ -90,7 +94,8 @@ def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array]:
         np.add.at(mean, before, along[after])
         np.add.at(mean, after, along[before])
         along = _unit(mean)
-    return at, before, after, np.cross(along, mesh.normals[at])
+    normals = mesh.normals[at]
+    return at, before, after, np.cross(along, normals), normals
 
 
 def _lengths(
@@ -155,7 +160,7 @@ def bordered(mesh: Mesh, border: Border) -> Mesh:
     mesh = mesh.chosen(~out[mesh.triangles].any(axis=1))
     for _ in range(EARS):
         mesh = mesh.chosen(mesh.sides_on_border < 2)
-    at, _, _, toward = _rim_of(mesh)
+    at, _, _, toward, _ = _rim_of(mesh)
     vertices = mesh.vertices.copy()
     feet, ways = _feet(border, vertices[at])
     # Where the mesh ends though the surface goes on, the way beyond is another.

@@ -24,6 +24,7 @@ REACH = 0.5  # A patch is asked about places up to this share of its radius abov
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius beside the normal at its foot has no foot.
+FLAT = 0.15  # A patch is flat if it is nowhere steeper than this slope to its own plane.
 STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
 CHUNK = 24_000  # So many pairs of a place and a patch fit into the processor's cache at once.
 
@@ -204,6 +205,15 @@ class Charts:
         for i, (x, y) in enumerate(zip(*every.reshape(2, len(self.radii), -1), strict=True)):
             found.append(self.shares(x, y, np.full(len(x), i)) <= share)
         return np.reshape(found, self.heights.shape)
+
+    @cached_property
+    def is_flat(self) -> NDArray[np.bool_]:
+        """Which patches are flat, (n,), by the slopes between neighboring knots of their domains."""
+        inside, pitch = self.inside(1.0), (2.0 * self.halves / (SIDE - 1))[:, None, None]
+        steps = np.stack([self.heights[:, 1:, :-1], self.heights[:, :-1, 1:]]) - self.heights[:, :-1, :-1]
+        steep = (np.hypot(*steps) > FLAT * pitch) & inside[:, :-1, :-1]
+        flat: NDArray[np.bool_] = ~steep.any(axis=(1, 2))
+        return flat
 
     def knots(self) -> Array:
         """Local x and y of all knots, (2, n, SIDE, SIDE)."""

@@ -150,10 +150,10 @@ def _intersections(charts: Charts, places: Array, normals: Array, edge: float) -
 def _steps(normals: Array, distance: Array) -> tuple[Array, NDArray[np.bool_]]:
     """The shortest steps (n, 3) onto planes with these normals (n, k, 3) at signed distances (n, k).
 
-    Also whether the planes are turned enough, (n,).
+    Also whether the planes are turned enough, (n,); those with the normal 0 are none.
     """
     gram, count = normals @ np.swapaxes(normals, 1, 2), normals.shape[1]
-    apart = np.all([np.abs(gram[:, i, i - 1]) < SHARP for i in range(count)], axis=0)
+    apart = np.all([np.abs(gram[:, i, i - 1]) < SHARP * gram[:, i, i] for i in range(count)], axis=0)
     gram[~apart] = np.eye(count)
     steps = np.linalg.solve(gram + LEAST * np.eye(count), distance[..., None])
     return -(normals * steps).sum(axis=1), apart

@@ -23,6 +23,7 @@ FLOOR = 1e-3  # No deviation below this share of the radius counts in a weight.
 # The cosines of 37 and of 53 degrees: patches that turn by less are one wall, from there on they fade out of
 # it, and those that turn by more are another wall.
 AGREE, APART = 0.8, 0.6
+FLAT_AGREE, FLAT_APART = 0.87, 0.75  # Those of flat patches, of 30 and 41 degrees: these end where walls do.
 # Patches of one wall differ in distance by at most this share of the radius, and this share of the distance
 # more.
 LAYER, SLANT = 0.15, 0.5
@@ -100,13 +101,15 @@ def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius:
     radius : (m,), that of a patch of the wall
     """
     room = LAYER * np.maximum(charts.radii[pairs.node], radius) + SLANT * np.abs(offset)
-    return _facing(pairs, up) * _within(pairs.distance - offset, room)
+    return _facing(charts, pairs, up) * _within(pairs.distance - offset, room)
 
 
-def _facing(pairs: Pairs, up: Array) -> Array:
+def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
     """From 1 to 0, (m,), how much patches face the way of normals (m, 3)."""
     cosine: Array = np.einsum("mi,mi->m", pairs.normal, up)
-    agree: Array = np.clip((cosine - APART) / (AGREE - APART), 0.0, 1.0)
+    is_flat = charts.is_flat[pairs.node]
+    apart, most = np.where(is_flat, FLAT_APART, APART), np.where(is_flat, FLAT_AGREE, AGREE)
+    agree: Array = np.clip((cosine - apart) / (most - apart), 0.0, 1.0)
     agree *= agree * (3.0 - 2.0 * agree)
     return agree
 
@@ -193,7 +196,7 @@ def _is_convex(indicator: Indicator, points: Array, a: Blend, b: Blend) -> NDArr
 def wall_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
     """The wall with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
     pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
-    alike = _facing(pairs, up[pairs.place]) * _within(pairs.distance, near[pairs.place])
+    alike = _facing(charts, pairs, up[pairs.place]) * _within(pairs.distance, near[pairs.place])
     return _mean(pairs, node_weights(charts, pairs) * alike, len(points))
 
 
@@ -202,7 +205,7 @@ def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
     pairs = charts.pairs(points)
     on = pairs.share < INSIDE
     on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
-    on &= np.einsum("mi,mi->m", pairs.normal, normals[pairs.place]) > APART
+    on &= _facing(charts, pairs, normals[pairs.place]) > 0.0
     found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
     return found
 

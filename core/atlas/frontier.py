@@ -38,6 +38,7 @@ BORDER_RADIUS, BORDER_APART = (
 )  # Places on the border of a mesh have a radius of so many edges, and are so many radii apart.
 OFF = 0.5  # Beyond a border a contact counts from so many edges off the mesh.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
+IN_VAIN = 2.0  # What is within so many radii of the least patch of a touch in vain brings nothing, too.
 TRIES = 3  # Touches go on from a place at most so many times.
 LOOK = 15  # So many other places are looked at together with the first of the queue, which is faster.
 ALONG = 0.9  # A direction is along another if the cosine of the angle between them is more.
@@ -82,6 +83,7 @@ class Frontier:
     least : the least area that a touch has to bring
     noise : standard deviation of the contacts between curves, drawn from `rng`
     taps : these contacts, for each patch
+    in_vain : where touches that could not make a patch were, (3,) each
 
     The first place is the one that can bring most. That only shrinks as patches come, so only there it is
     measured again.
@@ -93,6 +95,7 @@ class Frontier:
     noise: float = 0.0
     rng: np.random.Generator = field(default_factory=np.random.default_rng)
     taps: list[Contour] = field(default_factory=list)
+    in_vain: list[Vector] = field(default_factory=list)
     charts: Charts | None = None
     queue: list[tuple[float, int, Place]] = field(default_factory=list)
     pushed: int = 0
@@ -254,6 +257,9 @@ class Frontier:
     def _touch(self, place: Place, share: float) -> Next | None:
         """The touch in the middle of what is uncovered on a disk that was felt, if it brings enough."""
         hits, disk = place.felt[share], math.pi * (min(1.0, DISK_REACHES * share) * place.radius) ** 2
+        if self.in_vain and len(hits):
+            apart = ((hits[:, 0, None] - np.array(self.in_vain)) ** 2).sum(axis=2).min(axis=1)
+            hits = hits[apart > IN_VAIN**2 * self.least / math.pi]
         area = len(hits) / (DISK_PLACES + 1) * disk
         if area <= max(SLIVER * disk, self.least):
             return None

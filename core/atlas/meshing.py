@@ -150,6 +150,7 @@ def meshed(
         yield 0.7
         vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
     found = yield from creased(charts, vertices, triangles, surface.normal, edge)
+    yield 0.9
     surface = surface.chosen(np.append(np.arange(len(vertices)), found.parents))
     surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * found.unfelt))
     return (yield from _felt(found.vertices, found.triangles, surface, indicator.cell, ended))
@@ -215,8 +216,9 @@ def _settled(
 
     up : (k, 3), the way outward; room : a length within which the surface is
     """
-    for _ in range(2):
-        surface = yield from _onto(charts, indicator, vertices, up, room)
+    surface = yield from _onto(charts, indicator, vertices, up, room)
+    far = np.abs(surface.distance) > FAR * indicator.cell
+    yield from _again(charts, indicator, vertices, up, surface, far, room)
     for _ in range(SMOOTHINGS):
         vertices = evened(vertices, surface.normal, triangles)
         yield 0.5
@@ -226,12 +228,27 @@ def _settled(
         folded = _folded(vertices, surface.normal, triangles)
         if folded.any():
             vertices[folded] = evened(vertices, surface.normal, triangles)[folded]
-        some = np.flatnonzero(far | folded)
-        moved = vertices[some]
-        again = yield from _onto(charts, indicator, moved, up[some], room)
-        for old, new in zip((vertices, *surface), (moved, *again), strict=True):
-            old[some] = new
+        if not (far | folded).any():
+            break
+        yield from _again(charts, indicator, vertices, up, surface, far | folded, room)
     return vertices, surface
+
+
+def _again(
+    charts: Charts,
+    indicator: Indicator,
+    vertices: Array,
+    up: Array,
+    surface: Surface,
+    which: NDArray[np.bool_],
+    room: float,
+) -> Generator[float, None, None]:
+    """Moves some of the vertices (k, 3) onto the surface again, and changes both in place."""
+    some = np.flatnonzero(which)
+    moved = vertices[some]
+    again = yield from _onto(charts, indicator, moved, up[some], room)
+    for old, new in zip((vertices, *surface), (moved, *again), strict=True):
+        old[some] = new
 
 
 def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.bool_]:
@@ -267,7 +284,8 @@ def _felt(
     """The mesh without triangles where nothing was felt; yields the share that is done.
 
     Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
-    as small as some cells of the indicator is bridged; a later mesh ends where the first one did.
+    as small as some cells of the indicator is bridged. A later mesh ends where the first one did,
+    where most of what lies beyond patches is off the first.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -286,10 +304,12 @@ def _felt(
         far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
         gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * cell**2)[piece]
     else:
-        outer = np.flatnonzero(~inside & ~gone)
+        outer, off = np.flatnonzero(~inside & ~gone), np.zeros(count)
         for start in range(0, len(outer), PLACES_AT_ONCE):
             some = outer[start : start + PLACES_AT_ONCE]
-            gone[some] = ended(vertices[some])
+            off += np.bincount(piece[some], np.where(ended(vertices[some]), 1.0, -1.0), count)
             yield 0.9
+        gone[outer] = off[piece[outer]] > 0.0
+    yield 0.9
     std = np.where(surface.node < 0, cell, surface.std)
     return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))

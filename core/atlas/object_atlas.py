@@ -158,13 +158,18 @@ class Atlas:
                 f"Walls or gaps of {thin:.2g} % of the size were felt, and what is thinner than "
                 f"{resolved:.2g} % may be bridged or pierced: touch such parts as objects of their own."
             )
-        rough, _ = self._rough
-        if rough > ROUGH:
+        if self.is_rough:
+            rough = 100.0 * self._rough[0]
             return "uncertain", (
-                f"The deviation is above the tolerance on {100.0 * rough:.0f} % of the surface: touch there "
+                f"The deviation is above the tolerance on {rough:.0f} % of the surface: touch there "
                 "again or use a larger tolerance."
             )
         return self._checked()
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether more of the surface than the share ROUGH is less certain than LIMIT tolerances."""
+        return self._rough[0] > ROUGH
 
     @cached_property
     def _rough(self) -> tuple[float, int]:
@@ -235,10 +240,9 @@ class Atlas:
             place = max(self.uncovered, key=lambda place: place.radius)
             area = np.pi * place.radius**2
             return NextTouch(np.array(place.point), np.array(place.normal), area)
-        rough, vertex = self._rough
-        if rough <= ROUGH:
+        if not self.is_rough:
             return None
-        mesh = self.reference.mesh
+        vertex, mesh = self._rough[1], self.reference.mesh
         patch = self.patches[mesh.patch[vertex]]
         return NextTouch(mesh.vertices[vertex], mesh.normals[vertex], patch.domain.area)
 

@@ -98,8 +98,12 @@ class ReferenceMesh:
         return feet[row, best], triangle, std, ends
 
     def ended(self, points: Array) -> NDArray[np.bool_]:
-        """Which of points (n, 3) are beyond where the mesh ends."""
-        return self.feet(points)[3]
+        """Which of points (n, 3) are beyond where the mesh ends, or an edge off it as behind a sheet."""
+        if not self.is_open.any():
+            return np.zeros(len(points), dtype=bool)
+        feet, _, _, ends = self.feet(points)
+        off: NDArray[np.bool_] = np.linalg.norm(points - feet, axis=1) > self.edge
+        return off | ends
 
     def away(self, point: Vector) -> float:
         """The distance of a point from the triangles."""

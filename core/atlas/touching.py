@@ -200,12 +200,15 @@ class _Run:
         points, outward = (np.array(values) for values in zip(*contacts, strict=True))
         results = yield from exploring(self.surface, points, outward, farthest=farthest, **self.wanted)
         new = []
-        for e, up, times in zip(results, outward, least, strict=True):
+        for e, point, up, times in zip(results, points, outward, least, strict=True):
+            # At an edge a fit may end up on the other side.
             if isinstance(e, ValueError) or e.result.frame.axes[:, 2] @ up < FACING:
-                continue  # At an edge a fit may end up on the other side.
-            if self.frontier.add(e.result, times * self.tolerance, SMALL * self.tolerance):
+                self.frontier.in_vain.append(vector_of(point))
+            elif self.frontier.add(e.result, times * self.tolerance, SMALL * self.tolerance):
                 new.append(e)
                 yield
+            elif times < SMALL:
+                self.frontier.in_vain.append(vector_of(point))
         self.found += new
         self.done += len(contacts)
         return new
@@ -287,7 +290,7 @@ class _Run:
         atlas = yield from atlas.widened()
         contacts: list[Contact] = [contact for _, contact in uncovered]
         contacts += zip(check.points[off], check.normals[off], strict=True)
-        return atlas, contacts + self.rough(atlas.reference.mesh)
+        return atlas, contacts + (self.rough(atlas.reference.mesh) if atlas.is_rough else [])
 
     def rough(self, mesh: Mesh) -> list[Contact]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether one curve contradicts the others, as if it were upside down or its plane were another.
+"""Whether one curve contradicts the others, as if it were flipped or its plane were another.
 
 Beside the paper. Three curves always agree, because the normal curvatures H + A cos 2 phi + B sin 2 phi are
 three numbers. Where there are more contacts, all others tell where each curve should be, with a deviation.

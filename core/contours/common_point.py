@@ -41,7 +41,8 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     found = list_of("contours", contours, Contour)
     if len(found) < 2:
         raise DegenerateCurvesError(
-            f"the common point needs two or more curves, got {len(found)}: give more curves, or the point"
+            f"the common point needs two or more curves, got {len(found)}: name the curve of each contact in "
+            'a column "curve", give more curves, or give the point'
         )
     for number, contour in enumerate(found, 1):
         if len(contour.points) <= LEAST_CONTACTS:

@@ -17,6 +17,9 @@ from .contour import CREASE, NO_CONTACT, NOT_MONGE, Vector, along, cross, dot, s
 
 # benchmarks.refusals counts what these refuse.
 MAX_TURN = math.cos(math.radians(45.0))  # A sharper turn between two contacts is a crease to a finger.
+# A surface that bends more from one contact to the next, across the plane or along it, is another wall: an
+# edge of 45 degrees that is crossed aslant turns less in the plane (python -m benchmarks.atlas --shapes).
+MAX_BEND = math.cos(math.radians(40.0))
 # A normal tilted more against that at the point has slopes above 3.7.
 MAX_TILT = math.cos(math.radians(75.0))
 LEAST_IN_PLANE = 1e-3  # A surface normal has at least this share in the sampling plane.
@@ -112,7 +115,7 @@ def contacts(
 
     up : the curve's normal at the point; `turn` times it is the way ahead
     """
-    at = 0j
+    at, last = 0j, n
     if abs(up) < LEAST_IN_PLANE:
         return CREASE
     up /= abs(up)
@@ -131,8 +134,11 @@ def contacts(
         # If the surface lies in the plane, there is no curve to follow.
         if length < LEAST_IN_PLANE or (new_up * up.conjugate()).real < MAX_TURN * length:
             return CREASE
+        if dot(normal, last) < MAX_BEND:
+            return CREASE
         if dot(normal, n) < MAX_TILT:
             return NOT_MONGE
+        last = normal
         up = new_up / length
         yield point, normal
 

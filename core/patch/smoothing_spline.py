@@ -98,7 +98,7 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
 
     weights : (n,), by which these count at first; later by how far off the contacts are
     half : half the side of the square of knots
-    noise : least standard deviation of a contact
+    noise : noise floor, the standard deviation that a contact has at least
     """
     knots, basis = bases(contacts[:, 0], contacts[:, 1], half)
     up = np.maximum(normals[:, 2], LEAST_COSINE)

@@ -56,7 +56,7 @@ def reconstruct(
     method : "bayes" (bayes/joint_fit.py), or one of the paper's: "tagc" (9), "quadratic-variation",
         "least-squares" (5)
     degree : d of (1), 2 to 6, or "auto", the lowest that describes what the contacts show
-    noise : least standard deviation of a contact; None for the contours' own
+    noise : noise floor, the standard deviation that a contact has at least; None for the contours' own
     weight : lambda L^2 of "tagc" and "quadratic-variation", None for 1000 and 1e5
     solver : for "tagc", "fast" (Newton, from the quadric) or "descent" (the paper's, from its start)
 

@@ -37,7 +37,7 @@ class Reconstruction:
     patch : equation (1) of the degree asked for, in the frame
     contours : the fitted contours, in the world
     strokes : the other fitted contacts, in the world, (n, 3); means of neighbors if there are many
-    noise : least standard deviation of a contact, in units of L
+    noise : noise floor, the standard deviation that a contact has at least, in units of L
     method : the method of the fit
     converged : whether its solver converged
     taps : what was felt between the curves; None if nobody tapped there

@@ -20,7 +20,7 @@ from ..patch.domain import Domain, hull_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import HeightField, MongePatch
 from .result import Reconstruction
-from .start import Given, Start, curves_start, domain_of, strokes_start
+from .start import Given, Start, away_from, curves_start, domain_of, strokes_start
 
 
 class Options(NamedTuple):
@@ -148,7 +148,7 @@ def _result(
 ) -> Reconstruction | DegenerateCurvesError:
     """What touch i of the stack has found."""
     if fit.axes[i, :, 2] @ outward <= 0.0:
-        return DegenerateCurvesError(
+        return away_from(fit.points[i], contours) or DegenerateCurvesError(
             "the contacts show a surface that faces away from the outward direction: give the direction to "
             "its outer side at the point, or move the point away from the edge"
         )

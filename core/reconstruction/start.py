@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import BRINKS, Contour
-from ..contours.curves import Curves, curves_through, stacked
+from ..contours.curves import LEAST_CONTACTS, Curves, curves_through, misses, stacked
 from ..contours.local_geometry import (
     DegenerateCurvesError,
     darboux_frames,
@@ -23,6 +23,7 @@ from ..contours.thinning import thinned
 from ..patch.domain import BRINK, Domain, closed_spline_domain
 from .strokes import STRIPS, FirstFrame, first_frame, means, toward_farthest
 
+AWAY = 0.1  # Beyond this share of a curve's size, the point is not on it.
 TOUCH_ROUNDING = 1e-3  # Far from the origin rounding may take this share of a touch; MISFIT has room for it.
 
 
@@ -101,6 +102,10 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         degeneracy(*touch) or (too_coarse(gap, size) if gap > TOUCH_ROUNDING * size else None)
         for touch, gap, size in zip(each, apart, reach, strict=True)
     ]
+    errors = [
+        error and (away_from(point, contours) or error)
+        for error, point, contours in zip(errors, points, touches, strict=True)
+    ]
     good = [i for i, error in enumerate(errors) if error is None]
     if not good:
         return None, touches, errors
@@ -119,6 +124,33 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     noises, kappas = (np.array(stds), np.array(known_stds)), np.stack([k1, k2], axis=1)
     first = Start(points[good], axes, kappas, radii, curves, strokes, *noises)
     return first, touches, errors
+
+
+def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesError | None:
+    """The error that names the curve which passes the point farthest off, if it is AWAY; else None.
+
+    Both its nearest contact and its line there are, because at a corner only the line is. Too few curves or
+    contacts are errors of their own.
+    """
+    if len(contours) < 3 or min(len(contour.points) for contour in contours) <= LEAST_CONTACTS:
+        return None
+    found = misses(curves_through(*stacked(point[None], [contours])))[0, :, 0]
+    away = [
+        miss if min(gap, miss) > AWAY * size else 0.0
+        for miss, gap, size in zip(found, *_gaps_and_sizes(point, contours), strict=True)
+    ]
+    worst = int(np.argmax(away))
+    if not away[worst]:
+        return None
+    return DegenerateCurvesError(
+        f"curve {worst + 1} passes the reference point at {away[worst]:.3g}, more than a tenth of its size: "
+        "set the point where the curves meet"
+    )
+
+
+def _gaps_and_sizes(point: Array, contours: Sequence[Contour]) -> tuple[list[float], list[float]]:
+    gaps = [float(np.linalg.norm(contour.points - point, axis=1).min()) for contour in contours]
+    return gaps, [float(np.linalg.norm(np.ptp(contour.points, axis=0))) for contour in contours]
 
 
 def _std(noise: float | None, size: int, known: list[float]) -> float:

@@ -87,19 +87,33 @@ def notes(r: Judged) -> str:
     if r.taps is not None and r.taps.missed:
         message += f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface."
     if r.posterior.is_round:
-        message += " The curvatures are alike, so there are no principal directions."
+        message += " The two curvatures are equal within their error, so there are no principal directions."
     if r.blind:
-        verb, terms = "is" if r.blind == 1 else "are", terms_to(r.patch.degree)
-        message += f" {r.blind} of {terms} coefficients {verb} invisible to these planes."
+        terms = terms_to(r.patch.degree)
+        message += f" These planes cannot show {r.blind} of the {terms} shape terms."
     return message
 
 
 def _doubts(r: Judged) -> Iterator[str]:
     """Every sentence of advice where there is doubt, the gravest first."""
+    yield from _about_point(r)
     yield from _about_data(r)
     yield from _about_heights(r)
     yield from _about_frame(r)
     yield from _about_curves(r)
+
+
+def _about_point(r: Judged) -> Iterator[str]:
+    """A point beside the curves makes everything else doubtful, too."""
+    distances, stds = r.misses.T / r.radius
+    stds = np.maximum(stds, LEAST_SCATTER * r.noise)
+    apart = distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds)
+    if apart.any():
+        worst = np.argmax(np.where(apart, distances, 0.0))
+        yield (
+            f"Curve {worst + 1} passes the reference point at {r.radius * distances[worst]:.3g}"
+            ", more than its scatter explains: set the point where the curves meet."
+        )
 
 
 def _about_data(r: Judged) -> Iterator[str]:
@@ -135,14 +149,6 @@ def _about_heights(r: Judged) -> Iterator[str]:
 
 
 def _about_frame(r: Judged) -> Iterator[str]:
-    distances, stds = r.misses.T / r.radius
-    stds = np.maximum(stds, LEAST_SCATTER * r.noise)
-    apart = np.flatnonzero(distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds))
-    if len(apart):
-        yield (
-            f"Curve {apart[0] + 1} passes the reference point at {r.radius * distances[apart[0]]:.3g}"
-            ", more than its scatter explains: set the point where the curves meet."
-        )
     turn = r.posterior.turn(LIKELY if r.posterior.amplitude else CONFIDENCE)
     if turn > DOUBTFUL_TURN and not r.posterior.is_round:
         yield (
@@ -162,7 +168,7 @@ def _about_curves(r: Judged) -> Iterator[str]:
     if deviations > CONTRADICTING_CURVE:
         yield (
             f"A curve is {100.0 * off:.2g} % of the radius off what the others show, {deviations:.0f} times "
-            "the deviation, as if it were upside down or its plane were another: check each curve."
+            "the deviation, as if it were flipped or its plane were another: check each curve."
         )
     waves = r.waves / r.radius
     if waves > DOUBTFUL_WAVES and not len(r.strokes):

@@ -65,8 +65,10 @@ def gathered(
     if not given:  # In most cases there are only contours, which should not take longer.
         return np.empty((0, 3)), np.empty(0, dtype=np.intp), 0.0
     arrays = [
-        stroke.points if isinstance(stroke, Contour) else finite_array("strokes", stroke, (None, 3), LARGEST)  # type: ignore[arg-type]
-        for stroke in given
+        stroke.points
+        if isinstance(stroke, Contour)
+        else finite_array(f"strokes[{i}]", stroke, (None, 3), LARGEST)  # type: ignore[arg-type]
+        for i, stroke in enumerate(given)
     ]
     noise = max((stroke.noise or 0.0 for stroke in given if isinstance(stroke, Contour)), default=0.0)
     points = np.vstack([*(contour.points for contour in contours), *arrays])

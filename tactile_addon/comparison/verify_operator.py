@@ -77,7 +77,7 @@ class Verification:
         record["verification"] = {"target": self.target, **self._found}
         if record["status"] != "outdated":
             mean = self._found.get("vertex_distance_mean", 0.0)
-            record.update(judgment(r, mean, record["ended"], self._found["vertices"]))
+            record.update(judgment(r, mean, record["ended"], record.get("few_facets", False)))
         return record.to_dict()
 
     def _objects(self):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The export of patches: File > Export."""
 
+import math
 from pathlib import Path
 
 import bpy
@@ -54,8 +55,14 @@ class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
     def write(self, patch):
-        r = patch_record.reconstruction_of(patch)
-        contact_file.write(self.filepath, contact_file.contacts_of(r))
+        contacts = contact_file.contacts_of(patch_record.reconstruction_of(patch))
+        settings = bpy.context.scene.unit_settings
+        named = contact_file.UNIT_METERS.items() if settings.system != "NONE" else ()
+        # An imported file brings numbers of this unit back as they are.
+        unit = next(
+            (name for name, meters in named if math.isclose(meters, settings.scale_length, rel_tol=1e-6)), ""
+        )
+        contact_file.write(self.filepath, contacts._replace(unit=unit))
 
 
 class TACTILE_OT_export_patch(ObjectExport, bpy.types.Operator):

@@ -177,6 +177,7 @@ def _fit(source, contacts, point, outward, flip, normal_std, options):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     require_single("patch", result.radius, result.frame.origin)
     given = {"source": source, "unit": unit, "curves": len(contours), "strokes": len(strokes)}
+    given["given_contacts"] = sum(len(contour.points) for contour in felt)
     missed = {} if distances is None else {"misses": distances.tolist()}
     seconds = {"fit": perf_counter() - start}
     return Touched(None, result, given | _report(result, options["method"]) | missed | {"seconds": seconds})

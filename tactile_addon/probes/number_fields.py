@@ -10,7 +10,7 @@ import math
 from inspect import get_annotations
 
 import bpy
-from bpy.props import FloatProperty
+from bpy.props import FloatProperty, IntProperty
 
 # What a pixel changes a length by, as a share of the object's size.
 PACES = {
@@ -29,7 +29,7 @@ WHOLE = {"METRIC": 1.0, "IMPERIAL": 0.3048}  # Lengths below all of these are sh
 def annotations(cls, found=lambda owner, name: 0.0):
     """The additional properties for the lengths of a property group or operator, by name.
 
-    found : function of an object and the name of a length; gives the value that was found for 0
+    found : function of an object and the name of a number; gives the value that was found for 0
     """
     given = {name: kind for base in reversed(cls.__mro__) for name, kind in get_annotations(base).items()}
     return {
@@ -40,7 +40,10 @@ def annotations(cls, found=lambda owner, name: 0.0):
 
 
 def dragged(cls):
-    """Decorates an operator that shows its lengths through `fields`."""
+    """Decorates an operator that shows its lengths through `fields`, and that Blender does not register.
+
+    Blender's log of registered operators would list each of these properties.
+    """
     cls.__annotations__.update(annotations(cls))
     return cls
 
@@ -75,6 +78,16 @@ def _unit_of(system, meters):
 
 def _name(name, decade):
     return f"{name}_by_{'m' if decade < 0 else ''}{abs(decade)}"
+
+
+def degree_field(given, found):
+    """The property that shows the degree that was found, and sets the property with the keywords `given`."""
+    return IntProperty(
+        **{key: given[key] for key in ("name", "description", "min", "max")},
+        options=HIDDEN_UNSAVED,
+        get=lambda settings: settings.degree or int(found(settings.id_data, "degree")),
+        set=lambda settings, value: setattr(settings, "degree", value),
+    )
 
 
 def _field(name, given, decade, found):

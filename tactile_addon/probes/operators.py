@@ -19,13 +19,12 @@ from ..touch.settings import (
 )
 from ..touch.touch_object import completed, touch
 from ..touch.wording import fit_summary, sentence
-from .number_fields import dragged, fields
+from .number_fields import fields
 from .probe import is_result, lock_of, patch_near, probe_of, record_of
 
 NO_MESH = "There is no mesh to touch: add one (Shift A), or import a scan (File > Import)"
 
 
-@dragged
 class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     """Feel the surface along curves through a point and rebuild the patch around it"""
 
@@ -77,10 +76,9 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         # If they are not set, the cursor and the surface decide, which zeros would prevent.
         for name in filter(self.properties.is_property_set, ("location", "outward")):
             layout.prop(self, name)
-        shown = fields_of(context, self.target)
-        draw_all(layout, self, shown)
+        draw_all(layout, self)
         given = self.properties.is_property_set("tolerance")
-        layout.prop(self, shown["tolerance"], text="Tolerance" if given else "Tolerance (Off)")
+        layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
 
 
 def report_error(operator, error):

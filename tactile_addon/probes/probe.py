@@ -20,7 +20,7 @@ from bpy.props import (
 
 from ..scene import patch_object, patch_record, shown
 from ..scene.family import children_of
-from ..touch.settings import OVERRIDABLE, TouchSettings, changed, is_silent
+from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, changed, is_silent
 from . import anchor, number_fields
 
 DIGEST = "tactile_digest"
@@ -209,14 +209,23 @@ def _show(obj):
             shown.share_range(obj)
 
 
+def _show_contours(patch, shown):
+    """Shows or hides the contours of a patch, if it has any."""
+    lines = patch_record.contours_of(patch)
+    if lines is not None:
+        lines.hide_viewport = not shown
+
+
 def _found(probe, name):
-    """The value that the last touch chose for a length that is 0."""
+    """The value that the last touch chose for a number that is 0."""
     record = record_of(probe)
     return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
 
 
 def register():
     TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
+    degree = FitSettings.__annotations__["degree"].keywords
+    TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(degree, _found)
     bpy.utils.register_class(TactileProbe)
     bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
     bpy.types.Object.tactile_colors = EnumProperty(
@@ -226,6 +235,12 @@ def register():
         override=OVERRIDABLE,
         update=lambda obj, _: _show(obj),
     )
+    bpy.types.Object.tactile_contours = BoolProperty(
+        name="Contours",
+        description="Show the curves that the finger followed",
+        get=lambda obj: (lines := patch_record.contours_of(obj)) is not None and not lines.hide_viewport,
+        set=lambda obj, shown: _show_contours(obj, shown),
+    )
     bpy.types.Object.tactile_target = StringProperty(  # A pointer would keep a deleted mesh.
         name="Target",
         description="Name of the mesh object to put the patch onto, or to compare it with",
@@ -234,5 +249,6 @@ def register():
 
 
 def unregister():
+    del bpy.types.Object.tactile_contours
     del bpy.types.Object.tactile_target, bpy.types.Object.tactile_colors, bpy.types.Object.tactile_probe
     bpy.utils.unregister_class(TactileProbe)

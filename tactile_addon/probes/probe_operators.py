@@ -11,10 +11,12 @@ from ..scene import color_range, patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
 from ..touch.settings import MOST_PLANES, length_property
-from ..touch.wording import added_planes
+from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
-from .number_fields import dragged
-from .operators import fields_of, has_patch, is_in_object_mode, is_unlocked, report_error, waiting
+from .operators import has_patch, is_in_object_mode, is_unlocked, report_error, waiting
+
+SUBDIVISIONS = 3  # A target gets so many levels at once,
+MOST_FACES = 500_000  # as long as it has no more faces then.
 
 
 class _ProbeOperator:
@@ -59,7 +61,6 @@ class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-@dragged
 class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
     """Feel along more planes, each time the one that tells most, until it is enough or none would help"""
 
@@ -89,7 +90,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
 
     def draw(self, context):
         self.layout.use_property_split = True
-        self.layout.prop(self, fields_of(context, "")["tolerance"])
+        self.layout.prop(self, "tolerance")
 
 
 def _add(settings, suggested):
@@ -140,6 +141,35 @@ class TACTILE_OT_update(_ProbeOperator, bpy.types.Operator):
             touch_again.refresh(found, context)
         if found.tactile_probe.message:
             self.report({"WARNING"}, found.tactile_probe.message)
+        return {"FINISHED"}
+
+
+class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
+    """Smooth the target by a Subdivision Surface modifier, or by one more level of the one it has"""
+
+    bl_idname = "tactile.add_subdivision"
+    bl_label = "Add Subdivision"
+
+    def execute(self, context):
+        found = probe.probe_of(context.view_layer.objects.active)
+        target = found.tactile_probe.target
+        if target is None or not target.is_editable:
+            return report_error(self, ValueError("The target cannot be changed: make it local first"))
+        modifier = next((m for m in reversed(target.modifiers) if m.type == "SUBSURF"), None)
+        if modifier is None:
+            modifier, level = target.modifiers.new("Subdivision", "SUBSURF"), 1
+            while level < SUBDIVISIONS and 4 ** (level + 1) * len(target.data.polygons) <= MOST_FACES:
+                level += 1
+        else:
+            level = modifier.levels + 1
+        modifier.levels, modifier.render_levels = level, max(level, modifier.render_levels)
+        modifier.show_viewport = True
+        context.view_layer.update()
+        touch_again.refresh(found, context)
+        if found.tactile_probe.message:
+            return report_error(self, ValueError(found.tactile_probe.message))
+        record = probe.record_of(found).to_dict()
+        self.report({"INFO"}, verdict(record, units.unit_of(context.scene, record["radius"])))
         return {"FINISHED"}
 
 
@@ -203,6 +233,7 @@ OPERATORS = (
     TACTILE_OT_add_planes,
     TACTILE_OT_remove_plane,
     TACTILE_OT_update,
+    TACTILE_OT_add_subdivision,
     TACTILE_OT_delete,
     TACTILE_OT_show_colors,
     TACTILE_OT_share_range,

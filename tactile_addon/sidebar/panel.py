@@ -3,6 +3,7 @@
 """The panels of the sidebar's tab."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface
 
 from ..comparison.register_operator import TACTILE_OT_register
 from ..comparison.verification_wording import verification_rows, verification_table
@@ -11,6 +12,7 @@ from ..probes import number_fields, probe
 from ..probes.operators import NO_MESH
 from ..probes.probe_operators import (
     TACTILE_OT_add_plane,
+    TACTILE_OT_add_subdivision,
     TACTILE_OT_delete,
     TACTILE_OT_remove_plane,
     TACTILE_OT_share_range,
@@ -18,6 +20,7 @@ from ..probes.probe_operators import (
     TACTILE_OT_update,
 )
 from ..scene import patch_record
+from ..scene.color_range import unit_of_range
 from ..scene.viewports import shows_colors
 from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import map_rows, median_rows
@@ -28,6 +31,7 @@ from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
 from ..whole_object.object_report import farthest, object_rows, object_verdict
 from ..whole_object.surface_operators import TACTILE_OT_look_farthest, TACTILE_OT_mesh_again
+from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
 from .rows import draw_rows, draw_sentence
 
@@ -77,7 +81,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         chosen = found_values(record, context.scene)
         fields = {}  # The override of a library's probe keeps numbers, but not the properties that show them.
         if found.override_library is None:
-            fields = number_fields.fields(_size_of(settings.target, record))
+            fields = number_fields.fields(_size_of(settings.target, record)) | {"degree": "degree_shown"}
         draw_chosen(layout, settings, "extent", chosen, fields)
         _draw_planes(layout, settings)
         row = layout.row()
@@ -99,12 +103,14 @@ def _size_of(target, record):
 def _draw_planes(layout, settings):
     column = layout.column(align=True)
     heading = column.row(align=True)
+    heading.label(text="", icon="BLANK1")
     for text in ("Azimuth", "Tilt"):
         heading.label(text=text)
     heading.operator(TACTILE_OT_add_plane.bl_idname, text="", icon="ADD")
     for i in range(settings.plane_count):
         row = column.row(align=True)
         row.use_property_split = False
+        row.label(text="", icon_value=dot(i))
         row.prop(settings, "azimuths", index=i, text="")
         row.prop(settings, "tilts", index=i, text="")
         row.operator(TACTILE_OT_remove_plane.bl_idname, text="", icon="REMOVE").plane = i
@@ -134,10 +140,12 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         is_outdated = record["status"] == "outdated"
         if not (is_outdated and failed):  # The failure stands above already.
             draw_sentence(context, layout, verdict(record, unit), ICONS.get(record["status"], "ERROR"))
+        if record.get("few_facets") and found is not None and not is_outdated:
+            layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
         if is_outdated and found is not None:
             layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
         _draw_colors(context, layout, patch, "tactile_colors")
-        _draw_range(layout, patch)
+        _draw_range(context, layout, patch)
         _draw_shown(layout, found, patch)
         if is_outdated:  # These numbers are outdated.
             layout.label(text="Last Touch")
@@ -188,10 +196,15 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
         record = obj[patch_record.MAP_RECORD]
         box, unit = layout.box(), units.unit_of(context.scene, record["spacing"])
         draw_rows(context, box, map_rows(record, unit))
-        medians = median_rows(record, unit)
+        medians, more = median_rows(record, unit), median_rows(record, unit, more=True)
         if medians:
             box.label(text="Medians of the Patches")
             draw_rows(context, box, medians)
+        if more:
+            header, body = layout.panel("TACTILE_PT_medians", default_closed=True)
+            header.label(text="More")
+            if body:
+                draw_rows(context, body, more)
 
 
 def _draw_details(context, layout, record, unit):
@@ -213,11 +226,14 @@ def _draw_colors(context, layout, obj, name):
         layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
 
 
-def _draw_range(layout, patch):
+def _draw_range(context, layout, patch):
     """Draws where the colors end, and a button for one range on all patches."""
     row = layout.row(align=True)
     row.use_property_split = False
-    row.prop(patch, "tactile_range", text="Range" if patch_record.RANGE in patch else "Range (Auto)")
+    power, unit = unit_of_range(patch, context.scene)
+    symbol = units.symbol(power, unit)
+    name = iface("Range" if patch_record.RANGE in patch else "Range (Auto)")
+    row.prop(patch, "tactile_range", text=f"{name} {symbol}".rstrip(), translate=False)
     if patch_record.RECORD in patch:
         row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
 
@@ -228,7 +244,7 @@ def _draw_shown(layout, found, patch):
     row = layout.row(align=True)
     row.use_property_split = False
     if lines is not None:
-        row.prop(lines, "hide_viewport", text="Contours", toggle=1, invert_checkbox=True)
+        row.prop(patch, "tactile_contours", icon="CURVE_DATA", toggle=1)
     if found is not None:
         row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)
 

@@ -47,7 +47,7 @@ def plane_rows(record, unit):
     plane = record["suggested_plane"]
     return [
         ("Suggested Plane", f"{plane['azimuth']:.0f}°"),
-        ("Would Bring", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
+        ("Expected Accuracy with It", f"± {units.say(plane['expected_height_std'], 1, unit)}"),
     ]
 
 

@@ -34,7 +34,7 @@ TIPS = {
     "Degree": "Degree of the polynomial that describes the patch",
     "Contacts": "Number of contacts that the patch was fitted to",
     "Suggested Plane": "Azimuth of the sampling plane that would improve the patch most",
-    "Would Bring": "Standard deviation of the height expected with the suggested plane",
+    "Expected Accuracy with It": "Standard deviation of the height expected with the suggested plane",
     "Error on Curves": "Mean difference in height between contacts and patch, equation (6) of the paper",
     "Error on … More": "The same for more contours, which are felt on the mesh between the sampling planes",
     "Total |K|": "Absolute Gaussian curvature summed over the patch: 0 where it is flat or rolled",

@@ -16,6 +16,7 @@ from ..touch.settings import MOST_PLANES
 from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
 
 MAP_COLOR = "stability_color"
+TOUCHED = "is_touched"
 SHADES = 256
 # The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
 # starts away, as a scan in mm is.
@@ -24,17 +25,23 @@ SHOWN_ABOVE = 5e-3
 MAP_QUANTITIES = [
     ("error", "Error", "Mean distance in height between patch and mesh", 1),
     ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
-    ("reach", "Reach", "How far the longest half curve goes: the extent, where that is automatic", 1),
+    (
+        "reach",
+        "Reach",
+        "How far the longest half curve goes, the extent where that is automatic; red is short",
+        1,
+    ),
     (
         "condition_number",
         "Condition Number",
         "Factor by which plain least squares amplifies noise",
         0,
     ),
-    ("blind_share", "Blind Share", "Share of the coefficients that are invisible to the planes", 0),
+    ("blind_share", "Blind Share", "Share of the shape terms that the planes cannot show", 0),
     ("reason", "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
+REVERSED = ("reach",)  # Of these much is good, so that red is little: red is bad on every map.
 MAP_POWERS = {name: power for name, _, _, power in MAP_QUANTITIES}
 REFUSED = (0.27, 0.27, 0.27, 1.0)
 # The colors of the reasons, in sRGB, are Okabe and Ito's, which color-blind readers can tell apart.
@@ -72,11 +79,14 @@ def _paint(mesh, touched):
     """Gives each vertex the values of the nearest touch."""
     attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in MEASURES]
     attributes.append(("reason", "INT", touched.reason))
-    for name in (*MEASURES, "reason", MAP_COLOR):
+    for name in (*MEASURES, "reason", TOUCHED, MAP_COLOR):
         if name in mesh.attributes:  # The source may have one of this name and another type.
             mesh.attributes.remove(mesh.attributes[name])
     for name, kind, values in attributes:
         mesh.attributes.new(name, kind, "POINT").data.foreach_set("value", values[touched.nearest])
+    is_touched = np.zeros(len(mesh.vertices), dtype=bool)
+    is_touched[touched.chosen[: touched.done]] = True
+    mesh.attributes.new(TOUCHED, "BOOLEAN", "POINT").data.foreach_set("value", is_touched)
     mesh.attributes.new(MAP_COLOR, "FLOAT_COLOR", "POINT")
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
 
@@ -94,7 +104,8 @@ def recolor(painted):
         table = np.vstack([table, colors.linear([REFUSED])])
         share = np.maximum(values, 1.0 if shown in LOGARITHMIC else 0.0)
         share = np.log(share) / np.log(limit) if shown in LOGARITHMIC else share / limit
-        place = (np.minimum(share, 1.0) * (SHADES - 1) + 0.5).astype(np.int32)
+        share = np.minimum(share, 1.0)
+        place = ((1.0 - share if shown in REVERSED else share) * (SHADES - 1) + 0.5).astype(np.int32)
         rgba = table[np.where(values == NOTHING, SHADES, place)]
     mesh.attributes[MAP_COLOR].data.foreach_set("color", rgba.astype(np.float32).ravel())
     mesh.update()
@@ -119,6 +130,25 @@ def swatches(painted):
         return [(f"No Patch: {refused}", REFUSED)] if refused else []
     names = zip(REASONS, REASON_COLORS, strict=True)
     return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
+
+
+def touched_near(painted, location):
+    """The point nearest to a location at which a map was touched.
+
+    It is the location itself if that point is farther away than the spacing, as where the target was moved.
+    """
+    mesh, count = painted.data, len(painted.data.vertices)
+    if TOUCHED not in mesh.attributes:
+        return location
+    is_touched, co = np.empty(count, dtype=bool), np.empty((count, 3), dtype=np.float32)
+    mesh.attributes[TOUCHED].data.foreach_get("value", is_touched)
+    mesh.attributes["position"].data.foreach_get("vector", co.ravel())
+    matrix = np.array(painted.matrix_world, dtype=float)
+    places = co[is_touched] @ matrix[:3, :3].T + matrix[:3, 3]
+    away = np.linalg.norm(places - np.array(location), axis=1)
+    nearest = int(np.argmin(away)) if len(away) else None
+    is_near = nearest is not None and away[nearest] <= painted[patch_record.MAP_RECORD]["spacing"]
+    return places[nearest].tolist() if is_near else location
 
 
 def inputs_of(painted):

@@ -27,7 +27,7 @@ def map_table_rows(record):
         ("refused", refused),
         ("fit", f"{record['method']}, degree {record['degree']}"),
         (", ".join(names), ", ".join(lengths)),
-        *((f"median {title.lower()}", value) for title, value in _medians(record, unit)),
+        *((f"median {title.lower()}", value) for _, title, value in _medians(record, unit)),
     ]
 
 
@@ -51,13 +51,14 @@ def map_rows(record, unit):
     ]
 
 
-def median_rows(record, unit):
-    """(label, value) of the medians over the patches of a stability map."""
-    return list(_medians(record, unit))
+def median_rows(record, unit, more=False):
+    """(label, value) of the medians over the patches of a stability map: those in lengths, or all `more`."""
+    powers = map_object.MAP_POWERS
+    return [(title, value) for name, title, value in _medians(record, unit) if (powers[name] == 0) is more]
 
 
 def _medians(record, unit):
-    """(title, value) of each median that is known."""
+    """(attribute, title, value) of each median that is known."""
     for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:
-            yield title, units.say(record[f"{name}_median"], power, unit)
+            yield name, title, units.say(record[f"{name}_median"], power, unit)

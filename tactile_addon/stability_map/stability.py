@@ -145,9 +145,11 @@ class StabilityMap:
         return _reason_of(_ended(contours, point) or shortest.stops)
 
     def _note(self, number, touch):
-        result = touch.result
-        self.reason[number] = REASON_KEYS.index("patch" if result.status == "ok" else "doubt")
-        off = core.height_error(result, self.surface)
+        result, surface = touch.result, self.surface
+        off = core.height_error(result, surface)
+        status, _ = core.judged_by_mesh(result, off or 0.0)
+        is_sure = status == "ok" and not core.has_few_facets(result, surface.face_near, surface.corners_of)
+        self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
         self.error[number] = NOTHING if off is None else off
         self.height_std[number], self.reach[number] = result.mean_height_std, touch.extent
         self.condition_number[number] = result.condition_number

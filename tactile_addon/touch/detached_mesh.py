@@ -37,7 +37,9 @@ class DetachedMesh(PlacedMesh):
         self._compared_until = 0.0
         farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
         self.spacing = farthest * np.finfo(np.float32).eps
-        normals, corners, self.faces, self.triangles = _arrays_of(evaluated.data)
+        normals, corners, starts, self.triangles = _arrays_of(evaluated.data)
+        self.faces = corners[starts[:, None] + np.arange(3)]
+        self._corners, self._starts = corners, np.append(starts, len(corners))
         if np.linalg.det(linear) < 0.0:
             self.triangles = self.triangles[:, ::-1]
         self.has_face = np.bincount(corners, minlength=len(co)) > 0
@@ -90,9 +92,18 @@ class DetachedMesh(PlacedMesh):
     def _nearest(self, local):
         return self._tree.find_nearest(local)[:2]
 
+    def face_near(self, point):
+        """The number of the face nearest to a point."""
+        return self._tree.find_nearest(self._to_local(point))[2]
+
+    def corners_of(self, number):
+        """The corners (k, 3) of a face, in order."""
+        start, end = self._starts[number : number + 2]
+        return self.points[self._corners[start:end]]
+
 
 def _arrays_of(mesh):
-    """Normals (n, 3) of a mesh's vertices, and the vertices of its corners, faces and triangles."""
+    """Normals (n, 3) of a mesh's vertices, those of its corners, its faces' first corners, its triangles."""
     normals = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.vertex_normals.foreach_get("vector", normals.ravel())
     corners = np.empty(len(mesh.loops), dtype=np.int32)
@@ -102,4 +113,4 @@ def _arrays_of(mesh):
     mesh.calc_loop_triangles()
     triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return normals, corners, corners[starts[:, None] + np.arange(3)], triangles
+    return normals, corners, starts, triangles

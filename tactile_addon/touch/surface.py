@@ -111,9 +111,17 @@ class MeshSurface(PlacedMesh):
 
     def facet(self, point):
         """The longest edge of the face nearest to a world point."""
-        _, _, _, number = self._object.closest_point_on_mesh(self._to_local(point), depsgraph=self._depsgraph)
-        corners = self._co[list(self._mesh.polygons[number].vertices)] @ self._linear.T
+        corners = self.corners_of(self.face_near(point))
         return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max())
+
+    def face_near(self, point):
+        """The number of the face nearest to a world point."""
+        return self._object.closest_point_on_mesh(self._to_local(point), depsgraph=self._depsgraph)[3]
+
+    def corners_of(self, number):
+        """The corners (k, 3) of a face in the world, in order; counterclockwise, unless it is mirrored."""
+        co = np.array([self._mesh.vertices[i].co for i in self._mesh.polygons[number].vertices], dtype=float)
+        return co @ self._linear.T + self._origin
 
     def _nearest(self, local):
         """The nearest (point, normal) in object coordinates."""

@@ -90,7 +90,12 @@ def touch(
         "method": fit["method"],
         "noise": noise,
         "seed": seed,
-        **_exploration_report(found, len(planes), (early_ends if extent else ends)(found.result.contours)),
+        **_exploration_report(
+            found,
+            len(planes),
+            (early_ends if extent else ends)(found.result.contours),
+            core.has_few_facets(found.result, surface.face_near, surface.corners_of),
+        ),
         "axes": axes.tolist(),
         "seconds": dict(zip(("prepare", "touch"), np.diff(clock).tolist(), strict=True)),
     }
@@ -112,14 +117,14 @@ def _explored(surface, point, *where, **given):
         ) from error
 
 
-def _exploration_report(found, given, ended):
-    """The report of a touch whose first `given` planes were given; `ended` as in reconstruction_report."""
+def _exploration_report(found, given, ended, few_facets):
+    """The report of a touch whose first `given` planes were given; the rest as in `judgment`."""
     added = zip(found.planes[given:], found.stds, found.stds[1:], strict=False)
     return {
         "degree": found.result.patch.degree,
         "extent": found.extent,
         "step": found.step,
-        **reconstruction_report(found.result, ended),
+        **reconstruction_report(found.result, ended, few_facets),
         "planes": [[math.degrees(plane.azimuth), math.degrees(plane.tilt)] for plane in found.planes],
         "added_planes": [
             {"azimuth": math.degrees(plane.azimuth), "height_std_before": before, "height_std": after}
@@ -136,9 +141,9 @@ def completed(touched, most=None):
     """
     clock, result, report = [perf_counter()], touched.result, touched.report
     found = _verification_report(touched.surface, result, most)
-    # If faces are large, a pocket between the curves may have no vertex that lies over the patch.
-    offs = found.get("vertex_distance_mean"), core.height_error(result, touched.surface)
-    found |= judgment(result, max(off or 0.0 for off in offs), report["ended"], found["vertices"])
+    # Where vertices are many they would count more, and if faces are large, there may be none in a pocket.
+    off = core.height_error(result, touched.surface)
+    found |= judgment(result, off or 0.0, report["ended"], report["few_facets"])
     clock.append(perf_counter())
     plane = suggestion_report(result, np.array(report["axes"]))
     clock.append(perf_counter())

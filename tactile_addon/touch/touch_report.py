@@ -15,7 +15,6 @@ ENDS = {
     core.CREASE: "at a crease",
     core.NOT_MONGE: "where the surface turns away",
 }
-FEW_VERTICES = 6  # With fewer vertices over a patch, facets were felt and not the shape they stand for.
 
 
 def ends(contours):
@@ -42,18 +41,19 @@ def _counted(counts, total):
     )
 
 
-def judgment(result, mean, ended, vertices=FEW_VERTICES):
+def judgment(result, mean, ended, few_facets=False):
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
-    vertices : number of the mesh's vertices over the patch, if it is known
+    few_facets : see core.has_few_facets
     """
     status, message = core.judged_by_mesh(result, mean)
     found = {"status": status, "message": message + (ended if message == result.message else "")}
-    if vertices >= FEW_VERTICES:
+    if not few_facets:
         return found
-    return found | {
-        "message": f"The patch lies on coarse facets (mesh vertices over it: {vertices}): add a "
-        f"Subdivision modifier if the mesh stands for a smooth shape. {found['message']}"
+    return {
+        "status": "uncertain" if status == "ok" else status,
+        "message": "The curves lie on so few facets that the curvature is that of the facets, not of the "
+        f"shape: add a Subdivision modifier if the mesh stands for a smooth shape. {found['message']}",
     }
 
 
@@ -78,11 +78,12 @@ def measures(result):
     }
 
 
-def reconstruction_report(result, ended=""):
-    """The report of a fit before it is compared with a mesh; `ended` is added to its message."""
+def reconstruction_report(result, ended="", few_facets=False):
+    """The report of a fit before it is compared with a mesh; arguments as in `judgment`."""
     (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
-        **judgment(result, 0.0, ended),
+        **judgment(result, 0.0, ended, few_facets),
+        "few_facets": few_facets,
         "ended": ended,
         "is_verified": False,
         "frame": {"origin": result.frame.origin.tolist(), "d1": d1, "d2": d2, "normal": n},

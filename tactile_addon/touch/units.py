@@ -14,6 +14,7 @@ ADAPTIVE = {
 }
 # Symbol and meters of each unit, by Blender's name.
 METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
+LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
 SUPERSCRIPTS = {1: "", 2: "²"}
 
 
@@ -28,7 +29,7 @@ def unit_of(scene, size):
     name, meters = settings.length_unit, size * settings.scale_length * (1.0 + 1e-6)
     if name == "ADAPTIVE" or not 1e-1 <= meters / METERS[name][1] <= 1e4:
         names = ADAPTIVE[settings.system]
-        name = next((n for n in names if METERS[n][1] <= meters), names[-1])
+        name = next((n for n in names if LEAST.get(n, 1.0) * METERS[n][1] <= meters), names[-1])
     symbol, meters = METERS[name]
     return symbol, meters / settings.scale_length
 

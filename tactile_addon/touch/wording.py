@@ -7,7 +7,7 @@ from collections import Counter
 import bpy
 import numpy as np
 
-from .touch_report import ENDS, FEW_VERTICES
+from .touch_report import ENDS
 from .units import length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
@@ -56,6 +56,8 @@ def verdict(report, unit):
     """A sentence on whether a patch is good, and what to do if it is not."""
     if report["status"] == "outdated":
         return "Outdated: touch again"
+    if report.get("few_facets"):
+        return "Curvature of the facet, not of the shape"
     if report["status"] != "ok":
         doubt = report["message"].partition(". ")[0].rstrip(".")
         return f"Doubtful: {doubt.rpartition(': ')[2]}"
@@ -64,8 +66,7 @@ def verdict(report, unit):
     if early:
         count, where = early[0]
         return f"Good, with {count} of {stops.total()} half curves cut short {where}"
-    of = ", of a facet" if "step" in report and report.get("vertices", FEW_VERTICES) < FEW_VERTICES else ""
-    return f"Good{of}: heights to ± {say(report['height_std'], 1, unit)}"
+    return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
 
 
 def added_planes(report, unit):
@@ -79,8 +80,11 @@ def added_planes(report, unit):
 
 
 def _measured_contacts(report):
-    kinds = [f"{report[kind]} {kind}" for kind in ("curves", "strokes") if report[kind] or kind == "curves"]
-    return f"{report['contacts']} on {' and '.join(kinds)}"
+    kinds = " and ".join(f"{report[kind]} {kind}" for kind in ("curves", "strokes") if report[kind])
+    given, fitted = report.get("given_contacts", 0), report["contacts"]
+    if given <= fitted:  # The point of the file is one more.
+        return f"{fitted} on {kinds}"
+    return f"{given} on {kinds}, fitted as {fitted}"
 
 
 def _tracked(report):

@@ -21,6 +21,12 @@ DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
 EDGE_ON, STEEP = 0.03, 0.15
 SNAP = math.radians(5.0)  # With Ctrl, angles change by this step.
 PRECISE = 0.1  # With Shift, this share of the mouse's way counts.
+TIPS = {
+    DRAG_TURN: "Turn plane {}",
+    DRAG_TILT: "Tilt plane {}",
+    DRAG_EXTENT: "Change how far to feel",
+    POINT: "Slide the point over the surface",
+}
 HINTS = (
     ("MOUSE_LMB", "Confirm"),
     ("MOUSE_RMB", "Cancel"),
@@ -50,6 +56,11 @@ class TACTILE_OT_drag(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return shown_probe(context) is not None
+
+    @classmethod
+    def description(cls, context, properties):
+        """The tooltip of a handle."""
+        return TIPS[properties.what].format(properties.plane + 1)
 
     def invoke(self, context, event):
         found = shown_probe(context)

@@ -16,6 +16,8 @@ HANDLE_REACH = 1.15  # Handles that turn planes are so many extents away from th
 UPRIGHT = 0.75  # and those that tilt planes so many extents above it.
 BALL, LEAST_BALL = 0.12, 0.05  # Sizes of balls, in units of Blender's gizmo size.
 SHARE = 0.125  # A ball is no larger than this share of the patch in the view.
+APART = 24.0  # Handles that are nearer to the point in the view than so many pixels at scale 1 are hidden.
+NEAREST = 1e3  # What is closer to the eye than the point by less than this does not win over it.
 
 
 class TACTILE_GGT_handles(bpy.types.GizmoGroup):
@@ -36,6 +38,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         self.extent.use_draw_scale = False
         self.extent.line_width = 2.0
         self.point = self._ball(POINT, 0, (1.0, 1.0, 1.0))
+        self.point.select_bias = NEAREST
         self.turns = [self._ball(DRAG_TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
         self.tilts = [self._ball(DRAG_TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
 
@@ -62,7 +65,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
         center = np.array(matrix.translation, dtype=float)
-        self._shrink(context, matrix.translation, reach)
+        apart = self._shrink(context, matrix.translation, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
         self.point.matrix_basis = Matrix.Translation(center)
         self.point.hide = settings.target is None
@@ -75,21 +78,41 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
                 tilt.hide = tilt.hide or abs(ahead.dot(Vector(t))) < STEEP
                 turn.matrix_basis = Matrix.Translation(center + HANDLE_REACH * reach * t)
                 tilt.matrix_basis = Matrix.Translation(center + UPRIGHT * reach * up)
+                turn.hide, tilt.hide = (
+                    each.hide or not apart(each.matrix_basis.translation) for each in (turn, tilt)
+                )
+        self.extent.hide = not apart(matrix.translation + reach * _right(context))
         self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)
 
     def _shrink(self, context, center, reach):
-        """Makes the balls smaller if the patch is small in the view, so that they do not hide it."""
-        side = context.region_data.view_matrix.inverted_safe().col[0].xyz.normalized()
-        here, there = (
-            location_3d_to_region_2d(context.region, context.region_data, at)
-            for at in (center, center + reach * side)
-        )
+        """Makes the balls smaller if the patch is small in the view, so that they do not hide it.
+
+        Returns a function that tells whether a place is apart from the center in the view.
+        """
+
+        def seen(place):
+            """Where a place is in the region, or None."""
+            return location_3d_to_region_2d(context.region, context.region_data, place)
+
+        here, there = seen(center), seen(center + reach * _right(context))
         if here is None or there is None:
-            return
-        gizmo = context.preferences.view.gizmo_size * context.preferences.system.ui_scale
+            return lambda place: True
+        ui_scale = context.preferences.system.ui_scale
+        gizmo = context.preferences.view.gizmo_size * ui_scale
         scale = min(max(SHARE * (there - here).length / gizmo, LEAST_BALL), BALL)
         for ball in (self.point, *self.turns, *self.tilts):
             ball.scale_basis = scale
+
+        def is_apart(place):
+            at = seen(place)
+            return at is None or (at - here).length >= APART * ui_scale
+
+        return is_apart
+
+
+def _right(context):
+    """The direction to the right in the view."""
+    return context.region_data.view_matrix.inverted_safe().col[0].xyz.normalized()
 
 
 def _line_of_sight(view, point):

@@ -145,7 +145,7 @@ def draw_plane():
 def draw_legend():
     """Draws the legend of the active patch, whole object or map: quantity, unit and range."""
     context = bpy.context
-    if not shows_colors(context.space_data) or _is_picking(context):
+    if not shows_colors(context.space_data) or _is_picking(context) or not _is_last_view(context):
         return
     obj = _active(context)
     patch, record = probe.patch_near(obj), probe.record_of(obj)
@@ -164,6 +164,8 @@ def draw_legend():
         bar = _scale(context, title, record, record["spacing"], map_object.MAP_POWERS[shown], 0.0)
         if shown == "reason":
             bar = title, 0.0, []
+        elif shown in map_object.REVERSED:
+            bar = bar[0], bar[1], [(1.0 - at, text) for at, text in reversed(bar[2])]
         elif shown in map_object.LOGARITHMIC:
             bar = title, 0.0, [(at, f"{record['color_limit'] ** at:.2g}") for at in (0.0, 0.5, 1.0)]
         _draw_box(context, *bar, map_object.swatches(obj))
@@ -172,6 +174,12 @@ def draw_legend():
 def _is_picking(context):
     """Whether a pick draws the key of its preview where the legend is."""
     return any(operator.bl_idname == "TACTILE_OT_pick" for operator in context.window.modal_operators)
+
+
+def _is_last_view(context):
+    """Whether the region is the only view of its area, or the one at the bottom right in a quad view."""
+    views = [region for region in context.area.regions if region.type == "WINDOW"]
+    return context.region == max(views, key=lambda region: (region.x, -region.y))
 
 
 def _scale(context, title, record, size, power, low):

@@ -6,9 +6,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ..probes import anchor, probe, touch_again
-from ..probes.number_fields import dragged
 from ..probes.operators import (
-    fields_of,
     has_mesh,
     is_in_object_mode,
     make_active,
@@ -17,7 +15,7 @@ from ..probes.operators import (
 )
 from ..scene import patch_record
 from ..scene.viewports import show_colors
-from ..stability_map.map_object import inputs_of
+from ..stability_map.map_object import inputs_of, touched_near
 from ..touch import units
 from ..touch.settings import (
     LOCATION,
@@ -44,7 +42,6 @@ HINTS = (
 )
 
 
-@dragged
 class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     """Click on a mesh: a probe there feels the surface and keeps a patch of it up to date"""
 
@@ -186,7 +183,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         layout.prop(self, "target")
         layout.prop(self, "location")
         layout.prop(self, "parent")
-        draw_all(layout, self, fields_of(context, self.target))
+        draw_all(layout, self)
 
     def _inherit(self, context):
         """The probe to be moved, or None. Settings that are not set are taken from it or from the active map.
@@ -217,6 +214,9 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             found = point_below(context, event)
             if found is not None:
                 obj, location, eye = found
+                active = context.view_layer.objects.active
+                if (patch_record.touched_record(active) or {}).get("source") == obj.name:
+                    location = touched_near(active, location)
                 depsgraph = context.evaluated_depsgraph_get()
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched

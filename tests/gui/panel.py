@@ -31,10 +31,14 @@ def activate(obj):
     bpy.context.view_layer.objects.active = obj
 
 
+def look_at_cursor():
+    look(bpy.context.scene.cursor.location + Vector((0.2, 0.0, -0.1)), (0.3, -1.0, 0.5), 1.7)
+
+
 def first():
     space = gui.find()[1].spaces.active
     place = bpy.context.scene.cursor.location
-    look(place + Vector((0.2, 0.0, -0.1)), (0.3, -1.0, 0.5), 1.7)
+    look_at_cursor()
     space.shading.color_type = "MATERIAL"
     yield 0.5
     picture("panel_empty")
@@ -60,22 +64,19 @@ def first():
 
 def refused():
     """Where there can be no touch, words beside the mouse say why, and a click does not end the pick."""
-    mesh = bpy.data.meshes.new("Spikes")
-    mesh.from_pydata(
-        [(0, 0, 1), (1, 0, 0), (-0.5, 0.8, 0), (-0.5, -0.8, 0)], [], [(0, 1, 2), (0, 2, 3), (0, 3, 1)]
-    )
-    spike = bpy.data.objects.new("Spike", mesh)
-    bpy.context.collection.objects.link(spike)
-    others = [obj for obj in bpy.data.objects if obj != spike and obj.visible_get()]
+    bpy.ops.object.metaball_add(type="BALL", radius=1.0, location=(0.0, 0.0, 0.5))
+    ball = bpy.context.object
+    ball.name = "Metaball Whose Name Takes Two Lines"
+    others = [obj for obj in bpy.data.objects if obj != ball and obj.visible_get()]
     for obj in others:
         obj.hide_set(True)
-    activate(spike)
+    activate(ball)
     look(Vector((0.0, 0.0, 0.5)), (1.0, 0.1, 1.0), 4.0)
     yield 0.5
     before = set(bpy.data.objects)
     gui.click(*PICK_BUTTON)
     yield 0.5
-    x, y = (round(v) for v in gui.view_point((0.004, 0.0, 0.996)))
+    x, y = (round(v) for v in gui.view_point((0.0, 0.0, 0.5)))
     gui.xdo("mousemove", x - 20, y + 9, "sleep", 0.3, "mousemove", x, y)
     yield 1
     picture("panel_refused")
@@ -87,13 +88,15 @@ def refused():
     check("... and the pick goes on", picks)
     gui.xdo("key", "Escape")
     yield 0.5
+    bpy.data.objects.remove(ball)
+    for obj in others:
+        obj.hide_set(False)
+    activate(bpy.data.objects["Suzanne"])
     bpy.ops.object.mode_set(mode="SCULPT")
     yield 0.5
     picture("panel_sculpt")
     bpy.ops.object.mode_set(mode="OBJECT")
-    bpy.data.objects.remove(spike)
-    for obj in others:
-        obj.hide_set(False)
+    look_at_cursor()
 
 
 def numbers():

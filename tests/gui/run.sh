@@ -52,6 +52,8 @@ GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the panel's checks" \
   $gui shot tests/gui/panel.py "$out/panel.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the viewport's checks" \
   $gui shot tests/gui/viewport.py "$out/viewport.png"
+GUI_ARGS="$out/scene.blend" step "the checks of first tries" \
+  $gui shot tests/gui/first_tries.py "$out/first_tries.png"
 GUI_ARGS="$out/scene.blend" step "the checks of gestures" \
   $gui shot tests/gui/gestures.py "$out/gestures.png"
 GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the conventions' checks" \

@@ -35,7 +35,7 @@ def steps():
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.tactile.reconstruct("EXEC_DEFAULT", True, target="Vase", location=(0.0, 0.86, 0.75))
     folders = [Path(path) for path in bpy.utils.preset_paths("operator/tactile.reconstruct")]
-    presets = [path / "paper.py" for path in folders if (path / "paper.py").is_file()]
+    presets = [path / "Paper.py" for path in folders if (path / "Paper.py").is_file()]
     check("Blender lists the preset Paper", len(presets) == 1, folders)
     menu = "WM_MT_operator_presets"
     bpy.ops.script.execute_preset(filepath=str(presets[0]), menu_idname=menu)

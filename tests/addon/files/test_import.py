@@ -3,6 +3,7 @@
 """Measured contours in and patches out, in a real Blender; windows and dropped files are in tests/gui."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -242,6 +243,7 @@ def test_measured_normals_show_what_curves_hide(empty, measured):
     [
         ("x,y,z\n0,0,a\n", {}, '"contacts.csv", line 2, column "z": expected a number'),
         ("x,y,z\n0,0,1\n", {}, "The common point needs two or more curves, got 1"),
+        ("finger,x,y,z\n1,0,0,1\n2,1,0,1\n", {}, 'got 1: name the curve of each contact in a column "curve"'),
         ("x,y,z\n0,0,1\n", {"point": (0, 0, 0)}, "Curve 1 has 1 of the 3 contacts it needs"),
         ("x,y,z\n1e60,0,1\n", {}, "expected numbers up to"),
         (None, {}, "There is no file"),
@@ -388,6 +390,7 @@ def test_fit_from_the_shell(command, empty, measured, tmp_path):
         code, out, err = command("fit", path, *FIT, "--output", tmp_path / output)
         assert (code, err) == (0, "")
         report = report_in(out)
+        assert report["is_verified"] is False  # There is no mesh.
         # Lengths are in the unit of the file.
         assert report["k1"] == pytest.approx(SURFACE.k1, abs=2e-3)
         assert report["unit"] == "mm"
@@ -420,6 +423,16 @@ def test_every_option_of_fit_arrives(command, empty, measured):
     assert code == 0
     assert "curves miss it by" in out
     assert "72 on 3 curves" in out
+
+
+def test_the_shell_tells_how_many_contacts_were_given_and_how_many_means_are_fitted(command):
+    example = str(Path(__file__).resolve().parents[3] / "examples" / "contacts.csv")
+    code, out, _ = command("fit", example)
+    assert code == 0
+    assert re.search(r"^contacts +240 on 3 curves and 5 strokes, fitted as 1\d\d$", out, re.MULTILINE)
+    code, out, _ = command("fit", example, "--location", "0", "0", "17", "--radius", "8")
+    assert code == 0
+    assert re.search(r"^contacts +240 on 8 strokes, fitted as \d\d$", out, re.MULTILINE)
 
 
 @pytest.mark.parametrize(

@@ -167,7 +167,7 @@ def test_undo_leaves_no_pointer_to_patches_that_are_still_growing(empty, extensi
     rest(empty)
     rest(empty)
     patches = extension.tactile_addon.whole_object.whole_mesh.GrowingPatches
-    growing = patches(empty.context.scene, SimpleNamespace(name="Sphere", origin=(0.0, 0.0, 0.0)))
+    growing = patches(empty.context.scene, SimpleNamespace(name="Sphere", origin=(0.0, 0.0, 0.0), size=2.0))
     assert "Sphere Touches" in empty.data.objects
     empty.ops.ed.undo()
     assert pointers(empty)

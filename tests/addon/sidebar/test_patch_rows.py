@@ -37,7 +37,7 @@ def record(status="ok", message="The patch describes its contacts.", **more):
 def test_the_verdict_says_good_and_how_good(wording):
     assert wording.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
     blind = record(
-        message="The patch describes its contacts. 3 of 28 coefficients are invisible to these planes."
+        message="The patch describes its contacts. These planes cannot show 3 of the 28 shape terms."
     )
     assert wording.verdict(blind, UNIT) == "Good: heights to ± 0.0123 mm"
 
@@ -54,7 +54,7 @@ def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
 def test_the_verdict_says_what_to_do_where_there_is_doubt(wording, status):
     message = (
         "Heights are accurate to 5.3 % of the radius on average: use a shorter extent or add sampling planes."
-        " 3 of 28 coefficients are invisible to these planes. All half curves end at a crease."
+        " These planes cannot show 3 of the 28 shape terms. All half curves end at a crease."
     )
     words = wording.verdict(record(status, message), UNIT)
     assert words == "Doubtful: use a shorter extent or add sampling planes"
@@ -100,9 +100,14 @@ def test_a_number_that_is_left_to_the_surface_shows_what_it_has(empty, extension
 def test_a_length_that_is_dragged_in_a_dialog_is_the_operators_own(empty, extension):
     empty.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=2.0)
     name = extension.tactile_addon.probes.number_fields.fields(4.0)["extent"]
-    inputs = {"location": (0.0, 0.0, 2.0), name: 0.37}
-    assert empty.ops.tactile.reconstruct(**inputs) == {"FINISHED"}
-    assert empty.context.object["tactile"]["extent"] == pytest.approx(0.37)
+    assert empty.ops.tactile.stability_map(**{name: 0.9, "spacing": 0.8}) == {"FINISHED"}
+    assert empty.context.object["tactile_map"]["extent"] == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize("operator", ["pick", "reconstruct", "add_planes"])
+def test_what_blender_logs_has_no_properties_beside_the_inputs(empty, operator):
+    kind = getattr(empty.ops.tactile, operator).get_rna_type()
+    assert not [name for name in kind.properties.keys() if "_by_" in name]  # noqa: SIM118
 
 
 def test_what_was_found_stands_beside_auto(said, empty, ball):
@@ -128,7 +133,11 @@ def test_every_row_says_what_it_is(said, extension, ball):
     _, report = ball
     addon = extension.tactile_addon
     rows = said.main_rows(report, UNIT) + said.other_rows(report, UNIT) + said.plane_rows(report, UNIT)
-    labels = [label for label, value in rows if value] + ["Error on 9 More", "Total |K|", "Would Bring"]
+    labels = [label for label, value in rows if value] + [
+        "Error on 9 More",
+        "Total |K|",
+        "Expected Accuracy with It",
+    ]
     assert not [
         label for label in labels if not re.match(r"[A-Z1\d].{15,}", addon.sidebar.rows.tip_of(label))
     ]

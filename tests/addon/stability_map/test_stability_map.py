@@ -406,3 +406,45 @@ def test_a_map_and_a_patch_lead_back_to_what_was_touched(empty, ball):
 def test_edit_mode_is_to_be_left_first(empty, ball):
     empty.ops.object.mode_set(mode="EDIT")
     assert not empty.ops.tactile.stability_map.poll()
+
+
+@pytest.fixture
+def vase(empty):
+    """A vase of revolution, 1 high, of 5664 faces."""
+    t, turns = np.linspace(0.0, 1.0, 60), np.linspace(0.0, 2.0 * np.pi, 96, endpoint=False)
+    radii = 0.3 + 0.12 * np.sin(5.0 * t) * (1.0 - 0.5 * t)
+    co = [(r * np.cos(a), r * np.sin(a), z) for r, z in zip(radii, t, strict=True) for a in turns]
+    faces = [
+        (96 * i + j, 96 * i + (j + 1) % 96, 96 * (i + 1) + (j + 1) % 96, 96 * (i + 1) + j)
+        for i in range(59)
+        for j in range(96)
+    ]
+    mesh = empty.data.meshes.new("Vase")
+    mesh.from_pydata(co, [], faces)
+    obj = empty.data.objects.new("Vase", mesh)
+    empty.context.collection.objects.link(obj)
+    empty.context.view_layer.objects.active = obj
+    empty.context.view_layer.update()
+    return obj
+
+
+def test_a_probe_finds_the_patches_of_a_map(empty, vase, extension):
+    painted, record = stability_map(empty, target="Vase", spacing=0.25)
+    touched_near = extension.tactile_addon.stability_map.map_object.touched_near
+    reasons, touched = values(painted.data, "reason"), values(painted.data, "is_touched")
+    assert touched.sum() == record["touched"] > 15
+    for vertex in np.flatnonzero(touched).tolist():
+        place = painted.matrix_world @ painted.data.vertices[vertex].co
+        beside = place + 0.02 * painted.data.vertices[vertex].normal
+        assert np.allclose(touched_near(painted, beside), place)
+        if reasons[vertex] == PATCH:
+            empty.context.view_layer.objects.active = painted
+            assert empty.ops.tactile.pick(target="Vase", location=place, new=True) == {"FINISHED"}
+            assert empty.context.object.children[0]["tactile"]["status"] == "ok"
+    assert touched_near(painted, (5.0, 0.0, 0.0)) == (5.0, 0.0, 0.0)
+
+
+def test_a_map_of_few_facets_is_in_doubt(empty):
+    empty.ops.mesh.primitive_torus_add()
+    _, record = stability_map(empty, spacing=0.5)
+    assert record["in_doubt"] == record["patches"] > 5

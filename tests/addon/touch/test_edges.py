@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
 from mathutils import Vector
-from scenes import made
+from scenes import by_hand, made, step
 
 OFF = "The principal directions may be"
 
@@ -66,8 +66,11 @@ def monkey(empty):
 def test_a_patch_on_facets_names_them_and_the_modifier(empty, monkey):
     report = made(empty.ops.tactile.reconstruct, target="Suzanne", location=(0.25, -0.55, 0.75))[1]
     assert report["vertices"] < 6
-    assert report["message"].startswith("The patch lies on coarse facets (mesh vertices over it: ")
-    assert "): add a Subdivision modifier if the mesh stands for a smooth shape. " in report["message"]
+    assert report["message"].startswith(
+        "The curves lie on so few facets that the curvature is that of the facets, not of the shape: add a "
+        "Subdivision modifier if the mesh stands for a smooth shape. "
+    )
+    assert (report["status"], report["few_facets"]) == ("uncertain", True)
     modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
     modifier.levels = 4
     report = made(empty.ops.tactile.reconstruct, target="Suzanne", location=(0.25, -0.55, 0.75))[1]
@@ -131,3 +134,49 @@ def test_the_preview_promises_no_more_than_was_felt(empty, extension, cube):
     for end in ends:  # the rim runs through what was felt last
         assert np.linalg.norm(rim - end, axis=1).min() < 0.03
     assert normal[1] - normal[0] == pytest.approx([0.0, 0.0, 0.6 * touched.result.radius], abs=1e-6)
+
+
+# Places close together on a torus whose smooth shape has kappa1 = -4 there.
+PLACES = [(1.25 * math.cos(a), 1.25 * math.sin(a), z) for a in (0.02, 0.05, 0.09) for z in (0.01, 0.05)]
+
+
+def test_the_verdict_on_few_facets_is_about_them_until_the_torus_is_subdivided(empty, extension):
+    wording, units = extension.tactile_addon.touch.wording, extension.tactile_addon.touch.units
+    empty.ops.mesh.primitive_torus_add()
+    torus = empty.data.objects["Torus"]
+    for place in PLACES:
+        assert empty.ops.tactile.pick(target=torus.name, location=place, new=True) == {"FINISHED"}
+        record = empty.context.object.children[0]["tactile"].to_dict()
+        said = wording.verdict(record, units.unit_of(empty.context.scene, record["radius"]))
+        assert said == "Curvature of the facet, not of the shape"
+    empty.ops.ed.undo_push(message="Picked")
+    by_hand(empty, empty.ops.tactile.add_subdivision)
+    assert [modifier.levels for modifier in torus.modifiers] == [3]
+    record = empty.context.object.children[0]["tactile"].to_dict()
+    assert (record["status"], record["few_facets"]) == ("ok", False)
+    assert record["k1"] == pytest.approx(-4.0, rel=0.1)
+    step(empty, "undo")
+    assert not empty.data.objects["Torus"].modifiers
+    (record,) = (o["tactile"].to_dict() for o in empty.context.object.children)
+    assert record["few_facets"]
+    step(empty, "redo")
+    empty.ops.tactile.add_subdivision()
+    assert [modifier.levels for modifier in empty.data.objects["Torus"].modifiers] == [4]
+
+
+@pytest.mark.parametrize("shape", ["cube", "plane", "grid"])
+def test_a_flat_face_is_no_facet(empty, shape):
+    getattr(empty.ops.mesh, f"primitive_{shape}_add")()
+    place = (0.1, 0.2, 1.0 if shape == "cube" else 0.0)
+    record = made(empty.ops.tactile.reconstruct, location=place)[1]
+    assert (record["status"], record["few_facets"]) == ("ok", False)
+    assert abs(record["k1"]) < 1e-3
+
+
+def test_a_fine_scan_has_no_few_facets(empty, scans):
+    empty.ops.wm.ply_import(filepath=str(scans / "pear.ply"))
+    places = [vertex.co.copy() for vertex in empty.context.object.data.vertices]
+    for place in places[::2000]:
+        record = made(empty.ops.tactile.reconstruct, location=place)[1]
+        assert not record["few_facets"]
+        empty.context.view_layer.objects.active = empty.data.objects["pear"]

@@ -9,7 +9,7 @@ import pytest
 
 import core
 from core.atlas.creases import creased
-from core.atlas.reference_mesh import closest
+from core.atlas.reference_mesh import ReferenceMesh, closest
 from core.exploration.side_by_side import result_of
 from tests import solids
 
@@ -71,6 +71,35 @@ def test_edges_of_any_length_leave_the_topology_and_the_place(block, edge):
     assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
     assert np.abs(BLOCK.distances(mesh.vertices)).max() < TOLERANCE
     assert mesh.edge == pytest.approx(edge, rel=0.3)
+
+
+@pytest.mark.parametrize(("sides", "flat", "sharp"), [(4, 0.99, 0.95), (6, 0.99, 0.95), (8, 0.97, 0.9)])
+def test_walls_that_turn_by_45_degrees_or_more_are_sharp_and_take_few_touches(sides, flat, sharp):
+    solid = solids.prism(sides)
+    atlas = explored(solid)
+    assert atlas.status == "ok"
+    assert len(atlas.patches) <= 30
+    mesh = atlas.mesh(0.06)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    across = np.cross(b - a, c - a)
+    areas = np.linalg.norm(across, axis=1)
+    walls = np.array([normal for normal, _ in solid.walls])
+    straight = (across @ walls.T).max(axis=1) > math.cos(math.radians(5.0)) * areas
+    assert areas[straight].sum() > flat * areas.sum()
+    off = ReferenceMesh(mesh, atlas.reference.indicator).feet(solid.edges(50))[0] - solid.edges(50)
+    assert np.mean(np.linalg.norm(off, axis=1) < 0.5 * TOLERANCE) > sharp
+
+
+def test_a_fillet_that_was_felt_stays_round():
+    solid = solids.rounded(0.1)
+    atlas = explored(solid)
+    assert atlas.status == "ok"
+    mesh = atlas.mesh(0.04)
+    assert solids.topology(mesh.triangles) == solids.Topology(0, 0, 2, 1)
+    assert np.quantile(np.abs(solid.distances(mesh.vertices)), 0.99) < TOLERANCE
+    true = np.array([solid.normal(*point) for point in mesh.vertices])
+    assert np.quantile(np.einsum("ni,ni->n", true, mesh.normals), 0.02) > math.cos(math.radians(10.0))
 
 
 def test_edges_are_straight_to_half_a_tolerance(block):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A curve that is upside down, or turned about the normal, among curves or strokes that contradict it."""
+"""A curve that is flipped, or turned about the normal, among curves or strokes that contradict it."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def turned(points, degrees):
 
 
 def contradicts(r):
-    return r.status == "uncertain" and "as if it were upside down or its plane were another" in r.message
+    return r.status == "uncertain" and "as if it were flipped or its plane were another" in r.message
 
 
 @pytest.mark.parametrize("name", BENT)

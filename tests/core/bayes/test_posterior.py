@@ -163,7 +163,7 @@ def test_blind_directions_are_counted_and_named(planes, degree, blind, terms):
     """m planes through the normal hide (d - m + 1)(d - m + 2) / 2 of the terms to degree d."""
     r = touched(surfaces.torus(40, 20, 0.6), planes, noise=0.02, degree=degree)
     assert r.posterior.blind(degree) == blind
-    named = f"{blind} of {terms} coefficients {'is' if blind == 1 else 'are'} invisible to these planes"
+    named = f"These planes cannot show {blind} of the {terms} shape terms"
     assert (named in r.message) == (blind > 0)
 
 
@@ -432,9 +432,11 @@ def test_the_suggested_plane_is_measured_as_the_contours_were_tracked():
     plane, expected = suggest_plane(r)
     d1, _, n = r.frame.axes.T
     along = plane.axes(n, d1)[:, 0]
+    assert plane.direction == pytest.approx(along)
     for tangent in (None, (0.3, -1.0, 0.2)):
         other, same = suggest_plane(r, s.normal, tangent)
         assert same == expected
+        assert other.direction == plane.direction
         t = other.axes(s.normal, tangent)[:, 0]
         assert abs(np.cross(t, along) @ s.normal) < 1e-3  # the fit's normal is not quite the true one
 

@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A patch in doubt says so, why, and what to do; a patch without doubt does not."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import surfaces
 
-from core import METHODS, Contour, reconstruct
+from core import METHODS, Contour, DegenerateCurvesError, reconstruct
 from core.bayes.posterior import SurfacePosterior
 from core.contours.curves import curves_through, misses, stacked
 
@@ -33,7 +34,7 @@ def test_where_all_is_well_no_warning(surface, noise):
         r = surface.fit(contours_of(surface, noise=noise, seed=seed), degree=4)
         assert r.status == "ok", r.message
         assert r.message.startswith("The patch describes its contacts.")
-        assert "3 of 14 coefficients are invisible" in r.message
+        assert "These planes cannot show 3 of the 14 shape terms" in r.message
 
 
 def test_heights_that_are_good_to_little():
@@ -98,6 +99,38 @@ def test_a_curve_that_misses_the_point_is_named_with_its_distance():
     assert r.status == "uncertain"
     assert r.message.startswith("Curve 2 passes the reference point at 0.4")
     assert "set the point where the curves meet" in r.message
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 3.0])
+@pytest.mark.parametrize("way", ["normal", "across"])
+def test_a_point_beside_the_curves_is_told_before_anything_that_follows_from_it(share, way):
+    s = surfaces.pear()
+    contours = contours_of(s, noise=0.02)
+    off = share * np.ptp(contours[0].points, axis=0).max()
+    direction = s.normal if way == "normal" else np.cross(s.normal, [0.3, 0.9, 0.1])
+    direction = direction / np.linalg.norm(direction)
+    try:
+        message = reconstruct(s.point + off * direction, contours, outward=s.normal).message
+    except DegenerateCurvesError as error:
+        message = str(error)
+    found = re.match(r"[Cc]urve \d passes the reference point at (\S+), more than", message)
+    assert found, message
+    assert "set the point where the curves meet" in message
+    if share < 1.0:  # From far away the line that a curve goes on along is a guess.
+        assert 0.3 * off < float(found[1]) < 2.0 * off
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_curves_that_carry_no_frame_from_a_point_beside_them_are_not_blamed(seed):
+    s, rng = surfaces.pear(), np.random.default_rng(seed)
+    contours = contours_of(s, noise=0.02)
+    size, off = np.ptp(contours[0].points, axis=0).max(), rng.normal(size=3)
+    off *= size * rng.uniform(0.5, 3.0) / np.linalg.norm(off)
+    try:
+        message = reconstruct(s.point + off, contours, outward=s.normal).message
+    except DegenerateCurvesError as error:
+        message = str(error)
+    assert re.match(r"[Cc]urve \d passes the reference point at \S+, more than", message), message
 
 
 def test_misses_are_distances_across_the_curve_with_their_scatter():
@@ -188,7 +221,7 @@ def test_a_curve_shorter_than_a_quarter_of_the_radius_leaves_doubt():
     assert open_curvature > 2
 
 
-ALIKE = "The curvatures are alike, so there are no principal directions."
+ALIKE = "The two curvatures are equal within their error, so there are no principal directions."
 
 
 def test_an_umbilic_has_no_directions_to_be_wrong():

@@ -405,9 +405,10 @@ def test_coarse_coordinates_and_bad_arguments_are_refused_with_a_sentence():
         reconstruct(surface.point + 1e15, [], outward=surface.normal, strokes=[points + 1e15])
     for strokes, words in (
         (3.0, "strokes: expected a list, got 3.0"),
-        (points, r"strokes: expected shape \(n, 3\), got \(3,\)"),
-        ([points[:, :2]], r"strokes: expected shape \(n, 3\), got \(\d+, 2\)"),
-        ([points * np.nan], "strokes: expected finite numbers"),
+        (points, r"strokes: expected a list, got one array of shape \(\d+, 3\): put it into a list"),
+        (points.tolist(), r"strokes\[0\]: expected shape \(n, 3\), got \(3,\)"),
+        ([points, points[:, :2]], r"strokes\[1\]: expected shape \(n, 3\), got \(\d+, 2\)"),
+        ([points * np.nan], r"strokes\[0\]: expected finite numbers"),
     ):
         with pytest.raises(ValueError, match=words):
             surface.fit([], strokes=strokes)

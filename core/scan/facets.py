@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a touch of a mesh has felt so few facets that its curvature is theirs, not the shape's."""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import Array
+from ..reconstruction.result import Reconstruction
+
+# benchmarks.facets chose these.
+FEW = 12  # If fewer facets are felt, a curvature is off by some .8 to 1.2 of the larger one; if more, by .3.
+MANY = 40  # If so many faces are, the mesh is fine, even where it is flat.
+# Edges between these angles stand for a smooth bend,
+SAME, SMOOTH = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
+LIKE = (
+    0.25  # if both facets are so many times as wide as the wider one and as the radius; else one is a fillet.
+)
+BEYOND = 0.05  # The facet behind an edge is looked for so many widths beyond it.
+
+
+class Facet(NamedTuple):
+    """A face: its corners (k, 3), its unit normal, and its area over its longest edge."""
+
+    corners: Array
+    normal: Array
+    width: float
+
+
+def has_few_facets(
+    r: Reconstruction, face_near: Callable[[Array], int], corners_of: Callable[[int], ArrayLike]
+) -> bool:
+    """Whether contacts lie on fewer than FEW facets of different directions, which stand for a smooth shape.
+
+    face_near : the number of the face nearest to a point (3,) of the world
+    corners_of : the corners (k, 3) of a face in the world, in order
+
+    Facets that bend into others at sharp edges alone, as those of a cube, are the shape itself.
+    """
+    shape = cache(lambda face: _facet(corners_of(face)))
+    felt: dict[int, Facet] = {}
+    distinct: list[Array] = []
+    points = np.vstack([contour.points for contour in r.contours])
+    for point in points[np.argsort(np.linalg.norm(points - r.frame.origin, axis=1), kind="stable")]:
+        face = face_near(point)
+        if face in felt or not (facet := shape(face)).width:
+            continue
+        felt[face] = facet
+        if all(facet.normal @ normal < SAME for normal in distinct):
+            distinct.append(facet.normal)
+        if len(distinct) == FEW or len(felt) == MANY:
+            return False
+    nearest = islice(felt.values(), FEW)
+    return any(_is_smooth(facet, r.radius, lambda at: shape(face_near(at))) for facet in nearest)
+
+
+def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]) -> bool:
+    """Whether an edge of the facet stands for a smooth bend."""
+    starts, along = facet.corners, np.roll(facet.corners, -1, axis=0) - facet.corners
+    outward = np.cross(along, facet.normal)
+    for start, edge, out in zip(starts, along, outward, strict=True):
+        if not np.any(out):
+            continue
+        beyond = facet_near(start + 0.5 * edge + BEYOND * facet.width * out / np.linalg.norm(out))
+        is_bend = SMOOTH < float(facet.normal @ beyond.normal) < SAME
+        narrow, wide = sorted((facet.width, beyond.width))
+        if is_bend and narrow >= LIKE * max(wide, radius):
+            return True
+    return False
+
+
+def _facet(corners: ArrayLike) -> Facet:
+    """The face with these corners; its normal and width are 0 if it has no area."""
+    points = np.asarray(corners, dtype=float)
+    sides = points - points[0]
+    across = np.cross(sides[1:-1], sides[2:]).sum(axis=0)
+    twice = float(np.linalg.norm(across))
+    if not twice:
+        return Facet(points, across, 0.0)
+    longest = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).max()
+    return Facet(points, across / twice, 0.5 * twice / float(longest))

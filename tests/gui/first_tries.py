@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run in a window of Blender: what is tried first, a torus of facets and Suzanne as Blender's menu adds them.
+
+Its pictures are beside the scene.
+"""
+
+import math
+import sys
+from pathlib import Path
+
+import bpy
+import gui
+from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).parent))
+from common import ARROW, ASIDE, check, extent, is_complete, look, open_tab, patch, picture, probe, until
+
+SUBDIVIDE_BUTTON = (893, 441)
+SMALL = 0.043
+
+
+def only(add, **given):
+    """Adds an object, which becomes the only one in the file."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    add(location=(0.0, 0.0, 0.0), **given)
+    return bpy.context.object
+
+
+def pick(obj, place, **given):
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.pick(target=obj.name, location=place, new=True, **given)
+    yield 1
+    yield from until(is_complete)
+
+
+def facets():
+    torus = only(bpy.ops.mesh.primitive_torus_add)
+    look((0, 0, 0), (1, -1, 1), 5)
+    yield from pick(torus, (0.9, -0.86, 0.05))
+    look(probe().matrix_world.translation, (1, -1, 0.6), 1.5)
+    yield 1
+    check("a touch of facets is about them", patch()["tactile"]["few_facets"], "")
+    picture("facets")
+    bpy.ops.ed.undo_push(message="Picked")
+    gui.click(*SUBDIVIDE_BUTTON)
+    yield 1
+    yield from until(lambda: bool(bpy.data.objects["Torus"].modifiers))
+    yield from until(is_complete)
+    gui.xdo("mousemove", *ASIDE)
+    yield 0.5
+    record = patch()["tactile"].to_dict()
+    check(
+        "Add Subdivision makes it smooth", record["status"] == "ok" and abs(record["k1"] + 4.0) < 0.4, record
+    )
+    picture("subdivided")
+    gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
+    yield from until(lambda: not bpy.data.objects["Torus"].modifiers)
+    yield from until(is_complete)
+    check("one Ctrl Z takes it back", not bpy.data.objects["Torus"].modifiers, "")
+    check("... and the verdict with it", patch()["tactile"]["few_facets"], "")
+
+
+def forehead():
+    monkey = only(bpy.ops.mesh.primitive_monkey_add)
+    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = 3
+    bpy.context.view_layer.update()
+    place = Vector((0.0, -0.73, 0.62))
+    look(place, (0.2, -1, 0.3), 3)
+    yield from pick(monkey, place)
+    record = patch()["tactile"].to_dict()
+    print("forehead", record["extent"], record["status"], record["message"], flush=True)
+    check("an automatic extent on the forehead is good", record["status"] == "ok", record["message"])
+    picture("forehead")
+    yield from small(monkey)
+
+
+def small(target):
+    """A probe of little extent, seen from afar."""
+    probe().tactile_probe.extent = SMALL
+    yield 1
+    found, tilts, azimuths = probe(), [*probe().tactile_probe.tilts], [*probe().tactile_probe.azimuths]
+    place = found.matrix_world.translation.copy()
+    for _ in range(3):
+        before = probe().matrix_world.translation.copy()
+        at = gui.view_point(before)
+        gui.drag(at, (at[0] + 30, at[1] + 12))
+        yield 1
+        yield from until(is_complete)
+        moved = (probe().matrix_world.translation - before).length
+        check("a small probe is moved by its center", moved > 0.05, moved)
+    settings = probe().tactile_probe
+    check("... and no plane is tilted", [*settings.tilts] == tilts, [*settings.tilts])
+    check(
+        "... nor turned, nor the extent changed", [*settings.azimuths] == azimuths and settings.extent > 0.042
+    )
+    picture("small")
+    look(probe().matrix_world.translation, (0.2, -1, 0.3), 0.5)
+    yield 0.5
+    turned = [round(v) for v in gui.view_point(ring(0))]
+    gui.xdo("mousemove", turned[0] - 8, turned[1], "sleep", 0.3, "mousemove", *turned)
+    yield 2.5
+    picture("tooltip")
+    gui.drag(turned, (turned[0] + 10, turned[1] - 40))
+    yield 1
+    yield from until(is_complete)
+    check("seen from near its planes turn", [*probe().tactile_probe.azimuths] != azimuths)
+    check("... and it stays", (probe().matrix_world.translation - place).length > 0.05)
+
+
+def ring(plane):
+    """Where the handle that turns a plane is, in the world."""
+    found = probe()
+    azimuth = found.tactile_probe.azimuths[plane]
+    e1, e2 = found.matrix_world.col[0].xyz, found.matrix_world.col[1].xyz
+    at = math.cos(azimuth) * e1 + math.sin(azimuth) * e2
+    return found.matrix_world.translation + ARROW * extent(found) * at
+
+
+def map_and_views():
+    """The map by reach, and one legend in a quad view."""
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.stability_map(target="Suzanne", spacing=0.3)
+    painted = bpy.context.object
+    look((0, 0, 0), (0.2, -1, 0.3), 4)
+    for shown in ("reach", "reason"):
+        painted.tactile_map_colors = shown
+        yield 1
+        picture(f"map_{shown}")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.screen.region_quadview()
+    yield 1.5
+    picture("quad")
+
+
+def steps():
+    yield from open_tab()
+    yield from facets()
+    yield from forehead()
+    yield from map_and_views()
+
+
+gui.play(steps())
