@@ -9,6 +9,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ... import core
 from ..probes import probe
 from ..probes.operators import report_error
 from ..scene import patch_record
@@ -57,7 +58,7 @@ class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
     def write(self, patch):
         contacts = contact_file.contacts_of(patch_record.reconstruction_of(patch))
         settings = bpy.context.scene.unit_settings
-        named = contact_file.UNIT_METERS.items() if settings.system != "NONE" else ()
+        named = core.UNIT_METERS.items() if settings.system != "NONE" else ()
         # An imported file brings numbers of this unit back as they are.
         unit = next(
             (name for name, meters in named if math.isclose(meters, settings.scale_length, rel_tol=1e-6)), ""
