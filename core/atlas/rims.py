@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import dot, vector_of
-from ..contours.finger import MAX_BEND, Finger
+from ..contours.contour import vector_of
+from ..contours.finger import Finger
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS
 from .join import FARTHEST_RIM
@@ -102,7 +102,7 @@ def _shares(r: Reconstruction, finger: Finger, near: float, rays: Array) -> tupl
 
 
 def _offsets(r: Reconstruction, finger: Finger, near: float, xy: Array) -> Array:
-    """How far the surface is from a patch at local places (2, k), (k,); inf where its wall is not."""
+    """How far the surface is from a patch at local places (2, k), (k,); inf where the finger feels none."""
     x, y, step = *xy, SLOPE * r.radius
     z, right, ahead = r.height(np.append(x, [x + step, x]), np.append(y, [y, y + step])).reshape(3, -1)
     up = np.stack([z - right, z - ahead, np.full(len(z), step)], axis=1) @ r.frame.axes.T
@@ -111,6 +111,5 @@ def _offsets(r: Reconstruction, finger: Finger, near: float, xy: Array) -> Array
     places = r.frame.to_world(np.stack([x, y, z], axis=1)).tolist()
     for i in np.flatnonzero(up @ r.frame.axes[:, 2] > STEEP):
         contact = finger.near(vector_of(places[i]), vector_of(up[i]), near)
-        if contact is not None and dot(contact[1], vector_of(up[i])) > MAX_BEND:
-            found[i] = math.dist(places[i], contact[0])
+        found[i] = math.inf if contact is None else math.dist(places[i], contact[0])
     return found

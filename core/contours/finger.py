@@ -17,9 +17,6 @@ from .contour import CREASE, NO_CONTACT, NOT_MONGE, Vector, along, cross, dot, s
 
 # benchmarks.refusals counts what these refuse.
 MAX_TURN = math.cos(math.radians(45.0))  # A sharper turn between two contacts is a crease to a finger.
-# A surface that bends more from one contact to the next, across the plane or along it, is another wall: an
-# edge of 45 degrees that is crossed aslant turns less in the plane (python -m benchmarks.atlas --shapes).
-MAX_BEND = math.cos(math.radians(40.0))
 # A normal tilted more against that at the point has slopes above 3.7.
 MAX_TILT = math.cos(math.radians(75.0))
 LEAST_IN_PLANE = 1e-3  # A surface normal has at least this share in the sampling plane.
@@ -109,11 +106,13 @@ def contact_of(hit: _Hit, side: float) -> Contact:
 
 
 def contacts(
-    cast: _Cast, up: complex, turn: complex, n: Vector, step: float
+    cast: _Cast, up: complex, turn: complex, n: Vector, step: float, least_cosine: float
 ) -> Generator[tuple[Vector, Vector], None, str]:
     """Yields contacts with surface normals on one side of the reference point 0, and returns why they end.
 
     up : the curve's normal at the point; `turn` times it is the way ahead
+    n : the surface's normal there
+    least_cosine : of the angle between the normals of two contacts; where the surface bends more is a crease
     """
     at, last = 0j, n
     if abs(up) < LEAST_IN_PLANE:
@@ -134,7 +133,7 @@ def contacts(
         # If the surface lies in the plane, there is no curve to follow.
         if length < LEAST_IN_PLANE or (new_up * up.conjugate()).real < MAX_TURN * length:
             return CREASE
-        if dot(normal, last) < MAX_BEND:
+        if dot(normal, last) < least_cosine:
             return CREASE
         if dot(normal, n) < MAX_TILT:
             return NOT_MONGE

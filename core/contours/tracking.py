@@ -55,8 +55,12 @@ def following(
     noise: float = 0.0,
     rng: np.random.Generator | int | None = None,
     tangent: ArrayLike | None = None,
+    least_cosine: float = -1.0,
 ) -> Callable[[float], list[Contour]]:
-    """`track` as a function of the extent, which goes on from where it was when a longer one is asked for."""
+    """`track` as a function of the extent, which goes on from where it was when a longer one is asked for.
+
+    least_cosine : a contour ends where the normals of two contacts turn by more than this cosine's angle
+    """
     p = finite_array("point", point, (3,), LARGEST)
     n = vector_of(unit_vector("outward", outward))
     planes = list_of("planes", planes, SamplingPlane)
@@ -68,7 +72,7 @@ def following(
         t, u, across = plane.floats(n, e1)
         cast, up_in_plane = section(surface, start, t, u, side), complex(dot(up, t), dot(up, u))
         # The curve's normal, turned clockwise by a quarter, is its tangent.
-        halves = [_Half(contacts(cast, up_in_plane, turn, n, step)) for turn in (1j, -1j)]
+        halves = [_Half(contacts(cast, up_in_plane, turn, n, step, least_cosine)) for turn in (1j, -1j)]
         curves.append(_Curve(across, halves, p[None], np.array([up])))
 
     def contours(extent: float) -> list[Contour]:

@@ -26,6 +26,10 @@ from .taps import tapped
 MOST_EVEN = 24  # At most so many planes are laid out evenly.
 GLANCE_CONTACTS = 8  # A half curve has so many contacts where it is only asked whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
+# Touches with a given deviation, as those of a whole object, end where the surface bends by 40 degrees from
+# one contact to the next: an edge of 45 that is crossed aslant turns less in the plane
+# (python -m benchmarks.atlas --shapes).
+BENT, ANY = 0.77, -1.0
 BISECTIONS = 6  # They narrow a factor of two to a 64th of it.
 
 Found = Generator[None, None, list[Exploration | ValueError]]
@@ -77,8 +81,9 @@ def touching(
         """The steps of one touch."""
         reference = SamplingPlane(0.0).axes(direction, tangent)
         place = surface, point, direction
+        cosine = BENT if wanted["largest_std"] else ANY
         farthest = wanted["farthest"] or _farthest(partial(track, *place, wanted["planes"], tangent=tangent))
-        follow = partial(following, *place, noise=noise, rng=generator, tangent=tangent)
+        follow = partial(following, *place, noise=noise, rng=generator, tangent=tangent, least_cosine=cosine)
         more = wanted | {"farthest": farthest, "tap": partial(tapped, surface)}
         return (yield from Touch(follow, point, reference, **more).steps())
 
