@@ -11,15 +11,12 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING
 
 # benchmarks.refusals counts the patches that are off and do not say so.
-PATCH_SAMPLES = 15  # So many samples of a patch are compared with the mesh.
 MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh.
 
 
 def height_error(r: Reconstruction, surface: Surface) -> float | None:
     """The mean distance in height of patch and surface over the domain, or None if there is no surface."""
     points, weights = r.domain.nodes
-    some = slice(None, None, len(points) // PATCH_SAMPLES | 1)
-    points, weights = points[some], weights[some]
     heights = r.height(points[:, 0], points[:, 1])
     up = r.frame.axes[:, 2].tolist()
     starts = r.frame.to_world(np.column_stack([points, heights])).tolist()

@@ -80,7 +80,8 @@ def added_planes(report, unit):
 
 
 def _measured_contacts(report):
-    kinds = " and ".join(f"{report[kind]} {kind}" for kind in ("curves", "strokes") if report[kind])
+    numbers = [(report[kind], kind) for kind in ("curves", "strokes") if report[kind]]
+    kinds = " and ".join(f"{number} {kind[:-1] if number == 1 else kind}" for number, kind in numbers)
     given, fitted = report.get("given_contacts", 0), report["contacts"]
     if given <= fitted:  # The point of the file is one more.
         return f"{fitted} on {kinds}"

@@ -156,7 +156,7 @@ def test_strokes_are_fitted_around_a_place(command, empty, tmp_path):
     assert 0.5 < report["radius"] < 0.7
     code, out, _ = command("fit", path, *place)
     assert code == 0
-    assert re.search(r"\b\d{2,3} on 0 curves and 1 strokes", out)
+    assert re.search(r"^contacts +360 on 1 stroke, fitted as \d{2,3}$", out, re.MULTILINE)
     code, _, err = command("fit", path, *place, "--point", "0", "0", "2")
     assert code == 2
     assert "--location: expected this or --point, got both" in err

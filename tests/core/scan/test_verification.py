@@ -120,7 +120,8 @@ def test_further_contours_see_what_the_contours_do_not():
     """3 x^2 y - y^3 is zero along 0, 60 and 120 degrees: all of it is between the curves."""
     flat = surfaces.plane()
     a = 1e-3
-    monkey = MongePatch(0.0, 0.0, np.array([0.0, 3.0 * a, 0.0, -a, *[0.0] * 5]))
+    in_unit_radius = a * EXTENT**2
+    monkey = MongePatch(0.0, 0.0, in_unit_radius * np.array([0.0, 3.0, 0.0, -1.0, *[0.0] * 5]))
     ends = [(EXTENT * np.cos(t), EXTENT * np.sin(t)) for t in np.radians(np.arange(0, 360, 60))]
     geometry = Geometry(Frame(np.zeros(3), np.eye(3)), EXTENT, monkey, Domain(np.array(ends)))
     r = replace(touched(flat), geometry=geometry, contours=(Contour(_line_points()),))
