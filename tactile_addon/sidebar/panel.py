@@ -172,7 +172,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         draw_sentence(context, layout, object_verdict(record), ICONS.get(record["status"], "ERROR"))
         _draw_colors(context, layout, obj, "tactile_colors")
         if patch_record.is_colored(obj):
-            _draw_range(layout, obj)
+            _draw_range(context, layout, obj)
         draw_rows(context, layout.box(), object_rows(record))
         if "touches" not in record:  # Measured contacts have no mesh to touch.
             return

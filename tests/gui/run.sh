@@ -31,6 +31,10 @@ step() {
   "$@" >"$out/step.txt" 2>&1 || code=$?
   cat "$out/step.txt" >>"$log"
   grep -E '^(ok|FAILED): ' "$out/step.txt" || true
+  if grep -q "Python script error" "$out/step.txt"; then
+    grep -B 4 -m 1 "Python script error" "$out/step.txt" >&2
+    echo "FAILED: $what ran into an error that Blender only printed" | tee -a "$log"
+  fi
   if [ "$code" != 0 ]; then
     tail -n 30 "$out/step.txt" >&2
     echo "FAILED: $what ended with $code" | tee -a "$log"
