@@ -11,7 +11,8 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING
 
 # benchmarks.refusals counts the patches that are off and do not say so.
-MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh.
+MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh,
+HAIR = 1e-4  # and rays go on this share of their reach beyond each.
 
 
 def height_error(r: Reconstruction, surface: Surface) -> float | None:
@@ -45,9 +46,9 @@ def layer_off(surface: Surface, start: list[float], up: list[float], reach: floa
 
     Layers that are seen from inside are another wall of the object, or its other side.
     """
-    nearest = None
+    nearest, hair = None, HAIR * reach
     for sign in (1.0, -1.0):
-        gone = 0.0
+        gone = -hair  # Rays that begin on the mesh, but for rounding, may miss all of it.
         for _ in range(MESH_LAYERS):
             at = _along(start, up, sign * gone)
             hit = surface.ray_cast(at, _along([0.0, 0.0, 0.0], up, sign), reach - gone)
@@ -58,7 +59,7 @@ def layer_off(surface: Surface, start: list[float], up: list[float], reach: floa
             if _dot(normal, up) > 0.0:
                 nearest = reach = gone
                 break
-            gone += 1e-4 * reach
+            gone += hair
             if gone >= reach:
                 break
     return nearest
