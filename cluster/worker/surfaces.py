@@ -27,6 +27,7 @@ def surface(target: Touchable, options: WholeOptions) -> tuple[dict[str, Any], f
         bpy.context.evaluated_depsgraph_get(),
         location=None,
         tolerance=options.length("tolerance", facts["size"]) or 0.0,
+        accuracy="normal",
         noise=options.length("noise", facts["size"]),
         seed=[options.seed, int(facts["hash"], 16)],
         most=options.most,
