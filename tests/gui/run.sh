@@ -78,7 +78,7 @@ GUI_TIMEOUT=600 GUI_ARGS="$out/scene.blend" step "the checks of whole objects" \
   $gui shot tests/gui/whole_object.py "$out/whole_object.png"
 GUI_ARGS="$out/scene.blend" step "the contacts' checks" \
   $gui shot tests/gui/contacts.py "$out/contacts.png"
-GUI_TIMEOUT=240 GUI_ARGS="$out/scene.blend" step "the endurance checks" \
+GUI_TIMEOUT=600 GUI_ARGS="$out/scene.blend" step "the endurance checks" \
   $gui shot tests/gui/endurance.py "$out/endurance.png" 640 480
 GUI_ARGS=examples/sample.blend step "the sample's checks" \
   $gui shot tests/gui/sample.py "$out/sample.png"
