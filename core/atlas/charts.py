@@ -226,9 +226,12 @@ class Charts:
 
     def joined(self, others: "Charts") -> "Charts":
         """The tables of these patches, followed by others."""
-        return Charts(
+        found = Charts(
             *(np.concatenate([getattr(self, f.name), getattr(others, f.name)]) for f in fields(Charts))
         )
+        # Otherwise each touch would look at the knots of all patches before it again.
+        vars(found)["is_flat"] = np.append(self.is_flat, others.is_flat)
+        return found
 
     def rim_at(self, azimuths: NDArray[np.intp]) -> Array:
         """Local x and y (2, k) of the first patch's rim, at some of its AZIMUTHS."""

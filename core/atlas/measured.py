@@ -26,9 +26,7 @@ MISSED = 3.0  # Contacts are off a patch, in the median, by at most so many time
 PATCHES_APART = 0.6  # Patches are so many radii from each other.
 NEIGHBORS = 16  # The plane of so many neighbors gives the normal of a contact where none was measured.
 ABREAST = 8  # So many neighbors of each contact are to face the same way.
-ALIKE = (
-    2.0  # Neighbors share a place if they are apart by up to so many times what others are, in the median.
-)
+ALIKE = 2.0  # Neighbors share a place if they are apart by up to so many times the median of all.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 

@@ -19,9 +19,8 @@ FEW = 12  # If fewer facets are felt, a curvature is off by some .8 to 1.2 of th
 MANY = 40  # If so many faces are, the mesh is fine, even where it is flat.
 # Edges between these angles stand for a smooth bend,
 SAME, SMOOTH = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
-LIKE = (
-    0.25  # if both facets are so many times as wide as the wider one and as the radius; else one is a fillet.
-)
+# if both facets are so many times as wide as the wider one and as the radius; else one is a fillet.
+LIKE = 0.25
 BEYOND = 0.05  # The facet behind an edge is looked for so many widths beyond it.
 
 
