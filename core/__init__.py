@@ -7,7 +7,7 @@ has negative curvatures, because normals point outward.
 """
 
 from .atlas.boundaries import Edge
-from .atlas.expected import expected_touches
+from .atlas.expected import covered_by, expected_touches
 from .atlas.measured import atlas_of, cover_contacts
 from .atlas.meshing import Mesh, shortest_edge
 from .atlas.object_atlas import Atlas, NextTouch
@@ -76,6 +76,7 @@ __all__ = [
     "contacts_from_csv",
     "contacts_to_csv",
     "cover_contacts",
+    "covered_by",
     "distances",
     "expected_touches",
     "explore",

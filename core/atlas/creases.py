@@ -79,16 +79,21 @@ def creased(
         yield 0.9
     points, off, met = (np.concatenate(values) for values in zip(*parts, strict=True))
     sides, points, off = sides[met], points[met], off[met]
-    away = np.linalg.norm(vertices[sides] - points[:, None], axis=2)
-    nearer = away.argmin(axis=1)
-    order = np.argsort(away.min(axis=1), kind="stable")
-    order = order[away.min(axis=1)[order] < SNAP * edge]
-    moved, first = np.unique(sides[order, nearer[order]], return_index=True)
-    vertices[moved], unfelt[moved], free[moved] = points[order[first]], off[order[first]], False
+    moved, to = _nearest(vertices, sides, points, edge)
+    vertices[moved], unfelt[moved], free[moved] = points[to], off[to], False
     left = free[sides].all(axis=1)
     split = split_sides(triangles, sides[left], len(vertices))
     unfelt = np.concatenate([unfelt, off[left]])
     return Creased(np.vstack([vertices, points[left]]), split, sides[left, 0], unfelt)
+
+
+def _nearest(vertices: Array, sides: Indices, points: Array, edge: float) -> tuple[Indices, Indices]:
+    """The ends of sides that are near to the points (n, 3) on these, and the point nearest to each."""
+    away = np.linalg.norm(vertices[sides] - points[:, None], axis=2)
+    order = np.argsort(away.min(axis=1), kind="stable")
+    order = order[away.min(axis=1)[order] < SNAP * edge]
+    ends, first = np.unique(sides[order, away.argmin(axis=1)[order]], return_index=True)
+    return ends, order[first]
 
 
 def _corners(

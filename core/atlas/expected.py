@@ -1,17 +1,18 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""About how many touches a whole object takes, as a few touches of it show."""
+"""How far touches all over an object are: about how many they will be, and which places they have covered."""
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number
 from ..contours.contour import tangent_of, vector_of
 from ..contours.finger import Finger, Surface, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.touches import explore
+from ..reconstruction.result import Reconstruction
 from .rims import felt_rim
 from .touching import FIRST_EXTENT, NEAR, SIZE
 
@@ -57,3 +58,15 @@ def expected_touches(
 def _area(radii: Array) -> float:
     """The area inside radii (n,) all round."""
     return float(np.pi * np.mean(radii**2))
+
+
+def covered_by(r: Reconstruction, rim: Array, points: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Which points (n, 3) of the world are inside the rim of a patch, and as near to it as a finger feels it.
+
+    rim : how far the patch reaches from its point all round, (k,), lengths, from azimuth 0 on
+    """
+    x, y, z = r.frame.to_local(points).T
+    azimuths = np.linspace(0.0, 2.0 * np.pi, len(rim), endpoint=False)
+    found: NDArray[np.bool_] = np.hypot(x, y) < np.interp(np.arctan2(y, x), azimuths, rim, period=2.0 * np.pi)
+    found[found] = np.abs(z[found] - r.height(x[found], y[found])) < NEAR * tolerance
+    return found

@@ -63,6 +63,32 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     """
     half = charts.rims.max(axis=1)
     across = np.maximum(ACROSS, np.ceil(2.0 * half * charts.radii / pitch).astype(np.intp))
+    node, x, y, middle, group = yield from _spread(charts, half, across)
+    parts = []
+    for start in range(0, len(middle), SAMPLES_AT_ONCE):
+        few = middle[start : start + SAMPLES_AT_ONCE]
+        parts.append(_others(charts, node[few], x[few], y[few]))
+        yield 0.0
+    others, thickness = (np.concatenate(values)[group] for values in zip(*parts, strict=True))
+    flat, found = (2.0 * half * charts.radii / across) ** 2, []
+    for start in range(0, len(node), SAMPLES_AT_ONCE):
+        some = slice(start, start + SAMPLES_AT_ONCE)
+        found.append(
+            _samples(charts, node[some], x[some], y[some], flat[node[some]], others[some], thickness[some])
+        )
+        yield 0.0
+    return Samples(*(np.concatenate(values) for values in zip(*found, strict=True)))
+
+
+def _spread(
+    charts: Charts, half: Array, across: NDArray[np.intp]
+) -> Generator[float, None, tuple[NDArray[np.intp], Array, Array, NDArray[np.intp], NDArray[np.intp]]]:
+    """The patches and local x and y of evenly spread samples, (n,) each; yields 0.
+
+    half, across : half the width of a square around each patch, and the number of samples along it
+
+    Also the sample in the middle of each group of neighbors, (g,), and the group of each sample, (n,).
+    """
     each = np.maximum(1, np.minimum(across // ACROSS, PARTS))  # Samples of a group, along each axis.
     places, groups = [], 0
     for i, (count, few) in enumerate(zip(across.tolist(), each.tolist(), strict=True)):
@@ -80,22 +106,9 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     # The sample in the middle of a group is first.
     order = np.lexsort((aside, group))
     _, first, of = np.unique(group[order], return_index=True, return_inverse=True)
-    middle, group = order[first], np.empty(len(order), dtype=np.intp)
+    group = np.empty(len(order), dtype=np.intp)
     group[order] = of
-    parts = []
-    for start in range(0, len(middle), SAMPLES_AT_ONCE):
-        few = middle[start : start + SAMPLES_AT_ONCE]
-        parts.append(_others(charts, node[few], x[few], y[few]))
-        yield 0.0
-    others, thickness = (np.concatenate(values)[group] for values in zip(*parts, strict=True))
-    flat, found = (2.0 * half * charts.radii / across) ** 2, []
-    for start in range(0, len(node), SAMPLES_AT_ONCE):
-        some = slice(start, start + SAMPLES_AT_ONCE)
-        found.append(
-            _samples(charts, node[some], x[some], y[some], flat[node[some]], others[some], thickness[some])
-        )
-        yield 0.0
-    return Samples(*(np.concatenate(values) for values in zip(*found, strict=True)))
+    return node, x, y, order[first], group
 
 
 def _others(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:

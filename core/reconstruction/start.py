@@ -96,34 +96,47 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     touches = [[contour for contour, _ in c] for c in thin]
     curves = curves_through(*stacked(points, touches))
     normals = surface_normals(curves.tangents, outward)
+    errors = _errors(points, touches, curves, normals)
+    good = [i for i, error in enumerate(errors) if error is None]
+    if not good:
+        return None, touches, errors
+    curves = curves.at(good)
+    axes, k1, k2, radii = darboux_frames(curves, normals[good])
+    strokes = [
+        _beside(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
+        for row, i in enumerate(good)
+    ]
+    stds = [
+        _std(
+            noise,
+            max(size, min(number for _, number in thin[i])),
+            [*(c.noise or 0.0 for c in touches[i]), given[i].noise / math.sqrt(size)],
+        )
+        for i, (_, size) in zip(good, strokes, strict=True)
+    ]
+    known = [
+        not len(beside) and (noise is not None or None not in [c.noise for c in touches[i]])
+        for i, (beside, _) in zip(good, strokes, strict=True)
+    ]
+    kappas, noises = np.stack([k1, k2], axis=1), (np.array(stds), np.array(known))
+    first = Start(points[good], axes, kappas, radii, curves, [beside for beside, _ in strokes], *noises)
+    return first, touches, errors
+
+
+def _errors(
+    points: Array, touches: list[list[Contour]], curves: Curves, normals: Array
+) -> list[DegenerateCurvesError | None]:
+    """Why each touch with these curves and normals (b, 3) carries no frame, or None."""
     each = zip(touches, curves.present, curves.tangents, normals, strict=True)
     apart, reach = np.spacing(np.abs(points)).max(axis=1), np.abs(curves.points).max(axis=(1, 2, 3))
     errors = [
         degeneracy(*touch) or (too_coarse(gap, size) if gap > TOUCH_ROUNDING * size else None)
         for touch, gap, size in zip(each, apart, reach, strict=True)
     ]
-    errors = [
+    return [
         error and (away_from(point, contours) or error)
         for error, point, contours in zip(errors, points, touches, strict=True)
     ]
-    good = [i for i, error in enumerate(errors) if error is None]
-    if not good:
-        return None, touches, errors
-    curves = curves.at(good)
-    axes, k1, k2, radii = darboux_frames(curves, normals[good])
-    strokes, stds, known_stds = [], [], []
-    for row, i in enumerate(good):
-        beside, size = _beside(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
-        strokes.append(beside)
-        sizes = [size for _, size in thin[i]]
-        known = [contour.noise or 0.0 for contour in touches[i]]
-        stds.append(_std(noise, max(size, min(sizes)), [*known, given[i].noise / math.sqrt(size)]))
-        known_stds.append(
-            not len(beside) and (noise is not None or None not in [c.noise for c in touches[i]])
-        )
-    noises, kappas = (np.array(stds), np.array(known_stds)), np.stack([k1, k2], axis=1)
-    first = Start(points[good], axes, kappas, radii, curves, strokes, *noises)
-    return first, touches, errors
 
 
 def away_from(point: Array, contours: Sequence[Contour]) -> DegenerateCurvesError | None:

@@ -65,7 +65,10 @@ def _weights(count):
 
 
 def _png(rgba):
-    """The bytes of a .png of pixels (h, w, 4), uint8."""
+    """The bytes of a .png of pixels (h, w, 4), uint8.
+
+    Blender writes pictures of the file's images only, and a report adds nothing to the file.
+    """
     high, wide, _ = rgba.shape
     # Each line begins with its filter, 2: differences from the line above take less than half the bytes.
     lines = np.full((high, 1 + 4 * wide), 2, dtype=np.uint8)

@@ -58,16 +58,11 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
     def draw_active(self, context, layout, obj):
         if context.mode != "OBJECT":
             draw_sentence(context, layout, OTHER_MODE, "INFO")
-            layout.operator(
-                "object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE"
-            ).mode = "OBJECT"
+            leave = layout.operator("object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE")
+            leave.mode = "OBJECT"
         found = probe.probe_of(obj)
         if found is None:
-            layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
-            if not any(each.type == "MESH" for each in context.view_layer.objects):
-                draw_sentence(context, layout, NO_MESH, "INFO")
-            elif obj is None or not probe.is_result(obj):
-                draw_sentence(context, layout, HELP, "INFO")
+            _draw_pick(context, layout, obj)
             return
         row = layout.row(align=True)
         move = row.row(align=True)
@@ -75,9 +70,8 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
         move.operator(TACTILE_OT_pick.bl_idname, text="Move", icon="EYEDROPPER")
         row.operator(TACTILE_OT_pick.bl_idname, text="New", icon="ADD").new = True
         row.operator(TACTILE_OT_delete.bl_idname, text="", icon="TRASH")
-        settings = found.tactile_probe
+        settings, record = found.tactile_probe, probe.record_of(found)
         layout.prop(settings, "target")
-        record = probe.record_of(found)
         chosen = found_values(record, context.scene)
         fields = {}  # The override of a library's probe keeps numbers, but not the properties that show them.
         if found.override_library is None:
@@ -92,6 +86,15 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
             header.label(text=title)
             if body:
                 draw(body, settings, chosen, fields)
+
+
+def _draw_pick(context, layout, obj):
+    """Draws the button that makes a probe, and what it does or needs."""
+    layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
+    if not any(each.type == "MESH" for each in context.view_layer.objects):
+        draw_sentence(context, layout, NO_MESH, "INFO")
+    elif obj is None or not probe.is_result(obj):
+        draw_sentence(context, layout, HELP, "INFO")
 
 
 def _size_of(target, record):
@@ -140,10 +143,8 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         is_outdated = record["status"] == "outdated"
         if not (is_outdated and failed):  # The failure stands above already.
             draw_sentence(context, layout, verdict(record, unit), ICONS.get(record["status"], "ERROR"))
-        if record.get("few_facets") and found is not None and not is_outdated:
-            layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
-        if is_outdated and found is not None:
-            layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
+        if found is not None:
+            _draw_remedy(layout, record)
         _draw_colors(context, layout, patch, "tactile_colors")
         _draw_range(context, layout, patch)
         _draw_shown(layout, found, patch)
@@ -158,6 +159,14 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
         _draw_comparison(context, layout, record, unit)
         if found is not None:
             draw_rows(context, layout, plane_rows(record, unit), active=not is_outdated)
+
+
+def _draw_remedy(layout, record):
+    """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
+    if record["status"] == "outdated":
+        layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
+    elif record.get("few_facets"):
+        layout.operator(TACTILE_OT_add_subdivision.bl_idname, icon="MOD_SUBSURF")
 
 
 class TACTILE_PT_object(_Sidebar, bpy.types.Panel):

@@ -13,7 +13,6 @@ from ..touch.touch_object import AWAY, nearest_point
 from ..touch.units import length
 from ..touch.wording import many
 from .both_ways import BothWays
-from .coverage import Coverage
 from .whole_surface import WholeSurface
 
 # These lengths are shares of the object's size.
@@ -21,6 +20,7 @@ TOLERANCE_SHARES = {"quick": 1.0 / 200.0, "normal": 1.0 / 500.0, "fine": 1.0 / 1
 LARGEST_TOLERANCE, LARGEST_EDGE = 0.1, 0.5  # With more, neither patches nor triangles would fit.
 OFF_TOLERANCES = 3.0  # The surface is no good if it is off the mesh by more tolerances, as in core's check.
 STARTS = 20  # So many places to begin are tried if none is given.
+PLACES, SEED = 1000, 0  # The progress is the share of so many places all over the mesh that patches cover.
 TOUCHED, JOINED = 0.5, 0.8  # Of all that is to be done, touching and joining are done at these shares.
 
 
@@ -56,7 +56,7 @@ class ObjectTouches:
         self.found, self.rims, self.done, self.uncovered = [], [], 0, 0
         self.words, self.share = "Looking for a place to begin", 0.0
         self.is_stopped = False
-        self._coverage = Coverage(self.surface, self.tolerance)
+        self._left = self._spread()
         self._rounds, self._is_joining = 0, False
         self._start = None
         if location is not None:
@@ -134,17 +134,25 @@ class ObjectTouches:
             with suppress(ValueError):  # The face has no area.
                 yield self.surface.project(middle)[:2]
 
+    def _spread(self):
+        """Places all over the mesh, (PLACES, 3), of which patches will cover more and more."""
+        with suppress(ValueError):  # No face has an area, so touches cannot begin.
+            rng = np.random.default_rng(SEED)
+            return core.scattered(self.surface.points, self.surface.triangles, PLACES, rng)[0]
+        return np.zeros((0, 3))
+
     def _note(self, state):
         for exploration, rim in zip(state.found, state.rims, strict=True):
             self.found.append(exploration.result)
             self.rims.append(rim)
-            self._coverage.add(exploration.result, rim)
+            covered = core.covered_by(exploration.result, rim, self._left, self.tolerance)
+            self._left = self._left[~covered]
         self.done, self.uncovered = state.done, state.uncovered
         touches, places = many(state.done, "touch", "touches"), many(state.uncovered, "place", "places")
         self.words = f"{touches}, {places} to go on from"
         if state.joining is None:
             self._is_joining = False
-            self.share = max(self.share, TOUCHED * self._coverage.share)
+            self.share = max(self.share, TOUCHED * (1.0 - len(self._left) / PLACES))
             return
         self._rounds += not self._is_joining
         self._is_joining = True
