@@ -6,6 +6,7 @@
 runs in a process of its own on the same cases. The two take turns, so that other programs slow down both.
 """
 
+import os
 import pickle
 import subprocess
 import sys
@@ -69,7 +70,9 @@ def _row(title, seconds, cases, task):
 def worker(script, root, *arguments):
     """A process in which a script of this folder times the checkout `root`."""
     command = [sys.executable, str(ROOT / "benchmarks" / script), str(root), *map(str, arguments)]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    # Blender adds to the environment that processes inherit, and says on their standard output what it found.
+    env = dict(os.environ)
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=env)
 
 
 def answer(worker, task):
