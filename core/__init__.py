@@ -21,6 +21,7 @@ from .contours.contour import (
     NO_CONTACT,
     NOT_MONGE,
     UNEXPLAINED,
+    WHERE,
     Contour,
     SamplingPlane,
 )
@@ -53,6 +54,7 @@ __all__ = [
     "SOLVERS",
     "UNEXPLAINED",
     "UNIT_METERS",
+    "WHERE",
     "Atlas",
     "Contacts",
     "Contour",

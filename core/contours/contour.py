@@ -23,6 +23,13 @@ from ..arguments import (
 CURVE_ROUNDING = 0.01
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 UNEXPLAINED = "fit no longer matched"
+WHERE = {  # The stops in words.
+    EXTENT: "at the greatest extent allowed",
+    NO_CONTACT: "at an edge",
+    CREASE: "at a crease",
+    NOT_MONGE: "where the surface turns away",
+    UNEXPLAINED: "where the patch could no longer be trusted",
+}
 BRINKS = (NO_CONTACT, CREASE)  # The surface ends at these stops.
 
 Vector = tuple[float, float, float]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
-from .contour import Contour, cross
+from .contour import WHERE, Contour, cross
 from .curves import LEAST_CONTACTS, Curves
 
 # benchmarks.stability leads planes and tilts to where these refuse them.
@@ -102,7 +102,8 @@ def degeneracy(
     """The error that says why one touch of Curves carries no frame, and what to move; or None."""
     for i, (contour, count) in enumerate(zip(contours, present.sum(axis=1), strict=False), 1):
         if count < LEAST_CONTACTS:
-            why = f" (it ended by: {', '.join(contour.stops)})" if contour.stops else ""
+            ends = dict.fromkeys(WHERE.get(stop, stop) for stop in contour.stops or ())
+            why = f" (it ends {' and '.join(ends)})" if ends else ""
             return DegenerateCurvesError(
                 f"curve {i} has {count} of the {LEAST_CONTACTS} contacts it needs besides the reference "
                 f"point{why}: move the point away from the crease or edge there, or use a shorter step"

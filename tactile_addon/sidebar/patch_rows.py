@@ -29,7 +29,7 @@ def other_rows(record, unit):
         *_radii(record, unit),
         ("K Gaussian", _measured(record, "gaussian_curvature", -2, unit)),
         ("H Mean", _measured(record, "mean_curvature", -1, unit)),
-        ("Shape Index", f"{record['shape_index']:.2f}"),
+        ("Shape Index", _shape_index(record)),
         ("Curvedness", _said(record, "curvedness", -1, unit)),
         ("Fit Error", _said(record, "fit_error", 1, unit)),
     ]
@@ -62,6 +62,12 @@ def found_values(record, scene):
 
 def _said(record, key, power, unit):
     return units.say(_value(record, key, power), power, unit)
+
+
+def _shape_index(record):
+    """The shape index in words; a flat patch has none."""
+    flat = not any(units.known(_value(record, key, -1), record[f"{key}_std"]) for key in ("k1", "k2"))
+    return "–" if flat else f"{record['shape_index']:.2f}"
 
 
 def _measured(record, key, power, unit):

@@ -8,20 +8,13 @@ from collections import Counter
 from ... import core
 
 CURVATURES = ("k1", "k2", "gaussian_curvature", "mean_curvature")
-ENDS = {
-    core.UNEXPLAINED: "where the patch could no longer be trusted",
-    core.EXTENT: "at the greatest extent allowed",
-    core.NO_CONTACT: "at an edge",
-    core.CREASE: "at a crease",
-    core.NOT_MONGE: "where the surface turns away",
-}
 
 
 def ends(contours):
     """A sentence on what has ended curves that were free to grow."""
     counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
     if len(counts) == 1:
-        return f" All half curves end {ENDS[counts[0][0]]}."
+        return f" All half curves end {core.WHERE[counts[0][0]]}."
     return f" {_counted(counts, 2 * len(contours))}."
 
 
@@ -35,7 +28,7 @@ def early_ends(contours):
 
 
 def _counted(counts, total):
-    (most, first), *others = [(count, ENDS[stop]) for stop, count in counts]
+    (most, first), *others = [(count, core.WHERE[stop]) for stop, count in counts]
     return ", ".join(
         [f"{most} of {total} half curves end {first}", *(f"{count} {end}" for count, end in others)]
     )

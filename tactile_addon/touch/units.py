@@ -16,6 +16,7 @@ ADAPTIVE = {
 METERS = dict(zip((*ADAPTIVE["METRIC"], *ADAPTIVE["IMPERIAL"]), core.UNIT_METERS.items(), strict=True))
 LEAST = {"MILLIMETERS": 1e-2}  # In an adaptive unit lengths are at least 1 or this: few count micrometers.
 SUPERSCRIPTS = {1: "", 2: "²"}
+ROUNDING = 1e-3  # A value below this share of its standard deviation is rounding, and counts as 0.
 
 
 def unit_of(scene, size):
@@ -37,7 +38,12 @@ def unit_of(scene, size):
 def say(value, power, unit, std=None):
     """A value in length^power in words, such as "0.0123 mm" or "-4.2 ± 0.3 1/mm²"."""
     spread = "" if std is None else f" ± {float(f'{std / unit[1] ** power:.1g}'):g}"
-    return f"{value / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
+    return f"{known(value, std) / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
+
+
+def known(value, std):
+    """The value, or 0 if it is only rounding beside its standard deviation, which may be None."""
+    return 0.0 if std is not None and abs(value) < ROUNDING * std else value
 
 
 def length(value, unit=None):

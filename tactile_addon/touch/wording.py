@@ -7,8 +7,8 @@ from collections import Counter
 import bpy
 import numpy as np
 
-from .touch_report import ENDS
-from .units import length, say, unit_of
+from ... import core
+from .units import known, length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
@@ -62,7 +62,8 @@ def verdict(report, unit):
         doubt = report["message"].partition(". ")[0].rstrip(".")
         return f"Doubtful: {doubt.rpartition(': ')[2]}"
     stops = Counter(stop for pair in report.get("stops", ()) for stop in pair)
-    early = [(count, ENDS[stop]) for stop, count in stops.most_common() if ENDS.get(stop, "").endswith(EARLY)]
+    ends = ((count, core.WHERE.get(stop, "")) for stop, count in stops.most_common())
+    early = [(count, where) for count, where in ends if where.endswith(EARLY)]
     if early:
         count, where = early[0]
         return f"Good, with {count} of {stops.total()} half curves cut short {where}"
@@ -90,7 +91,7 @@ def _measured_contacts(report):
 
 def _tracked(report):
     stops = sorted({stop for pair in report["stops"] for stop in pair})
-    where = ", ".join(ENDS.get(stop, stop) for stop in stops)
+    where = ", ".join(core.WHERE.get(stop, stop) for stop in stops)
     return f"{report['contacts']} on {len(report['planes'])} curves, which end {where}"
 
 
@@ -123,8 +124,12 @@ def sentence(error):
 def fit_summary(report):
     """A sentence on a fit: the verdict on it, and the curvatures."""
     unit = unit_of(bpy.context.scene, report["radius"])
-    curvatures = " and ".join(say(report[key], -1, unit) for key in ("k1", "k2"))
-    return f"{verdict(report, unit)}. Curvatures {curvatures}"
+    return f"{verdict(report, unit)}. Curvatures {curvatures(report, unit)}"
+
+
+def curvatures(report, unit):
+    """Both principal curvatures in words, without their standard deviations."""
+    return " and ".join(say(known(report[key], report[f"{key}_std"]), -1, unit) for key in ("k1", "k2"))
 
 
 def _verification(report, unit):

@@ -28,7 +28,7 @@ from ..touch.settings import (
     touch_arguments,
 )
 from ..touch.touch_object import touch
-from ..touch.wording import sentence, verdict
+from ..touch.wording import curvatures, sentence, verdict
 from . import overlay
 from .below import large_meshes, names_below, point_below, read
 from .mouse import draw_hints
@@ -221,8 +221,8 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
                 unit = units.unit_of(context.scene, touched.result.radius)
-                k1, k2 = (units.say(k, -1, unit) for k in (touched.result.patch.k1, touched.result.patch.k2))
-                words = short = f"{touched.report['source']}: principal curvatures {k1} and {k2}"
+                found = curvatures(touched.report, unit)
+                words = short = f"{touched.report['source']}: principal curvatures {found}"
         except ValueError as error:
             words = self._seen["refusal"] = sentence(error)
             short = "No touch is possible here"

@@ -34,6 +34,21 @@ def record(status="ok", message="The patch describes its contacts.", **more):
     return {"status": status, "message": message, "height_std": 0.0123, **more}
 
 
+def test_a_number_that_is_only_rounding_beside_its_deviation_is_0(extension):
+    units = extension.tactile_addon.touch.units
+    assert units.say(3.34e-7, -1, UNIT, 7e-4) == "0 ± 0.0007 1/mm"
+    assert units.say(-0.002, -1, UNIT, 7e-4) == "-0.002 ± 0.0007 1/mm"
+    flat = {"k1": 2e-40, "k2": -1e-7, "k1_std": 0.01, "k2_std": 0.01}
+    assert extension.tactile_addon.touch.wording.curvatures(flat, UNIT) == "0 1/mm and 0 1/mm"
+
+
+def test_a_flat_patch_has_no_shape_index(said, empty):
+    empty.ops.mesh.primitive_cube_add()
+    empty.ops.tactile.pick(target="Cube", location=(0.2, 0.1, 1.0))
+    (patch,) = empty.context.object.children
+    assert dict(said.other_rows(patch["tactile"].to_dict(), UNIT))["Shape Index"] == "–"
+
+
 def test_the_verdict_says_good_and_how_good(wording):
     assert wording.verdict(record(), UNIT) == "Good: heights to ± 0.0123 mm"
     blind = record(

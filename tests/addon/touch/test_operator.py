@@ -532,7 +532,7 @@ def test_all_curves_ending_at_once_leave_nothing(empty):
     empty.ops.mesh.primitive_cone_add(radius1=0.2, depth=4.0)
     before = datablocks(empty)
     with pytest.raises(
-        RuntimeError, match=r"of the 3 contacts it needs besides the reference point \(it ended by"
+        RuntimeError, match=r"of the 3 contacts it needs besides the reference point \(it ends at"
     ):
         empty.ops.tactile.reconstruct(location=(0.0, 0.0, 2.0), extent=0.5, outward=(0.0, 0.0, 1.0))
     assert datablocks(empty) == before
@@ -542,7 +542,7 @@ def test_a_plane_that_misses(empty):
     """Curves across a thin strip end at its border at once."""
     empty.ops.mesh.primitive_plane_add(size=2.0)
     empty.context.object.scale.y = 0.01
-    with pytest.raises(RuntimeError, match="no contact"):
+    with pytest.raises(RuntimeError, match="it ends at an edge"):
         empty.ops.tactile.reconstruct(location=(0.0, 0.0, 0.0), extent=0.5)
 
 

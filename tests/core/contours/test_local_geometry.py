@@ -167,7 +167,10 @@ def line(angle, contacts=9):
             [line(0), line(1), line(2, 3)],
             "curve 3 has 2 of the 3 contacts it needs besides the reference point",
         ),
-        ([line(0), line(1), Contour([[0, 0, 0]], stops=("crease", "no contact"))], "crease, no contact"),
+        (
+            [line(0), line(1), Contour([[0, 0, 0]], stops=("crease", "no contact"))],
+            "it ends at a crease and at an edge",
+        ),
         ([line(0), line(1), Contour(np.empty((0, 3)))], "curve 3 has 0 of the 3 contacts"),
         (
             [line(0), line(1), Contour(np.outer(np.linspace(-1, 1, 9), [0, 0, 1]))],
