@@ -19,6 +19,7 @@ DOUBTFUL_TURN = math.radians(10.0)  # Angle by which the frame may be off.
 LIKELY = 0.5  # Probability of that angle on a rough surface, whose directions differ at each scale.
 DOUBTFUL_CURVATURE = 0.1  # Deviation of a curvature times the radius: that of curves a quarter as long.
 DOUBTFUL_MISS = 0.005  # Share of the radius by which a curve may miss the point, if it is
+OWN_POINT = 1e-6  # A contact that is nearer to the point, in unit radius, is the point.
 SIGNIFICANT = 5.0  # so many standard deviations as well.
 # Scatter counts as at least this share of a contact's noise: few contacts may scatter less.
 LEAST_SCATTER = 0.3
@@ -110,6 +111,14 @@ def _about_point(r: Judged) -> Iterator[str]:
     apart = distances > np.maximum(DOUBTFUL_MISS, SIGNIFICANT * stds)
     if apart.any():
         worst = np.argmax(np.where(apart, distances, 0.0))
+        own = np.linalg.norm(r.contours[worst].points - r.frame.origin, axis=1).min()
+        if own <= OWN_POINT * r.radius:  # The point is one of its contacts, so the fit to these is off.
+            yield (
+                f"Curve {worst + 1} bends so sharply at the point that its fit is "
+                f"{100.0 * distances[worst]:.2g} % of the radius off there: move the point away from that "
+                "edge, or make the facets finer."
+            )
+            return
         yield (
             f"Curve {worst + 1} passes the reference point at {r.radius * distances[worst]:.3g}"
             ", more than its scatter explains: set the point where the curves meet."

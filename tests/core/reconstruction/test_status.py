@@ -101,6 +101,17 @@ def test_a_curve_that_misses_the_point_is_named_with_its_distance():
     assert "set the point where the curves meet" in r.message
 
 
+def test_curves_that_bend_at_a_point_of_their_own_are_not_told_to_meet_elsewhere():
+    """The point is one of their contacts, as that of a touch is: at the tip of a cone the fit is off it."""
+    s = np.linspace(-1.0, 1.0, 25)
+    curves = [np.outer(s, [np.cos(a), np.sin(a), 0.0]) - np.outer(np.abs(s), [0, 0, 0.2]) for a in (0, 1, 2)]
+    message = reconstruct((0, 0, 0), [Contour(points) for points in curves], outward=(0, 0, 1)).message
+    assert re.match(
+        r"Curve \d bends so sharply at the point that its fit is \S+ % of the radius off", message
+    )
+    assert "move the point away from that edge, or make the facets finer" in message
+
+
 @pytest.mark.parametrize("share", [0.1, 0.3, 3.0])
 @pytest.mark.parametrize("way", ["normal", "across"])
 def test_a_point_beside_the_curves_is_told_before_anything_that_follows_from_it(share, way):
