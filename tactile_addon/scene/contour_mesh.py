@@ -10,7 +10,8 @@ import numpy as np
 from .mesh_data import fill, write
 
 RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # The rim has so many points and this share of a contour's thickness.
-CONTACT = 3.6  # The tips of a contact are so many times a contour's thickness away from it.
+CONTACT = 3.6  # The tips of a contact are so many times a contour's thickness away from it,
+LEAST_CONTACT, GAP = 1.6, 0.4  # or this share of the way to the next one, if they would run together.
 CONTACT_TIPS = np.vstack([np.eye(3), -np.eye(3)])
 FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
 SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # The corners of a square tube.
@@ -48,9 +49,7 @@ def fill_contours(mesh, touched):
     lengths = [len(path) for path in paths]
     sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM_THICKNESS]), lengths)
     tubes = _tubes(np.vstack(paths), np.repeat([*across, (0.0, 0.0, 1.0)], lengths, axis=0), sizes, form)
-    contacts = np.vstack([*contours, frame.to_local(strokes)])
-    octahedra = contacts[:, None] + CONTACT * thickness * CONTACT_TIPS
-    points = np.vstack([tubes, octahedra.reshape(-1, 3)])
+    points = np.vstack([tubes, _octahedra(contours, frame.to_local(strokes), thickness)])
     if _has_form(mesh, form):
         write(mesh, "position", "FLOAT_VECTOR", points)
         mesh.update()
@@ -69,6 +68,22 @@ def _has_form(mesh, form):
     found = np.empty(len(form.contact), dtype=np.int32)
     contact.data.foreach_get("value", found)
     return np.array_equal(found, form.contact)
+
+
+def _octahedra(contours, strokes, thickness):
+    """The tips (6n, 3) of the octahedra at the contacts of contours and at those of strokes (m, 3)."""
+    reach = [_reach(path, thickness) for path in contours] + [CONTACT * thickness]
+    reach = np.repeat(reach, [*map(len, contours), len(strokes)])
+    contacts = np.vstack([*contours, strokes])
+    return (contacts[:, None] + reach[:, None, None] * CONTACT_TIPS).reshape(-1, 3)
+
+
+def _reach(path, thickness):
+    """How far the tips of the contacts of a path (n, 3) are from it: less where many are close together."""
+    if len(path) < 2:
+        return CONTACT * thickness
+    apart = float(np.median(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+    return min(max(GAP * apart, LEAST_CONTACT * thickness), CONTACT * thickness)
 
 
 def _rim(result):

@@ -71,11 +71,12 @@ def _has_triangles(mesh, count, triangles):
     return np.array_equal(corners, triangles.ravel())
 
 
-def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0)):
+def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0), upright=False):
     """The material of this name, made if missing, which shows a color attribute or one color as it is.
 
-    Eevee and Cycles draw what has it above the mesh in which it lies, by the object's length ABOVE. Solid
-    shading draws it in front instead, and neither changes its geometry.
+    Eevee and Cycles draw what has it above the mesh in which it lies, by the object's length ABOVE: along its
+    normals, or upright, which is along the object's z, as a patch and its thin contours are. Solid shading
+    draws it in front instead, and neither changes its geometry.
     """
     material = bpy.data.materials.get(name)
     if material is None:
@@ -95,17 +96,25 @@ def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0)):
             source.layer_name = attribute
             links.new(source.outputs["Color"], emission.inputs["Color"])
         output.location, emission.location = (200, 0), (0, 0)
-        _draw_above(material, output)
+        _draw_above(material, output, upright)
     return material
 
 
-def _draw_above(material, output):
-    """Moves what has the material along its normals where it is drawn, by the object's length ABOVE."""
+def _draw_above(material, output, upright):
+    """Moves what has the material along its normals, or upright, where it is drawn, by the length ABOVE."""
     nodes, links = material.node_tree.nodes, material.node_tree.links
-    length, move = nodes.new("ShaderNodeAttribute"), nodes.new("ShaderNodeDisplacement")
+    length = nodes.new("ShaderNodeAttribute")
     length.attribute_type, length.attribute_name = "OBJECT", ABOVE
+    if upright:
+        move, along = nodes.new("ShaderNodeVectorDisplacement"), nodes.new("ShaderNodeCombineXYZ")
+        move.space = "OBJECT"
+        links.new(length.outputs["Fac"], along.inputs["Z"])
+        links.new(along.outputs["Vector"], move.inputs["Vector"])
+        along.location = (-100, -350)
+    else:
+        move = nodes.new("ShaderNodeDisplacement")
+        links.new(length.outputs["Fac"], move.inputs["Height"])
     move.inputs["Midlevel"].default_value, move.inputs["Scale"].default_value = 0.0, 1.0
-    links.new(length.outputs["Fac"], move.inputs["Height"])
     links.new(move.outputs["Displacement"], output.inputs["Displacement"])
     material.displacement_method = "DISPLACEMENT"
     move.location, length.location = (0, -200), (-200, -200)

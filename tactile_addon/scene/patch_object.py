@@ -31,7 +31,9 @@ from .viewports import show_colors
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
 NORMAL, PLACE = "custom_normal", "domain_place"  # Attributes: normals for shading; places on the unit disk.
-DRAWN_ABOVE = 5e-3  # It is drawn this share of its radius above the mesh, as a stability map is.
+# It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
+# most, and by so many deviations of its height until it is compared with the mesh.
+DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 5e-2, 3.0
 
 
 def insert(scene, touched, parent=None, lines=None):
@@ -40,8 +42,10 @@ def insert(scene, touched, parent=None, lines=None):
     lines : an object of contours that has lost its patch, to be used for this one
     """
     name = touched.report["source"]
-    patch = _new(scene, f"{name} Patch", emission("Tactile Curvature", attribute=COLOR))
-    lines = lines or _new(scene, f"{name} Contours", emission("Tactile Contour", color=CONTOUR_COLOR))
+    patch = _new(scene, f"{name} Patch", emission("Tactile Curvature", attribute=COLOR, upright=True))
+    lines = lines or _new(
+        scene, f"{name} Contours", emission("Tactile Contour", color=CONTOUR_COLOR, upright=True)
+    )
     patch.parent, lines.parent, lines[CONTOURS] = parent, patch, True
     for obj in (patch, lines):
         add(obj)
@@ -91,7 +95,7 @@ def rewrite(patch, touched):
         names["contours"] = lines.name
     place(patch, Matrix(matrix_of(touched.result.frame.axes, touched.result.frame.origin).tolist()))
     for obj in filter(None, (patch, lines)):
-        obj[ABOVE] = DRAWN_ABOVE * touched.result.radius
+        obj[ABOVE] = _above(patch, touched)
     patch[RECORD] = touched.report | names
     patch.pop(RECONSTRUCTION, None)
     patch.pop(VERDICT, None)
@@ -100,6 +104,14 @@ def rewrite(patch, touched):
     recolor(patch)
     if touched.report["is_verified"]:
         settle(patch)
+
+
+def _above(patch, touched):
+    """How far above the mesh a patch and its contours are drawn where they would lie in it."""
+    radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
+    if touched.report["is_verified"] and touched.surface is not None:
+        deepest = max(deepest, -1.1 * float(values(patch.data, "deviation").min()))
+    return min(max(deepest, DRAWN_ABOVE * radius), MOST_ABOVE * radius)
 
 
 def meshes(patch):

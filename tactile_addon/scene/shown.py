@@ -16,13 +16,15 @@ from .patch_record import (
     POWERS,
     RANGE,
     RECORD,
+    contours_of,
     is_colored,
 )
 
 LEAST_RANGE = 1e-3  # The range of colors is no smaller, in unit radius, so that a plane is pale green.
 LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
-LAYER_HEIGHT = 3e-3  # this share of its radius for each; two in one place would flicker.
+APART = 2.0  # by so many deviations of the heights of both,
+LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these shares of its radius.
 ALIKE = 0.5  # Patches overlap only if the cosine between their normals is more.
 
 
@@ -74,17 +76,40 @@ def share_range(patch, others=None):
 
 def _draw_above(patch, others):
     """Draws a patch above those that it overlaps, by a modifier that rendering and most exports leave out."""
-    taken = {obj.get(LAYER, 0) for obj in others if _overlap(patch[RECORD], obj[RECORD])}
+    over = [obj for obj in others if _overlap(patch[RECORD], obj[RECORD])]
+    taken = {obj.get(LAYER, 0) for obj in over}
     patch[LAYER] = next(number for number in range(len(taken) + 1) if number not in taken)
+    higher = [obj for obj in over if obj[LAYER] > patch[LAYER]]
+    for obj in (patch, *sorted(higher, key=lambda each: each[LAYER])):
+        below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
+        below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
+        height = max((_height(each) + _layer(obj[RECORD], each[RECORD]) for each in below), default=0.0)
+        for part in filter(None, (obj, contours_of(obj))):
+            _lift(part, height)
+
+
+def _layer(upper, lower):
+    """How far above another a patch is drawn: by more than both may be off, as two in one place flicker."""
+    apart = APART * (upper["height_std"] + lower["height_std"])
+    return min(max(apart, LEAST_LAYER * upper["radius"]), MOST_LAYER * upper["radius"])
+
+
+def _height(patch):
     modifier = patch.modifiers.get(ABOVE_OTHERS)
-    if patch[LAYER] == 0:
+    return 0.0 if modifier is None else modifier.strength
+
+
+def _lift(obj, height):
+    """Draws a patch or its contours higher along the patch's normal."""
+    modifier = obj.modifiers.get(ABOVE_OTHERS)
+    if height == 0.0:
         if modifier is not None:
-            patch.modifiers.remove(modifier)
+            obj.modifiers.remove(modifier)
         return
     if modifier is None:
-        modifier = patch.modifiers.new(ABOVE_OTHERS, "DISPLACE")
-    modifier.mid_level, modifier.show_render = 0.0, False
-    modifier.strength = LAYER_HEIGHT * patch[LAYER] * patch[RECORD]["radius"]
+        modifier = obj.modifiers.new(ABOVE_OTHERS, "DISPLACE")
+    modifier.direction, modifier.mid_level, modifier.show_render = "Z", 0.0, False
+    modifier.strength = height
 
 
 def _overlap(a, b):

@@ -33,7 +33,7 @@ class GrowingPatches:
         scene.collection.objects.link(obj)  # A collection of its own might be left empty.
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
-        obj.data.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
+        obj.data.materials.append(emission("Tactile Surface", attribute=patch_record.COLOR))
         self._uid, self._patches, self._above = obj.session_uid, [], DRAWN_ABOVE * surface.size
         show_colors()
 
@@ -93,7 +93,7 @@ def insert(scene, name, whole, report):
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin), True
     patch_object.collection(scene).objects.link(obj)
-    mesh.materials.append(emission("Tactile Curvature", attribute=patch_record.COLOR))
+    mesh.materials.append(emission("Tactile Surface", attribute=patch_record.COLOR))
     rewrite(obj, whole, report | {"source": name})
     show_colors()
     return obj

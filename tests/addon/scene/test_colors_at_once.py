@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A patch shows its colors without a button: viewports, the range of colors, its rim, maps below it."""
 
+import itertools
 import math
 
 import numpy as np
@@ -22,8 +23,8 @@ def shadings(bpy):
     return [area.spaces.active.shading for area in areas]
 
 
-def touch(bpy, location, **arguments):
-    bpy.ops.tactile.reconstruct(target="Sphere", location=location, extent=0.4, **arguments)
+def touch(bpy, location, target="Sphere", extent=0.4, **arguments):
+    bpy.ops.tactile.reconstruct(target=target, location=location, extent=extent, **arguments)
     return bpy.context.object
 
 
@@ -81,6 +82,46 @@ def test_patches_over_each_other_do_not_flicker(empty, ball):
     empty.data.objects.remove(first)
     third = touch(empty, (0, 0.1, 0.995))
     assert len(third.modifiers) == 0
+
+
+def test_patches_that_differ_by_their_errors_do_not_run_through_each_other(empty):
+    """On the facets of a cylinder they differ by more than a share of the radius, and contours go along."""
+    empty.ops.mesh.primitive_cylinder_add()
+    empty.context.object.name = "Sphere"
+    touches = [touch(empty, place) for place in ((0.3, -0.95, 0.0), (-0.2, -0.98, -0.3), (0.3, -0.95, 0.8))]
+    depsgraph = empty.context.evaluated_depsgraph_get()
+    for lower, upper in itertools.pairwise(touches):
+        to_lower = lower.matrix_world.inverted() @ upper.matrix_world
+        below = lower.evaluated_get(depsgraph)
+        for vertex in upper.evaluated_get(depsgraph).data.vertices:
+            place = to_lower @ vertex.co
+            _, nearest, normal, _ = below.closest_point_on_mesh(place)
+            aside = (place - nearest) - (place - nearest).dot(normal) * normal
+            assert aside.length > 1e-3 or (place - nearest).dot(normal) > 0.0
+    (lines,) = touches[1].children
+    assert lines.modifiers[0].strength == touches[1].modifiers[0].strength > 0.0
+
+
+def test_eevee_draws_a_patch_above_the_mesh_where_it_is_below_it(empty):
+    empty.ops.mesh.primitive_monkey_add()
+    empty.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    patch = touch(empty, (0.3, -0.3, 0.9), target="Suzanne")
+    deepest = -values(patch.data, "deviation").min()
+    radius = patch["tactile"]["radius"]
+    assert 0.01 * radius < deepest < 0.05 * radius
+    for obj in (patch, *patch.children):
+        assert obj["tactile_above"] > deepest
+
+
+def test_contacts_that_are_close_together_do_not_run_into_a_bar(empty):
+    empty.ops.mesh.primitive_cube_add()
+    empty.context.object.name = "Sphere"
+    patch = touch(empty, (-0.9, 0.4, 1.0), step=0.02)
+    (lines,) = patch.children
+    contour, contact = values(lines.data, "contour"), values(lines.data, "contact")
+    points = positions(lines.data)
+    dots = points[(contour == 0) & (contact == 1)]
+    assert 0.0 < np.ptp(dots, axis=0).max() < 0.02
 
 
 def test_eevee_draws_a_patch_above_the_mesh_it_lies_in(empty, ball):
