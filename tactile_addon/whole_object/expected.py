@@ -10,6 +10,7 @@ from ... import core
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.wording import many
+from .object_report import LEAST_NUMBER
 from .object_touches import tolerance_of
 
 TRIED, SEED = 12, 0  # So many touches are made to know.
@@ -37,7 +38,8 @@ class Expected:
             touches, seconds = expected(self._mesh, tolerance, noise)
             self._given = given
             about = f"{many(touches, 'touch', 'touches')}, {_time(seconds)}"
-            self._words = f"Tolerance {units.length(tolerance)}: about {about}"
+            unit = units.unit_of(context.scene, LEAST_NUMBER * tolerance)
+            self._words = f"Tolerance {units.length(tolerance, unit)}: about {about}"
         return self._words
 
 

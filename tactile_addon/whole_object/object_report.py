@@ -8,12 +8,13 @@ import numpy as np
 from ..touch import units
 from ..touch.wording import many, table, vector
 
+LEAST_NUMBER = 10.0  # Lengths are in a unit that suits so many tolerances.
 ZERO = 1e-6  # A distance below this share of the size counts as 0.
 
 
 def unit_of(record):
     """The unit of a report, which has lengths from below the tolerance to far above it."""
-    return units.unit_of(bpy.context.scene, 10.0 * (record["tolerance"] or record["height_std"]))
+    return units.unit_of(bpy.context.scene, LEAST_NUMBER * (record["tolerance"] or record["height_std"]))
 
 
 def object_readable(record):
