@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from . import colors
-from .mesh_data import own_mesh, values
+from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
     COLOR,
@@ -83,15 +83,18 @@ def _draw_above(patch, others):
     for obj in (patch, *sorted(higher, key=lambda each: each[LAYER])):
         below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
         below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
-        height = max((_height(each) + _layer(obj[RECORD], each[RECORD]) for each in below), default=0.0)
+        height = max((_height(each) + _layer(obj, each) for each in below), default=0.0)
         for part in filter(None, (obj, contours_of(obj))):
             _lift(part, height)
 
 
 def _layer(upper, lower):
     """How far above another a patch is drawn: by more than both may be off, as two in one place flicker."""
-    apart = APART * (upper["height_std"] + lower["height_std"])
-    return min(max(apart, LEAST_LAYER * upper["radius"]), MOST_LAYER * upper["radius"])
+    radius = upper[RECORD]["radius"]
+    apart = APART * (upper[RECORD]["height_std"] + lower[RECORD]["height_std"])
+    # Eevee draws each of them above the mesh as well, the lower one perhaps by more.
+    further = max(lower.get(ABOVE, 0.0) - upper.get(ABOVE, 0.0), 0.0)
+    return min(max(apart, LEAST_LAYER * radius), MOST_LAYER * radius) + further
 
 
 def _height(patch):
