@@ -66,7 +66,8 @@ def verdict(report, unit):
     early = [(count, where) for count, where in ends if where.endswith(EARLY)]
     if early:
         count, where = early[0]
-        return f"Good, with {count} of {stops.total()} half curves cut short {where}"
+        number = "all" if count == stops.total() else f"{count} of {stops.total()}"
+        return f"Good, with {number} half curves cut short {where}"
     return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
 
 

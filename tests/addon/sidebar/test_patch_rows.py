@@ -63,6 +63,8 @@ def test_the_verdict_says_what_limits_a_good_patch(wording, empty):
     (patch,) = empty.context.object.children
     words = wording.verdict(patch["tactile"].to_dict(), UNIT)
     assert words == "Good, with 3 of 6 half curves cut short at a crease"
+    report = patch["tactile"].to_dict() | {"stops": [["crease", "crease"]] * 3}
+    assert wording.verdict(report, UNIT) == "Good, with all half curves cut short at a crease"
 
 
 @pytest.mark.parametrize("status", ["uncertain", "not_converged"])

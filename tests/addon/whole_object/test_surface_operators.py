@@ -85,7 +85,7 @@ def test_quick_and_fine_have_other_tolerances(empty, ball):
 def test_a_dialog_can_tell_how_many_touches_there_will_be(extension, empty, ball):
     expected = extension.tactile_addon.whole_object.expected.Expected()
     words = expected.words(ball, empty.context, 0.02, "normal", 0.0)
-    assert words.startswith("Tolerance 2 cm: about ") and " touches, " in words
+    assert words.startswith("Tolerance 0.02 m: about ") and " touches, " in words
     count = int(words.split()[4])
     record = made(empty.ops.tactile.touch_all_over, "tactile_object", tolerance=0.02)[1]
     assert 0.5 < count / record["touches"] < 2.0
