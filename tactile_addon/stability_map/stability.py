@@ -63,6 +63,9 @@ class StabilityMap:
         import scipy.spatial  # noqa: F401  # The import takes half a second, too long between redraws.
 
         self.surface = DetachedMesh(obj, depsgraph)
+        # A probe knows only the bounding box, and must find there what the map shows.
+        evaluated, linear, _ = evaluated_object(obj, depsgraph)
+        self._farthest = FARTHEST_SHARE * size_of(evaluated, linear)
         if not spacing >= 0.0:  # NaN fails every comparison, so it is refused, too.
             raise ValueError(f"The spacing is a length of 0 or more, got {length(spacing)}")
         usual = extent or EXTENT_SHARE * self.surface.size
@@ -118,7 +121,7 @@ class StabilityMap:
             surface.points[chosen],
             surface.normals[chosen],
             self.planes,
-            farthest=FARTHEST_SHARE * surface.size,
+            farthest=self._farthest,
             extent=self.extent or "auto",
             step=self.step or "auto",
             noise=self.noise,

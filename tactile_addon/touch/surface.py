@@ -11,6 +11,8 @@ from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object,
 
 MANY = 8  # So many times as many vertices as are wanted are looked at first, before all are.
 WALK = 8  # The way to the nearest point of a stretched object has at most so many steps; mostly two or three.
+AT_VERTEX = 1e-4  # A point that is nearer to a vertex than this share of its face's size is that vertex.
+SMOOTH = 0.77  # The cosine between the normals of a vertex and of a face beside it is more, but on a crease.
 
 
 class MeshSurface(PlacedMesh):
@@ -75,7 +77,11 @@ class MeshSurface(PlacedMesh):
         return self._co @ self._linear.T + self._origin, faces[:, ::-1] if mirrored else faces
 
     def project(self, location):
-        """The (point, unit normal) of the mesh nearest to the world `location`, and the distance."""
+        """The (point, unit normal) of the mesh nearest to the world `location`, and the distance.
+
+        At a vertex no face is nearer than the others, so the normal there is the vertex's, unless that is on
+        a crease.
+        """
         found = self._walk(location, location)
         gram = self._linear.T @ self._linear
         stretched = not np.allclose(gram, gram[0, 0] * np.eye(3), rtol=0.0, atol=1e-4 * gram[0, 0])
@@ -84,7 +90,20 @@ class MeshSurface(PlacedMesh):
             offsets = self._co @ self._linear.T - np.subtract(location, self._origin)
             nearest = self._co[np.argmin(np.einsum("ij,ij->i", offsets, offsets))]
             found = min(found, self._walk(self._to_world(nearest.tolist()), location), key=lambda f: f[2])
-        return found
+        point, normal, distance = found
+        return point, self._vertex_normal(point, normal), distance
+
+    def _vertex_normal(self, point, normal):
+        """The unit normal of the vertex at a world point, if that is like `normal`; else `normal`."""
+        number = self.face_near(point)
+        gaps = np.linalg.norm(self.corners_of(number) - point, axis=1)
+        corner = int(np.argmin(gaps))
+        if gaps[corner] > AT_VERTEX * gaps.max():
+            return normal
+        vertex = self._mesh.polygons[number].vertices[corner]
+        mean = np.array(self._mesh.vertex_normals[vertex].vector) @ self._inverse
+        mean /= max(np.linalg.norm(mean), 1e-30)
+        return mean.tolist() if np.dot(mean, normal) > SMOOTH else normal
 
     def _walk(self, start, location):
         """The nearest point, downhill from the one that is nearest to `start` as the object measures.

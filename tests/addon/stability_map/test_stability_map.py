@@ -71,6 +71,23 @@ def test_what_a_map_says_is_what_a_touch_says(empty):
         assert values(painted.data, "blind_share")[vertex] == pytest.approx(report["blind"] / 20)
 
 
+def test_what_a_map_calls_a_patch_a_probe_on_it_finds(empty):
+    """At a vertex the facets around differ, and both take the normal of the vertex instead."""
+    empty.ops.mesh.primitive_monkey_add()
+    head = empty.context.object
+    head.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    painted, _ = stability_map(empty, spacing=0.25)
+    is_patch = values(painted.data, "is_touched").astype(bool) & (values(painted.data, "reason") == 0)
+    places = [tuple(place) for place in positions(painted.data)[is_patch]]
+    assert len(places) > 20
+    found = []
+    for place in places:
+        empty.ops.tactile.pick(target=head.name, location=place, new=True)
+        (patch,) = empty.context.object.children
+        found.append(patch["tactile"]["status"])
+    assert found.count("ok") == len(found)
+
+
 @pytest.fixture
 def ridge(empty):
     """The active object: a sheet, 2 wide, with a ridge along y."""
