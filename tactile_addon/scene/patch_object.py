@@ -34,6 +34,7 @@ NORMAL, PLACE = "custom_normal", "domain_place"  # Attributes: normals for shadi
 # It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
 # most, and by so many deviations of its height until it is compared with the mesh.
 DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 5e-2, 3.0
+STEEP = 1.7  # Where a patch is steep, it has to go up by so many times as much.
 
 
 def insert(scene, touched, parent=None, lines=None):
@@ -110,7 +111,7 @@ def _above(patch, touched):
     """How far above the mesh a patch and its contours are drawn where they would lie in it."""
     radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
     if touched.report["is_verified"] and touched.surface is not None:
-        deepest = max(deepest, -1.1 * float(values(patch.data, "deviation").min()))
+        deepest = max(deepest, -STEEP * float(values(patch.data, "deviation").min()))
     return min(max(deepest, DRAWN_ABOVE * radius), MOST_ABOVE * radius)
 
 
