@@ -30,6 +30,7 @@ from .samples import indicated
 FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
 LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above so many tolerances.
 OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from so many of both away.
+IMPROVABLE = 0.5  # A touch improves the surface where a contact is so many tolerances away.
 THIN = 0.9  # Walls are resolved from this share of the thickness that cells are made for.
 BORDER = 2.0  # Beyond the border of the mesh it does from so many edges away.
 WITHIN_90 = 1.645  # So many deviations are a 90 % interval.
@@ -192,11 +193,19 @@ class Atlas:
     @property
     def contradicting(self) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than is explained."""
+        stds = self._contacts[1]
+        return self._farther(np.maximum(OFF_STDS * stds, OFF_TOLERANCES * (self.tolerance or 0.0)))
+
+    @property
+    def improvable(self) -> NDArray[np.bool_]:
+        """Which contacts of the check (n,) are so far from the surface that a touch there improves it."""
+        return self._farther(IMPROVABLE * (self.tolerance or 0.0))
+
+    def _farther(self, length: Array | float) -> NDArray[np.bool_]:
+        """Which contacts of the check (n,) are farther from the surface than lengths (n,)."""
         distance, std = self._contacts
-        explained = np.maximum(OFF_STDS * std, OFF_TOLERANCES * (self.tolerance or 0.0))
         # The mesh may end an edge or so before a border of the object.
-        explained[np.isinf(std)] = BORDER * self.reference.edge
-        return np.abs(distance) > explained
+        return np.abs(distance) > np.where(np.isinf(std), BORDER * self.reference.edge, length)
 
     def widened(self) -> Generator[float, None, "Atlas"]:
         """The atlas with deviations so large that 90 % of its check's contacts are in the 90 % interval.

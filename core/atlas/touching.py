@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
@@ -38,6 +38,7 @@ NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 3  # Where something is missing or less certain, touches go on at most so often.
 CHECKS, CHECK_SEED = 256, 0  # So many rays from outside check the surface.
 HAIR = 0.01  # It is cast again this share of the tolerance aside.
+SHARPEST = 64  # So many more go to its sharpest vertices.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
 BORDERS = 2  # So often a mesh is moved to the borders that are felt.
@@ -226,39 +227,25 @@ class _Run:
         some, more = contacts[: self.most - self.done], True
         new: list[Exploration] = []
         if some:
-            new, more = yield from _told(self.touch(some, farthest, [SMALL] * len(some)), self.now)
+            new, more = yield from _told(self.touch(some, farthest, [NARROW] * len(some)), self.now)
         more = _goes_on((yield self.now(new=new))) and more
         return (yield from _all_over(self, more))
 
     def check(self, reference: ReferenceMesh) -> Check:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
-        rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
-        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-        middle, far = 0.5 * (low + high), float(np.linalg.norm(high - low))
-        starts = rng.normal(size=(CHECKS, 3))
-        starts *= far / np.linalg.norm(starts, axis=1, keepdims=True)
-        starts += middle
-        # Half of the rays go to places of the surface, the others to any place near the object.
-        aims = middle + 0.5 * far * rng.uniform(-1.0, 1.0, (CHECKS, 3))
-        aimed = rng.integers(len(mesh.triangles), size=CHECKS // 2)
-        aims[: CHECKS // 2] = mesh.vertices[mesh.triangles[aimed]].mean(axis=1)
-        ways = aims - starts
-        away = np.linalg.norm(ways, axis=1)
-        ways /= away[:, None]
-        # The triangle's own normal counts: that of a vertex on a crease is between those of its walls.
-        facing = np.einsum("ni,ni->n", reference.normals[aimed], ways[: CHECKS // 2]) < -STRAIGHT
+        starts, aims, facing, length = rays_at(reference)
+        ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
         found, missed = [], []
-        for i in range(CHECKS):
+        for start, way, aim, is_facing in zip(starts, ways, aims, facing, strict=True):
             # Between two faces of a mesh a ray may slip through. A hair's breadth aside it does not.
             for aside in (0.0, HAIR * self.tolerance):
-                start = vector_of(starts[i] + aside)
-                contact = self.frontier.finger.met(start, vector_of(ways[i]), 3.0 * far)
+                contact = self.frontier.finger.met(vector_of(start + aside), vector_of(way), length)
                 if contact is not None:
                     found.append(contact)
                     break
             else:
-                if i < len(facing) and facing[i]:
-                    missed.append(aims[i])
+                if is_facing:
+                    missed.append(aim)
         points, normals = np.array(found).reshape(-1, 2, 3).transpose(1, 0, 2)
         return Check(points, normals, np.array(missed).reshape(-1, 3))
 
@@ -285,7 +272,7 @@ class _Run:
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
         cut_short = self.done >= self.most
         atlas = Atlas(patches, charts, reference, self.tolerance, places, check, taps, border, cut_short)
-        off = atlas.contradicting
+        off = atlas.improvable
         yield 1.0
         atlas = yield from atlas.widened()
         contacts: list[Contact] = [contact for _, contact in uncovered]
@@ -305,6 +292,41 @@ class _Run:
             apart = ROUGH_APART * self.frontier.charts.radii[mesh.patch[worst]]
             left = left[((mesh.vertices[left] - mesh.vertices[worst]) ** 2).sum(axis=1) > apart**2]
         return found
+
+
+def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
+    """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
+
+    Also whether each must meet something there, (k,), and the length of all, which ends beyond the mesh.
+    A part goes to places of the surface, a part to any place near it, and the last to its sharpest vertices.
+    """
+    rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    middle, far = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    away = rng.normal(size=(CHECKS, 3))
+    away *= far / np.linalg.norm(away, axis=1, keepdims=True)
+    aims = middle + 0.5 * far * rng.uniform(-1.0, 1.0, (CHECKS, 3))
+    aimed = rng.integers(len(mesh.triangles), size=CHECKS // 2)
+    aims[: CHECKS // 2] = mesh.vertices[mesh.triangles[aimed]].mean(axis=1)
+    ways = (aims - middle - away)[: CHECKS // 2]
+    # The triangle's own normal counts: that of a vertex on a crease is between those of its walls.
+    ahead = np.einsum("ni,ni->n", reference.normals[aimed], ways)
+    facing = np.zeros(CHECKS + SHARPEST, dtype=bool)
+    facing[: CHECKS // 2] = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
+    sharpest = np.argsort(angles_of(mesh), kind="stable")[:SHARPEST]
+    up = away[: len(sharpest)]
+    up = up * np.copysign(1.0, np.einsum("ni,ni->n", up, mesh.normals[sharpest]))[:, None]
+    starts = np.vstack([middle + away, mesh.vertices[sharpest] + up])
+    return starts, np.vstack([aims, mesh.vertices[sharpest]]), facing[: len(starts)], 3.0 * far
+
+
+def angles_of(mesh: Mesh) -> Array:
+    """The angles at each vertex (n,) of its triangles together: 2 pi where the surface is flat."""
+    corners = mesh.vertices[mesh.triangles]
+    one, other = (np.roll(corners, -k, axis=1) - corners for k in (1, 2))
+    across, along = np.linalg.norm(np.cross(one, other), axis=2), np.einsum("nki,nki->nk", one, other)
+    found: Array = np.bincount(mesh.triangles.ravel(), np.arctan2(across, along).ravel(), len(mesh.vertices))
+    return found
 
 
 def _joined(run: _Run, more: bool) -> Steps:
