@@ -223,12 +223,8 @@ class Atlas:
             factor = float(np.quantile(stds, 0.9)) / WITHIN_90
             if factor <= 1.0:
                 break
-            mesh = found.reference.mesh
-            found = replace(
-                found,
-                charts=replace(found.charts, stds=factor * found.charts.stds),
-                reference=replace(found.reference, mesh=mesh._replace(std=factor * mesh.std)),
-            )
+            charts, reference = found.charts.widened(factor), found.reference.widened(factor)
+            found = replace(found, charts=charts, reference=reference)
             yield 1.0
         return found
 

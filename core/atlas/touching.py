@@ -83,6 +83,9 @@ def touch_all_over(
     If it is sent anything false other than None, it stops touching and joins the patches so far. Arguments
     and errors are those of `explore_object`; errors are raised in the first step.
     """
+    # Otherwise later steps would import these, which takes longer than a step may.
+    from scipy import fft, linalg, ndimage, sparse, spatial  # noqa: F401
+
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     tolerance, noise = number("tolerance", tolerance, above=0.0), number("noise", noise, least=0.0)
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
@@ -231,9 +234,10 @@ class _Run:
         more = _goes_on((yield self.now(new=new))) and more
         return (yield from _all_over(self, more))
 
-    def check(self, reference: ReferenceMesh) -> Check:
+    def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
         starts, aims, facing, length = rays_at(reference)
+        yield 1.0
         ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
         found, missed = [], []
         for start, way, aim, is_facing in zip(starts, ways, aims, facing, strict=True):
@@ -261,12 +265,13 @@ class _Run:
         charts = yield from _part(agreed(charts), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
         reference = yield from _part(surfaced(patches, charts, self.tolerance), JOINED, 1.0)
+        yield 1.0
         for _ in range(BORDERS):
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
             border = yield from _part(steps, 1.0, 1.0)
             reference = replace(reference, mesh=bordered(reference.mesh, border))
         yield from reference.prepared()
-        check = self.check(reference)
+        check = yield from self.check(reference)
         yield 1.0
         uncovered = yield from self.frontier.uncovered(reference)
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
@@ -313,20 +318,11 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     ahead = np.einsum("ni,ni->n", reference.normals[aimed], ways)
     facing = np.zeros(CHECKS + SHARPEST, dtype=bool)
     facing[: CHECKS // 2] = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
-    sharpest = np.argsort(angles_of(mesh), kind="stable")[:SHARPEST]
+    sharpest = np.argsort(reference.angles, kind="stable")[:SHARPEST]
     up = away[: len(sharpest)]
     up = up * np.copysign(1.0, np.einsum("ni,ni->n", up, mesh.normals[sharpest]))[:, None]
     starts = np.vstack([middle + away, mesh.vertices[sharpest] + up])
     return starts, np.vstack([aims, mesh.vertices[sharpest]]), facing[: len(starts)], 3.0 * far
-
-
-def angles_of(mesh: Mesh) -> Array:
-    """The angles at each vertex (n,) of its triangles together: 2 pi where the surface is flat."""
-    corners = mesh.vertices[mesh.triangles]
-    one, other = (np.roll(corners, -k, axis=1) - corners for k in (1, 2))
-    across, along = np.linalg.norm(np.cross(one, other), axis=2), np.einsum("nki,nki->nk", one, other)
-    found: Array = np.bincount(mesh.triangles.ravel(), np.arctan2(across, along).ravel(), len(mesh.vertices))
-    return found
 
 
 def _joined(run: _Run, more: bool) -> Steps:

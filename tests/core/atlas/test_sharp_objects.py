@@ -10,7 +10,7 @@ import pytest
 import core
 from core.atlas.creases import creased
 from core.atlas.reference_mesh import ReferenceMesh, closest
-from core.atlas.touching import SHARPEST, angles_of, rays_at
+from core.atlas.touching import SHARPEST, rays_at
 from core.exploration.side_by_side import result_of
 from tests import solids
 
@@ -145,7 +145,7 @@ def test_the_sharpest_places_are_checked_and_touched_again():
 
 
 def test_angles_around_a_vertex_are_those_of_its_triangles(block):
-    angles = angles_of(block.reference.mesh)
+    angles = block.reference.angles
     corners = np.linalg.norm(block.reference.mesh.vertices[:, None] - CORNERS, axis=2).argmin(axis=0)
     assert angles[corners] == pytest.approx(1.5 * np.pi, abs=0.02)
     assert (2.0 * np.pi - angles).sum() == pytest.approx(4.0 * np.pi)  # Gauss and Bonnet: 2 pi times 2
