@@ -369,20 +369,30 @@ SETTINGS = {
 def choose(scans, count):
     """Prints for each scan the setting with the least interval score on the others.
 
-    Scores and errors are shares of those of the process.
+    Scores and errors are shares of those of the process; in the second table errors are shares of those of
+    the best peer on that scan, by the number of planes.
     """
-    methods = {PROCESS: quadric_process} | {name: partial(ours, **v) for name, v in SETTINGS.items()}
+    methods = {peer: METHODS[peer] for peer in PEERS}
+    methods |= {name: partial(ours, **v) for name, v in SETTINGS.items()}
     scores = {scan.name: fixed_scores(scan, count, methods)[0] for scan in scans}
 
     def share(name, setting):
         return np.mean([of[setting].interval / of[PROCESS].interval for of in scores[name].values()])
 
-    rows = []
+    rows, ratios = [], []
     for name, of in scores.items():
         others = {s: np.mean([share(other, s) for other in scores if other != name]) for s in SETTINGS}
         best = min(others, key=others.__getitem__)
         errors = np.mean([cell[best].error / cell[PROCESS].error for cell in of.values()])
         covered = np.mean([cell[best].covered for cell in of.values()])
+        by_planes = [[cell for key, cell in of.items() if key[0] == planes] for planes in PLANES]
+        ratios.append(
+            [
+                np.mean([cell[best].error for cell in cells])
+                / min(np.mean([cell[peer].error for cell in cells]) for peer in PEERS)
+                for cells in by_planes
+            ]
+        )
         rows.append(
             [name, best, f"{others[best]:.3f}", f"{share(name, best):.3f}", f"{errors:.3f}", f"{covered:.2f}"]
         )
@@ -390,6 +400,11 @@ def choose(scans, count):
         ["left out", "chosen on the others", "score there", "score here", "error here", "within"],
         rows,
         left=2,
+    )
+    table(
+        ["scan", *(f"{planes} planes" for planes in PLANES)],
+        [[name, *(f"{v:.2f}" for v in of)] for name, of in zip(scores, ratios, strict=True)]
+        + [["mean", *(f"{v:.2f}" for v in np.mean(ratios, axis=0))]],
     )
 
 
