@@ -7,6 +7,7 @@ Each process computes on one thread, except those of benchmarks.threads.
 
 import os
 import platform
+import shutil
 import subprocess
 from importlib.metadata import version
 from pathlib import Path
@@ -27,12 +28,10 @@ def commit():
         run = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False)
         return run.stdout.strip()
 
-    changed = git("status", "--porcelain", "--untracked-files=no")
-    return (
-        f"later than {git('rev-parse', '--short', 'HEAD')}"
-        if changed
-        else git("rev-parse", "--short", "HEAD")
-    )
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        return ""
+    head = git("rev-parse", "--short", "HEAD")
+    return f"later than {head}" if git("status", "--porcelain", "--untracked-files=no") else head
 
 
 def machine(*packages):

@@ -42,7 +42,7 @@ from core.atlas.touching import SIZE
 from tests import solids
 from tools import blender
 
-from . import ROOT, SCANS_FOLDER, machine, table
+from . import SCANS_FOLDER, machine, table
 from .atlas_shapes import print_shapes
 from .real import Scan
 from .whole import EDGE, NOISE, away, cloud, contacts_of, matrices, poisson, put_together, spread, tree_of
@@ -135,7 +135,7 @@ class Blurred:
 
 
 def off_mesh(vertices, triangles, points):
-    """Distances (n,) of points (n, 3) from a mesh, in permille of the size."""
+    """Distances (n,) of points (n, 3) from a mesh, in ‰ of the size."""
     return 1e3 * away(tree_of(vertices, triangles), points)
 
 
@@ -337,15 +337,13 @@ def compared(thing, found, taps, cells, tolerance, some):
 
     If `some` names peers, there are only their rows, and only with the normals of the object as it is.
     """
-    others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]]
+    others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} ‰", cells[7], cells[4]]]
     others += peers(thing, found, taps, some)
     if some:
         return others, []
     badly = Blurred(thing)
     cells, _, again, more, _ = row(badly, tolerance)
-    others.append(
-        [thing.name, "this atlas, normals 10° off", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]
-    )
+    others.append([thing.name, "this atlas, normals 10° off", f"{1e3 * tolerance:g} ‰", cells[7], cells[4]])
     for line in peers(badly, again, more, "Poisson"):
         others.append([line[0], f"{line[1]}, normals 10° off", *line[2:]])
     count = min(len(found), len(thing.random))
@@ -372,7 +370,7 @@ def print_memory():
 
 
 NUMBERS = "At each dot is the tolerance, in ‰ of the size."
-DRAWN = ["object", "tolerance, permille", "touches", "CPU seconds", "mean distance, permille"]
+DRAWN = ["object", "tolerance, ‰", "touches", "CPU seconds", "mean distance, ‰"]
 
 
 def draw(numbers, caption):
@@ -459,7 +457,7 @@ def main():
         table(head.split("|"), bends)
     versions = machine("bpy", "numpy", "scipy")
     draw(numbers, f"{NUMBERS} On {versions}.")
-    print(f"Lengths are in permille of the size, times in CPU seconds; {versions}.")
+    print(f"Lengths are in ‰ of the size, times in CPU seconds; {versions}.")
 
 
 if __name__ == "__main__":

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Speed against accuracy: each fit of this project, and what else one could take, on the same contacts.
 
-`python -m benchmarks.chart [--quick | --redraw]`, from the root of a checkout. A peer whose package is missing
-is left out with a message. With --redraw the stored tables of docs/charts are drawn again, which takes a
-minute. The command writes to build/charts
+`python -m benchmarks.chart [--quick | --redraw]`, from the root of a checkout. A peer whose package is
+missing is left out with a message. With --redraw the stored tables of docs/charts are drawn again, which
+takes a minute. The command writes to build/charts
 
 speed_accuracy.png, .csv        from contacts to the heights of the hold-out: milliseconds and micrometers
 speed_accuracy_frame.png, .csv  normal and principal curvatures at the point: milliseconds, degrees and 1/mm

@@ -29,7 +29,7 @@ plt.rcParams.update({
 
 
 def save(figure, name, caption, header, rows):
-    """Writes build/charts/NAME.png, with the caption below, and NAME.csv, the caption and the table behind."""
+    """Writes build/charts/NAME.png, with the caption below, and NAME.csv with the table behind."""
     picture(figure, name, caption)
     with open(OUTPUT / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
         file.write(f"# {caption}\r\n")

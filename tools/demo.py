@@ -158,7 +158,7 @@ class _Overlay:
 
 
 def color_bar(extension, put, limit, unit):
-    """Adds a strip with the patch's own material from -limit to limit, with ticks and a title: these objects."""
+    """Adds a strip with the patch's own material from -limit to limit, ticks and a title; returns them."""
     import bpy
 
     module = extension.tactile_addon
