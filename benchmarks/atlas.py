@@ -391,7 +391,7 @@ def draw(numbers, caption):
                 axis.annotate(f"{place[2]:g}", place[:2], (4, 3), **look)
     axes[0].set(xlabel="touches", ylabel="mean distance, ‰ of the size")
     axes[1].set(xlabel="CPU seconds: touches, join and mesh")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=7, frameon=False)
+    axes[1].legend(loc="lower right", ncols=2)
     for axis in axes:
         axis.grid(alpha=0.3, which="both")
         for ticks in (axis.xaxis, axis.yaxis):
