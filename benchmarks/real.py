@@ -15,7 +15,8 @@ prints Markdown tables:
     refused, the doubts that are right, and the sure touches that are off.
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
-`--chart`, without `--only`, also draws build/charts/real_surfaces.png. `--only choose` chooses the constants
+`--chart`, without `--only`, also draws build/charts/real_surfaces.png, and `--redraw` only draws the numbers
+of docs/charts again. `--only choose` chooses the constants
 of the process for each scan on all others, and judges them on that one; `--only taps` does so with the
 constants of the taps.
 """
@@ -469,7 +470,13 @@ def main():
     parser.add_argument("--only", choices=("fixed", "automatic", "choose", "taps"), help="only this part")
     parser.add_argument("--chart", action="store_true", help="draw the chart as well")
     parser.add_argument("--scan", default="", help="only scans with this in their names")
+    parser.add_argument("--redraw", action="store_true", help="only draw docs/charts/real_surfaces.csv again")
     options = parser.parse_args()
+    if options.redraw:
+        from . import plot, real_chart
+
+        caption, _, rows = plot.stored("real_surfaces")
+        return real_chart.draw_rows(rows, caption)
     paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
     if not paths:
         sys.exit(f"real: there are no scans in {SCANS_FOLDER}")
