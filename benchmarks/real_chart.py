@@ -20,8 +20,8 @@ STYLES = (  # These are in the order of benchmarks.real's methods.
 AUTOMATIC = "automatic touch"
 CAPTION = (
     "scans, half curves of 1/32, 1/16 and 1/8 of the object, without noise. The times are medians of "
-    "processor time for a fit and 300 heights with three to six planes; the star is a touch with three planes that "
-    "chooses its extent and step, ray casts and all its fits included."
+    "processor time for a fit and 300 heights with three to six planes; the star is a touch with three "
+    "planes that chooses its extent and step, ray casts and all its fits included."
 )
 HEAD = ["method", "planes", "error", "within", "ms"]
 
