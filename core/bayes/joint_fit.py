@@ -19,7 +19,7 @@ from ..contours.local_geometry import UMBILIC
 from .evidence import Hyperparameters, hyperparameters
 from .posterior import SurfacePosterior
 from .prior import FREE, USUAL_WAVINESS, prior_mean, prior_variances
-from .sextic import Sextics, mean_given, posterior_given, sextics
+from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 
 # benchmarks.accuracy judges MISFIT, and the outliers of benchmarks.stability judge the last two.
 MISFIT = 2e-3  # The noise is at least this share of the radius, because no surface is a polynomial.
@@ -146,6 +146,9 @@ def _pass(
         stale = np.abs(state.weights - state.of_weights).max(axis=1) > STALE_WEIGHT
         state = _with_evidence(state, data, given.floor, stale | (step == 1))
     found = mean_given(data, state.hyper)
+    if data.slopes is not None:
+        data = with_scatter(data, found)
+        found = mean_given(data, state.hyper)
     mean = expected + found
     # Outliers can be told only once the axes are level.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
