@@ -53,11 +53,13 @@ class Check(NamedTuple):
 
     points, normals : (n, 3), where it met the object
     missed : (k, 3), places of the surface that it did not meet
+    at_random : so many contacts are at random places, and come first; the others are where errors are likely
     """
 
     points: Array
     normals: Array
     missed: Array
+    at_random: int
 
 
 def suggested_edge(patches: Sequence[Reconstruction], charts: Charts, indicator: Indicator) -> float:
@@ -213,9 +215,12 @@ class Atlas:
         Those that contradict the surface do not count: they are of something else. What patches differ by is
         a part of a deviation and does not grow with theirs, so they grow more than once. Yields 1 each time.
         """
-        found, within = self, ~self.contradicting
+        if self.check is None:
+            return self
+        found, count = self, self.check.at_random
+        within = ~self.contradicting[:count]
         for _ in range(WIDENINGS):
-            distance, std = found._contacts
+            distance, std = (values[:count] for values in found._contacts)
             felt = np.isfinite(std) & within
             if not felt.any():
                 break

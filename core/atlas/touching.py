@@ -38,7 +38,7 @@ NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 3  # Where something is missing or less certain, touches go on at most so often.
 CHECKS, CHECK_SEED = 256, 0  # So many rays from outside check the surface.
 HAIR = 0.01  # It is cast again this share of the tolerance aside.
-SHARPEST = 64  # So many more go to its sharpest vertices.
+SHARPEST, SPIKES = 64, 16  # So many more go to its sharpest vertices, and to the triangles around so many.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
 BORDERS = 2  # So often a mesh is moved to the borders that are felt.
@@ -239,19 +239,22 @@ class _Run:
         starts, aims, facing, length = rays_at(reference)
         yield 1.0
         ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
-        found, missed = [], []
-        for start, way, aim, is_facing in zip(starts, ways, aims, facing, strict=True):
-            # Between two faces of a mesh a ray may slip through. A hair's breadth aside it does not.
-            for aside in (0.0, HAIR * self.tolerance):
-                contact = self.frontier.finger.met(vector_of(start + aside), vector_of(way), length)
-                if contact is not None:
-                    found.append(contact)
-                    break
-            else:
-                if is_facing:
-                    missed.append(aim)
+        found, missed, at_random = [], [], 0
+        for i, (start, way, aim) in enumerate(zip(starts, ways, aims, strict=True)):
+            contact = self._met(start, vector_of(way), length)
+            if contact is not None:
+                found.append(contact)
+                at_random += i < CHECKS
+            elif i < len(facing) and facing[i]:
+                missed.append(aim)
         points, normals = np.array(found).reshape(-1, 2, 3).transpose(1, 0, 2)
-        return Check(points, normals, np.array(missed).reshape(-1, 3))
+        return Check(points, normals, np.array(missed).reshape(-1, 3), at_random)
+
+    def _met(self, start: Array, way: Vector, length: float) -> tuple[Vector, Vector] | None:
+        """The first contact of a ray: between faces of a mesh it may slip through, but not a hair aside."""
+        met = self.frontier.finger.met
+        aside = vector_of(start + HAIR * self.tolerance)
+        return met(vector_of(start), way, length) or met(aside, way, length)
 
     def atlas(
         self, known: dict[int, tuple[int, Table]]
@@ -302,8 +305,9 @@ class _Run:
 def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
     """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
 
-    Also whether each must meet something there, (k,), and the length of all, which ends beyond the mesh.
-    A part goes to places of the surface, a part to any place near it, and the last to its sharpest vertices.
+    Also whether each of the first must meet something there, (CHECKS / 2,), and the length of all, which ends
+    beyond the mesh. The first CHECKS are random: one half goes to places of the surface, the other to any
+    place near it. Others go to the sharpest vertices, and straight down to triangles around some of these.
     """
     rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -312,17 +316,20 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     away *= far / np.linalg.norm(away, axis=1, keepdims=True)
     aims = middle + 0.5 * far * rng.uniform(-1.0, 1.0, (CHECKS, 3))
     aimed = rng.integers(len(mesh.triangles), size=CHECKS // 2)
-    aims[: CHECKS // 2] = mesh.vertices[mesh.triangles[aimed]].mean(axis=1)
+    centers = mesh.vertices[mesh.triangles].mean(axis=1)
+    aims[: CHECKS // 2] = centers[aimed]
     ways = (aims - middle - away)[: CHECKS // 2]
     # The triangle's own normal counts: that of a vertex on a crease is between those of its walls.
     ahead = np.einsum("ni,ni->n", reference.normals[aimed], ways)
-    facing = np.zeros(CHECKS + SHARPEST, dtype=bool)
-    facing[: CHECKS // 2] = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
-    sharpest = np.argsort(reference.angles, kind="stable")[:SHARPEST]
+    facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
+    sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
     up = away[: len(sharpest)]
     up = up * np.copysign(1.0, np.einsum("ni,ni->n", up, mesh.normals[sharpest]))[:, None]
-    starts = np.vstack([middle + away, mesh.vertices[sharpest] + up])
-    return starts, np.vstack([aims, mesh.vertices[sharpest]]), facing[: len(starts)], 3.0 * far
+    around = np.unique(reference.fans[sharpest[:SPIKES]])
+    around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
+    down = far * reference.normals[around]
+    starts = np.vstack([middle + away, mesh.vertices[sharpest] + up, centers[around] + down])
+    return starts, np.vstack([aims, mesh.vertices[sharpest], centers[around]]), facing, 3.0 * far
 
 
 def _joined(run: _Run, more: bool) -> Steps:
