@@ -29,7 +29,7 @@ ZIP := build/tactile_patch.zip
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
 	$(shell find core presets tactile_addon docs -name __pycache__ -prune -o -print)
 
-.PHONY: help demo dataset test test-core test-cluster fuzz chart paper stability site film lesson sample zip zip-nowheels \
+.PHONY: help demo dataset test test-core test-cluster fuzz chart paper stability site figures film lesson sample zip zip-nowheels \
 	release clean
 
 help:
@@ -43,6 +43,7 @@ help:
 	@echo 'make dataset           touch some objects with two workers, tabulate and draw the results, in build'
 	@echo 'make test-cluster      run the tests of data sets, with Dask'
 	@echo 'make site              build the site of the documentation, in build/site/html'
+	@echo 'make figures [ONLY=X]  draw every picture of the documentation again that a command draws, or those named X'
 	@echo 'make film              draw the moving picture of the README again'
 	@echo 'make lesson            draw the pictures of docs/lesson.md again'
 	@echo 'make sample            make examples/sample.blend again, in Blender 4.5'
@@ -89,6 +90,9 @@ stability: $(ZIP) $(PEERS)
 site: $(SITE)/.ready
 	@NO_MKDOCS_2_WARNING=1 $(SITE)/bin/mkdocs build --quiet --strict
 	@$(SITE)/bin/python tools/check_site.py $(SITE)/html
+
+figures: $(ZIP) $(PEERS)
+	$(VENV_PY) -m tools.figures --only "$(ONLY)"
 
 film: $(ZIP) $(PEERS)
 	$(VENV_PY) -m tools.film --zip $(ZIP)

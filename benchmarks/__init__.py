@@ -7,6 +7,8 @@ Each process computes on one thread, except those of benchmarks.threads.
 
 import os
 import platform
+import shutil
+import subprocess
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -19,13 +21,28 @@ ROOT = Path(__file__).resolve().parents[1]
 SCANS_FOLDER = Path(os.environ.get("TACTILE_SCANS", ROOT.parent / "shared" / "data" / "meshes"))
 
 
+def commit():
+    """The commit of the code, "later than" it if files were changed since; nothing outside a checkout."""
+
+    def git(*words):
+        run = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False)
+        return run.stdout.strip()
+
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        return ""
+    head = git("rev-parse", "--short", "HEAD")
+    return f"later than {head}" if git("status", "--porcelain", "--untracked-files=no") else head
+
+
 def machine(*packages):
-    """The processor, Python and these installed packages with their versions, for a caption."""
+    """The processor, the commit, Python and these installed packages with their versions, for a caption."""
     cpu = platform.processor() or platform.machine()
     if (listing := Path("/proc/cpuinfo")).exists():
         lines = listing.read_text(encoding="utf-8").splitlines()
         cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), cpu)
-    versions = (f"{name} {version(name)}" for name in packages)
+    versions = [f"{name} {version(name)}" for name in packages]
+    if code := commit():
+        versions.append(f"commit {code}")
     return ", ".join([f"one thread, {cpu}; Python {platform.python_version()}", *versions])
 
 

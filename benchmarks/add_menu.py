@@ -3,7 +3,8 @@
 """What Blender's Add menu has, touched all over with the dialog's defaults, beside the result.
 
 `python -m benchmarks.add_menu ZIP [--only NAME]`, from the root of a checkout; ZIP is the built extension.
-It prints a Markdown table and draws build/charts/add_menu.png, objects above and what was felt of them below.
+It prints a Markdown table and draws build/charts/add_menu.jpg, objects above and what was felt of them below.
+With --scans the objects are a cube and the scans of a bottle and of a pear, in build/charts/touched.jpg.
 With --expected it only prints how many touches the dialog expects of each, which takes seconds.
 
 Deviations are those of the report, both ways between surface and object, in tolerances (1/500 of the size).
@@ -17,14 +18,16 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
+from PIL import Image
 
 from tests.solids import topology
 from tools import blender, demo
 
-from . import ROOT, machine, table
+from . import ROOT, SCANS_FOLDER, machine, table
 
 APART, SIZE = 1.1, 1.05  # Objects are so far apart in the picture, and their diagonal is so long.
 COLUMNS, WIDTH, SAMPLES = 6, 1800, 48
+TINTS = ((0.35, 0.35, 0.34, 1.0), (0.16, 0.3, 0.5, 1.0))  # Of objects, and of what was felt of them.
 
 
 def shapes():
@@ -59,6 +62,25 @@ def shapes():
         "letter": letter,
         "Suzanne": add.primitive_monkey_add,
         "Suzanne, subdivided": subdivided,
+    }
+
+
+def scans():
+    """Functions that add a cube, and scans of a bottle and of a pear, by name."""
+    import bpy
+
+    standing = (math.radians(90.0), 0.0, 0.0)  # Of what lies along the second axis.
+
+    def scan(name):
+        bpy.ops.wm.ply_import(filepath=str(SCANS_FOLDER / f"{name}.ply"))
+        bpy.ops.object.shade_smooth()
+        made = bpy.context.object
+        made.rotation_euler = standing if max(made.dimensions) > made.dimensions.z else (0.0, 0.0, 0.0)
+
+    return {
+        "cube": bpy.ops.mesh.primitive_cube_add,
+        "bottle": lambda: scan("bottle_bleach"),
+        "pear": lambda: scan("pear"),
     }
 
 
@@ -125,15 +147,18 @@ def placed(obj, column, line):
     )
 
 
-def draw(pairs):
-    """Draws the objects above what was felt of them."""
+def draw(pairs, name):
+    """Draws the objects above what was felt of them, to build/charts/NAME.jpg."""
     import bpy
 
     scene = bpy.context.scene
     for i, (source, made) in enumerate(pairs):
         made.data.materials.clear()
+        source.data.materials.clear()
         for line, obj in enumerate((source, made)):
             demo.look(scene, obj)
+            clay = obj.data.materials[0].node_tree.nodes["Principled BSDF"]
+            clay.inputs["Base Color"].default_value = TINTS[line]
             placed(obj, i % COLUMNS, 2 * (i // COLUMNS) + line)
     columns, lines = min(len(pairs), COLUMNS), 2 * math.ceil(len(pairs) / COLUMNS)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -144,15 +169,18 @@ def draw(pairs):
     for obj in (camera, sun):
         scene.collection.objects.link(obj)
     scene.camera = camera
-    path = ROOT / "build" / "charts" / "add_menu.png"
+    path = ROOT / "build" / "charts" / name
     path.parent.mkdir(parents=True, exist_ok=True)
-    demo.photograph(scene, path, WIDTH, round(WIDTH * lines / columns), SAMPLES)
+    demo.photograph(scene, path.with_suffix(".png"), WIDTH, round(WIDTH * lines / columns), SAMPLES)
+    with Image.open(path.with_suffix(".png")) as picture:
+        picture.convert("RGB").save(path.with_suffix(".jpg"), quality=88)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path, help="the built extension")
     parser.add_argument("--only", default="", help="only objects with this in their names")
+    parser.add_argument("--scans", action="store_true", help="a cube, a bottle and a pear instead")
     parser.add_argument("--expected", action="store_true", help="print only the touches that are expected")
     options = parser.parse_args()
     rows, pairs = [], []
@@ -167,7 +195,7 @@ def main():
         table(["object", "touches expected"], rows)
         return
     with blender.quiet():
-        for name, add in shapes().items():
+        for name, add in (scans() if options.scans else shapes()).items():
             if options.only in name:
                 source, made, seconds = touched(add)
                 rows.append(row(name, source, made, seconds))
@@ -176,7 +204,7 @@ def main():
                     obj.hide_set(True)
         for obj in bpy.data.objects:
             obj.hide_set(False)
-        draw(pairs)
+        draw(pairs, "touched" if options.scans else "add_menu")
     table(["object", "touches", "open / Euler / pieces", "mean", "largest", "CPU s", "status"], rows)
     print(f"{machine('bpy', 'numpy', 'scipy')}.")
 

@@ -5,7 +5,7 @@
 `python -m benchmarks.atlas [--only NAME] [--finest T] [--coarsest T] [--peers NAME]`, from the root of a
 checkout. It needs bpy to read the scans and to cast rays, and pymeshlab for three of the peers. Each object
 has the size 1, and contacts have a noise of .0005. The command draws build/charts/atlas.png and prints
-Markdown tables:
+Markdown tables; with --redraw it only draws docs/charts/atlas.csv again:
 
 (a) each object at five tolerances: the numbers of touches and contacts, and CPU seconds; the distances of
     points of the object from the mesh, and the share of these points that the field's 90 % interval holds;
@@ -42,7 +42,7 @@ from core.atlas.touching import SIZE
 from tests import solids
 from tools import blender
 
-from . import ROOT, SCANS_FOLDER, machine, table
+from . import SCANS_FOLDER, machine, table
 from .atlas_shapes import print_shapes
 from .real import Scan
 from .whole import EDGE, NOISE, away, cloud, contacts_of, matrices, poisson, put_together, spread, tree_of
@@ -135,7 +135,7 @@ class Blurred:
 
 
 def off_mesh(vertices, triangles, points):
-    """Distances (n,) of points (n, 3) from a mesh, in permille of the size."""
+    """Distances (n,) of points (n, 3) from a mesh, in ‰ of the size."""
     return 1e3 * away(tree_of(vertices, triangles), points)
 
 
@@ -234,7 +234,7 @@ def row(thing, tolerance):
     ]
     return (
         cells,
-        (thing.name, tolerance, len(atlas.patches), touching + meshing, off.mean()),
+        (thing.name, 1e3 * tolerance, len(atlas.patches), round(touching + meshing, 2), round(off.mean(), 4)),
         found,
         atlas.taps,
         [curved(thing, tolerance, atlas, mesh)] if isinstance(thing, Exact) else [],
@@ -337,15 +337,13 @@ def compared(thing, found, taps, cells, tolerance, some):
 
     If `some` names peers, there are only their rows, and only with the normals of the object as it is.
     """
-    others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]]
+    others = [[thing.name, "this atlas", f"{1e3 * tolerance:g} ‰", cells[7], cells[4]]]
     others += peers(thing, found, taps, some)
     if some:
         return others, []
     badly = Blurred(thing)
     cells, _, again, more, _ = row(badly, tolerance)
-    others.append(
-        [thing.name, "this atlas, normals 10° off", f"{1e3 * tolerance:g} permille", cells[7], cells[4]]
-    )
+    others.append([thing.name, "this atlas, normals 10° off", f"{1e3 * tolerance:g} ‰", cells[7], cells[4]])
     for line in peers(badly, again, more, "Poisson"):
         others.append([line[0], f"{line[1]}, normals 10° off", *line[2:]])
     count = min(len(found), len(thing.random))
@@ -371,21 +369,29 @@ def print_memory():
     print(f"{len(atlas.patches)} patches of at most 1000 touches, joined and meshed: {took:.0f} MB")
 
 
-def draw(numbers):
-    """Draws the mean distance against touches and against CPU seconds."""
-    import matplotlib
+NUMBERS = "At each dot is the tolerance, in ‰ of the size."
+DRAWN = ["object", "tolerance, ‰", "touches", "CPU seconds", "mean distance, ‰"]
 
-    matplotlib.use("agg")
-    from matplotlib import pyplot, ticker
 
-    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4.2), sharey=True, layout="constrained")
+def draw(numbers, caption):
+    """Draws the mean distance against touches and against CPU seconds, with the tolerance at each dot."""
+    from matplotlib import ticker
+
+    from . import plot
+
+    figure, axes = plot.plt.subplots(1, 2, figsize=(10, 4.2), sharey=True, layout="constrained")
     for name in dict.fromkeys(n[0] for n in numbers):
-        _, _, touches, seconds, off = zip(*(n for n in numbers if n[0] == name), strict=True)
+        # A line leads from the coarsest tolerance to the finest.
+        of = sorted((n for n in numbers if n[0] == name), key=lambda n: -n[1])
+        _, tolerances, touches, seconds, off = zip(*of, strict=True)
         for axis, x in zip(axes, (touches, seconds), strict=True):
-            axis.loglog(x, off, "o-", label=name.split("_")[0], markersize=4)
-    axes[0].set(xlabel="touches", ylabel="mean distance, permille of the size")
+            (line,) = axis.loglog(x, off, "o-", label=name.split("_")[0], markersize=4)
+            for place in zip(x, off, tolerances, strict=True):
+                look = {"textcoords": "offset points", "fontsize": 7, "color": line.get_color()}
+                axis.annotate(f"{place[2]:g}", place[:2], (4, 3), **look)
+    axes[0].set(xlabel="touches", ylabel="mean distance, ‰ of the size")
     axes[1].set(xlabel="CPU seconds: touches, join and mesh")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=7, frameon=False)
+    axes[1].legend(loc="lower right", ncols=2)
     for axis in axes:
         axis.grid(alpha=0.3, which="both")
         for ticks in (axis.xaxis, axis.yaxis):
@@ -393,9 +399,7 @@ def draw(numbers):
             ticks.set_major_formatter("{x:g}")
             ticks.set_minor_formatter(ticker.NullFormatter())
     figure.suptitle("Whole objects: how near, by touches and by time", weight="bold")
-    folder = ROOT / "build" / "charts"
-    folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / "atlas.png", dpi=110)
+    plot.save(figure, "atlas", caption, DRAWN, numbers)
 
 
 def main():
@@ -409,7 +413,14 @@ def main():
     parser.add_argument("--starts", type=int, default=8, help="so many starts of each of these (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first of these starts (%(default)s)")
     parser.add_argument("--places", type=int, default=20_000, help="places around each (%(default)s)")
+    parser.add_argument("--redraw", action="store_true", help="only draw docs/charts/atlas.csv again")
     options = parser.parse_args()
+    if options.redraw:
+        from . import plot
+
+        caption, _, numbers = plot.stored("atlas")
+        draw(numbers, caption)
+        return
     if options.memory:
         print_memory()
         return
@@ -444,8 +455,9 @@ def main():
     if bends:
         head = "object|tolerance|K|off|within 90 %|H|off|within 90 %|K of angle defects off|% unknown"
         table(head.split("|"), bends)
-    draw(numbers)
-    print(f"Lengths are in permille of the size, times in CPU seconds; {machine('bpy', 'numpy', 'scipy')}.")
+    versions = machine("bpy", "numpy", "scipy")
+    draw(numbers, f"{NUMBERS} On {versions}.")
+    print(f"Lengths are in ‰ of the size, times in CPU seconds; {versions}.")
 
 
 if __name__ == "__main__":

@@ -35,6 +35,8 @@ TOLERANCES = (0.002, 0.008)
 THINNEST = 10.0  # Objects are touched with a tolerance if no wall is thinner than so many of it.
 GAP = 10.0  # Two balls are so many tolerances from each other.
 SECTIONS = 128  # Round objects have so many facets around their axis.
+# Balls have more: 128 facets are as far off a ball as a patch is uncertain, and finer than its knots.
+BALL_SECTIONS = 256
 FILLET = 12  # A fillet has so many facets across.
 SHELLS = 160  # The hollow ball is touched at so many places.
 SAMPLES = 10_000
@@ -178,7 +180,7 @@ def revolved(profile, is_ring=False, sections=SECTIONS):
 
 def arc(radius, middle, low, high):
     """Radii and heights (n, 2) of an arc from one polar angle, against -z, to another."""
-    turns = np.linspace(low, high, SECTIONS // 2)
+    turns = np.linspace(low, high, BALL_SECTIONS // 2)
     found = np.column_stack([radius * np.sin(turns), middle - radius * np.cos(turns)])
     found[np.isin(turns, (0.0, np.pi)), 0] = 0.0
     return found
@@ -193,23 +195,29 @@ def both(one, two):
     return np.vstack([one[0], two[0]]), np.vstack([one[1], len(one[0]) + two[1]])
 
 
+def ball(radius, middle=0.0):
+    """A ball whose middle is at this height."""
+    return revolved(arc(radius, middle, 0.0, np.pi), sections=BALL_SECTIONS)
+
+
 def overlapping_balls(share):
     """Two balls of radius 1 that overlap by this share of their diameter."""
     half = 1.0 - share
     end = np.arccos(-half)
-    return revolved(np.vstack([arc(1.0, -half, 0.0, end), arc(1.0, half, np.pi - end, np.pi)[1:]]))
+    profile = np.vstack([arc(1.0, -half, 0.0, end), arc(1.0, half, np.pi - end, np.pi)[1:]])
+    return revolved(profile, sections=BALL_SECTIONS)
 
 
 def apart_balls(gap):
     """Two balls with this gap between them, as a share of what both measure."""
     middle = 1.0 + 2.0 * gap / (1.0 - gap)
-    return both(revolved(arc(1.0, -middle, 0.0, np.pi)), revolved(arc(1.0, middle, 0.0, np.pi)))
+    return both(ball(1.0, -middle), ball(1.0, middle))
 
 
 def hollow_ball(inner):
     """A ball of radius 1 with a cavity of radius `inner`."""
-    vertices, triangles = revolved(arc(inner, 0.0, 0.0, np.pi))
-    return both(revolved(arc(1.0, 0.0, 0.0, np.pi)), (vertices, triangles[:, ::-1]))
+    vertices, triangles = ball(inner)
+    return both(ball(1.0), (vertices, triangles[:, ::-1]))
 
 
 def cad_block():

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Speed against accuracy: each fit of this project, and what else one could take, on the same contacts.
 
-`python -m benchmarks.chart [--quick]`, from the root of a checkout. A peer whose package is missing is left
-out with a message. The command writes to build/charts
+`python -m benchmarks.chart [--quick | --redraw]`, from the root of a checkout. A peer whose package is
+missing is left out with a message. With --redraw the stored tables of docs/charts are drawn again, which
+takes a minute. The command writes to build/charts
 
 speed_accuracy.png, .csv        from contacts to the heights of the hold-out: milliseconds and micrometers
 speed_accuracy_frame.png, .csv  normal and principal curvatures at the point: milliseconds, degrees and 1/mm
@@ -34,6 +35,7 @@ SEEDS = 4  # The number of seeds of the noise in the full run.
 RINGS = 25  # The number of rings of a dense mesh, which has 1951 vertices.
 REPEATED = 0.02  # A method that takes fewer seconds is run three times more, for a median.
 LEAST_COVERED = 0.9  # A surface that covers less of the hold-out has failed.
+SAME = ("d2", "d3", "d4", "d6")  # Degrees whose marks would cover that of "auto".
 HOLLOW = "(hollow)"  # The label of methods that get more data than the others, so they do not compete.
 # Distributions whose names differ from their modules'.
 DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}
@@ -61,6 +63,7 @@ class Method(NamedTuple):
 
 OURS, PAPER, INTERPOLATION = "bayes: this project's default", "the paper's fits", "interpolation"
 PROCESSES, SPLINES, MESHES = "Gaussian processes", "splines", "meshes"
+FIXED = "fixed degree, under the mark of auto"
 CONTACTS = "75 contacts on three curves"
 DENSE = "dense mesh: 1951 vertices with the same noise"
 LOOKS = {
@@ -72,6 +75,12 @@ LOOKS = {
     MESHES: (plot.BLACK, "X"),
     CONTACTS: (plot.BLUE, "o"),
     DENSE: (plot.BLACK, "X"),
+}
+# Methods that do not look as the rest of their family.
+OWN_LOOKS = {
+    "paper": LOOKS[PAPER],
+    "jet 3": LOOKS[INTERPOLATION],
+    "jet 4": LOOKS[INTERPOLATION],
 }
 
 
@@ -94,7 +103,7 @@ def _peer(label, family, says, fit, *needs, **options):
 
 
 METHODS = [
-    *(_bayes(f"d{d}", "degree", degree=d) for d in (2, 3, 4, 6)),
+    *(_bayes(f"d{d}", FIXED, degree=d) for d in (2, 3, 4, 6)),
     _bayes("auto", "degree by evidence", degree="auto"),
     *(_bayes(f"{m} planes", f"degree 4, from more contacts {HOLLOW}", planes=m, degree=4) for m in (4, 5)),
     Method("auto touch", OURS, None, f"own extent and step, tracking included {HOLLOW}", touches=True),
@@ -319,7 +328,7 @@ def marks_of(table, noise, measure):
     return [
         Mark(row[0], row[1], HOLLOW in row[2], row[time : time + 3], row[error : error + 3])
         for row in rows
-        if row[3] == noise and np.isfinite(row[time])
+        if row[3] == noise and np.isfinite(row[time]) and row[0] not in SAME
     ]
 
 
@@ -331,7 +340,7 @@ def panel(axes, marks, noise, limits, off_scale=np.inf):
         ticks.set_major_formatter(lambda value, _: f"{value:g}" if value < off_scale else "")
     texts, places, beyond = [], [], 0
     for mark in marks:
-        color, shape = LOOKS[mark.family]
+        color, shape = OWN_LOOKS.get(mark.label, LOOKS[mark.family])
         x, y, text = mark.x[1], mark.y[1], mark.label
         if y > off_scale:
             text = f"{text} ↑ {y / 1e3:.1f} mm" if y < 1e4 else f"{text} ↑ {y / 1e3:.0f} mm"
@@ -369,16 +378,17 @@ def key(axes, methods, columns=False):
     lines = []
     for i, (family, of) in enumerate(families):
         line = 0 if columns else len(lines)
-        lines.append((i, line, family, family))
+        lines.append((i, line, LOOKS[family], family, True))
         for j, (says, same) in enumerate(groupby(of, key=lambda method: method.says), 1):
-            lines.append((i, line + j, family, f"{_listed([method.label for method in same])}: {says}"))
-    height = 1.0 / (1 + max(line for _, line, _, _ in lines))
-    for i, line, family, text in lines:
-        (color, shape), heading = LOOKS[family], text == family
+            labels = [method.label for method in same]
+            look = OWN_LOOKS.get(labels[0], LOOKS[family])
+            lines.append((i, line + j, look, f"{_listed(labels)}: {says}", False))
+    height = 1.0 / (1 + max(line for _, line, *_ in lines))
+    for i, line, (color, shape), text, heading in lines:
         x, y = i / len(families) if columns else 0.0, 1.0 - (line + 0.5) * height
         look = {"color": plot.dark(color), "weight": "bold" if heading else "normal", "fontsize": 8}
         axes.text(x + 0.04, y, text, transform=axes.transAxes, va="center", **look)
-        if heading:
+        if heading or (color, shape) != LOOKS[families[i][0]]:
             axes.plot(x + 0.01, y, shape, color=color, ms=7.0, transform=axes.transAxes, clip_on=False)
 
 
@@ -474,10 +484,25 @@ def captions(methods, quick):
     return cases + heights + known, cases + frame + known
 
 
+def redraw():
+    """Draws the stored tables again; the bounds are not stored, so all touches are made once more."""
+    caption, *table = plot.stored("speed_accuracy")
+    draw_heights(table, METHODS, caption)
+    bounds = {noise: [] for noise in accuracy.NOISES}
+    for touch in touches(quick=False):
+        bounds[touch.case.noise].append(accuracy.cramer_rao(touch.case))
+    caption, *table = plot.stored("speed_accuracy_frame")
+    draw_frame(table, FRAME_METHODS, {noise: np.median(of) for noise, of in bounds.items()}, caption)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="one plane set and seed")
+    parser.add_argument("--redraw", action="store_true", help="draw the tables of docs/charts again")
     options = parser.parse_args()
+    if options.redraw:
+        redraw()
+        return
     methods, frame_methods = available(METHODS), available(FRAME_METHODS)
     heights, frames, bounds = measured(methods, frame_methods, options.quick)
     of_heights, of_frame = captions([*methods, *frame_methods], options.quick)

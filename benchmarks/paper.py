@@ -421,8 +421,8 @@ def draw_sheets(scanned, errors):
         titles = ("the reference point", "from outside", "from inside")
         pictures = [[f"{name}_{column}" for column in (1, 2, 3)] for name in DRAWN_ROWS]
         caption = (
-            "black: the TAGC patch, where the mesh does not hide it · red lines: data curves\n"
-            "brown arrows: the Darboux frame · the mesh: its unit normal as red, green, blue"
+            "blue: the TAGC patch, where the mesh does not hide it · red lines: data curves\n"
+            "brown arrows: the Darboux frame"
         )
         paper_pictures.sheet("table_1", pictures, titles, DRAWN_ROWS.values(), caption)
     titles = (

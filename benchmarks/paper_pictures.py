@@ -16,7 +16,6 @@ TALL = 8.19  # The neck's patches are shown so many mm above and below the point
 FINE = 0.01  # The distance of vertices in a cut patch, as a share of the radius.
 SIZE = 480  # The width and height of a picture in a sheet, in pixels.
 INKS = {
-    "black": (0.004, 0.004, 0.004, 1.0),
     "red": (0.85, 0.01, 0.01, 1.0),
     "blue": (0.01, 0.08, 0.6, 1.0),
     "brown": (0.42, 0.18, 0.05, 1.0),
@@ -134,7 +133,7 @@ def draw_row(extension, place, r, contours):
         gone.hide_render = True
     _cut(stage, obj, place, r)
     points, triangles = r.mesh()
-    stage.mesh("Patch", r.frame.to_world(points), triangles, stage.ink("black"))
+    stage.mesh("Patch", r.frame.to_world(points), triangles, stage.ink("blue"))
     red, brown, size = stage.ink("red"), stage.ink("brown"), r.radius
     overlays = [stage.line(curve.points, 0.02 * size, red) for curve in contours]
     for axis in r.frame.axes.T:
@@ -144,23 +143,18 @@ def draw_row(extension, place, r, contours):
 
 
 def _cut(stage, obj, place, r):
-    """Adds the mesh around the patch, each vertex colored by its unit outward normal as R, G, B."""
+    """Adds the mesh around the patch, in clay."""
     mesh = obj.data
     mesh.calc_loop_triangles()
-    points, normals = np.empty((2, len(mesh.vertices), 3), dtype=np.float32)
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
     mesh.vertices.foreach_get("co", points.ravel())
-    mesh.vertex_normals.foreach_get("vector", normals.ravel())
     mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
     up, (x, y, z) = r.frame.axes[:, 2].tolist(), r.frame.to_local(points).T
     near = (np.hypot(x, y) < CUT * r.radius) & (np.abs(z) < CUT * r.radius)
     for i in np.flatnonzero(near):  # What lies below another layer would hide the view from inside.
         near[i] = not is_hidden(place.surface, points[i].tolist(), up, 2.0 * CUT * r.radius)
-    # Emission takes linear colors, but these are colors as they are seen.
-    colors = np.column_stack([((normals + 1.0) / 2.0) ** 2.2, np.ones(len(normals))])
-    attributes = [("normal_color", "FLOAT_COLOR", colors.astype(np.float32))]
-    material = stage.mesh_data.emission("Normals", attribute="normal_color")
-    stage.mesh("Mesh", points, triangles[near[triangles].all(axis=1)], material, attributes)
+    demo.look(stage.scene, stage.mesh("Mesh", points, triangles[near[triangles].all(axis=1)]))
 
 
 def draw_neck(extension, name, r, contacts, verifying):

@@ -15,7 +15,8 @@ prints Markdown tables:
     refused, the doubts that are right, and the sure touches that are off.
 
 All methods are judged above the domain and along the normal of the paper's frame, from which the peers start.
-`--chart`, without `--only`, also draws build/charts/real_surfaces.png. `--only choose` chooses the constants
+`--chart`, without `--only`, also draws build/charts/real_surfaces.png, and `--redraw` only draws the numbers
+of docs/charts again. `--only choose` chooses the constants
 of the process for each scan on all others, and judges them on that one; `--only taps` does so with the
 constants of the taps.
 """
@@ -369,20 +370,30 @@ SETTINGS = {
 def choose(scans, count):
     """Prints for each scan the setting with the least interval score on the others.
 
-    Scores and errors are shares of those of the process.
+    Scores and errors are shares of those of the process; in the second table errors are shares of those of
+    the best peer on that scan, by the number of planes.
     """
-    methods = {PROCESS: quadric_process} | {name: partial(ours, **v) for name, v in SETTINGS.items()}
+    methods = {peer: METHODS[peer] for peer in PEERS}
+    methods |= {name: partial(ours, **v) for name, v in SETTINGS.items()}
     scores = {scan.name: fixed_scores(scan, count, methods)[0] for scan in scans}
 
     def share(name, setting):
         return np.mean([of[setting].interval / of[PROCESS].interval for of in scores[name].values()])
 
-    rows = []
+    rows, ratios = [], []
     for name, of in scores.items():
         others = {s: np.mean([share(other, s) for other in scores if other != name]) for s in SETTINGS}
         best = min(others, key=others.__getitem__)
         errors = np.mean([cell[best].error / cell[PROCESS].error for cell in of.values()])
         covered = np.mean([cell[best].covered for cell in of.values()])
+        by_planes = [[cell for key, cell in of.items() if key[0] == planes] for planes in PLANES]
+        ratios.append(
+            [
+                np.mean([cell[best].error for cell in cells])
+                / min(np.mean([cell[peer].error for cell in cells]) for peer in PEERS)
+                for cells in by_planes
+            ]
+        )
         rows.append(
             [name, best, f"{others[best]:.3f}", f"{share(name, best):.3f}", f"{errors:.3f}", f"{covered:.2f}"]
         )
@@ -390,6 +401,11 @@ def choose(scans, count):
         ["left out", "chosen on the others", "score there", "score here", "error here", "within"],
         rows,
         left=2,
+    )
+    table(
+        ["scan", *(f"{planes} planes" for planes in PLANES)],
+        [[name, *(f"{v:.2f}" for v in of)] for name, of in zip(scores, ratios, strict=True)]
+        + [["mean", *(f"{v:.2f}" for v in np.mean(ratios, axis=0))]],
     )
 
 
@@ -454,7 +470,13 @@ def main():
     parser.add_argument("--only", choices=("fixed", "automatic", "choose", "taps"), help="only this part")
     parser.add_argument("--chart", action="store_true", help="draw the chart as well")
     parser.add_argument("--scan", default="", help="only scans with this in their names")
+    parser.add_argument("--redraw", action="store_true", help="only draw docs/charts/real_surfaces.csv again")
     options = parser.parse_args()
+    if options.redraw:
+        from . import plot, real_chart
+
+        caption, _, rows = plot.stored("real_surfaces")
+        return real_chart.draw_rows(rows, caption)
     paths = [path for path in sorted(SCANS_FOLDER.glob("*.*")) if options.scan in path.stem]
     if not paths:
         sys.exit(f"real: there are no scans in {SCANS_FOLDER}")

@@ -4,7 +4,8 @@
 
 `python -m benchmarks.stability [--seeds N]`, from the root of a checkout. One circumstance after the other is
 led from harmless to hopeless on exact surfaces, with every method. The command prints Markdown and writes
-build/charts/stability.png, the sheet of all sweeps, and stability.csv. Lengths are in mm.
+build/charts/stability.png with four of the sweeps, stability_all.png with all, and stability.csv. With
+--redraw it draws docs/charts/stability.csv again, which takes seconds. Lengths are in mm.
 
 A warning or a refusal is due wherever
 
@@ -494,26 +495,47 @@ LOOKS = {  # color, line, letter
     "quadratic-variation": (plot.GREEN, "-.", "Q"),
     "least-squares": ("#777777", ":", "L"),
 }
+# The sweeps in the picture that stands in the documentation; it links the others.
+SHOWN = ("degrees between planes", "noise, of the extent", "outliers, of the contacts", "one curve cut to")
 ERRORS, CONDITIONS = (2e-5, 20.0), (10.0, 1e8)
 
 
 def draw(rows, caption):
-    columns = 3
-    figure = plot.plt.figure(figsize=(8.6, 13.4))
+    """Draws build/charts/stability.png, of SHOWN, and stability_all.png; writes stability.csv."""
+    shown = [sweep for sweep in SWEEPS if sweep.title in SHOWN]
+    plot.save(_sheet(rows, shown, 2, 6.2), "stability", caption, HEAD, rows)
+    plot.picture(_sheet(rows, SWEEPS, 3, 13.4), "stability_all", caption)
+
+
+def _sheet(rows, sweeps, columns, height):
+    """A figure, `height` inches high, with a panel for each sweep, and the key."""
+    figure = plot.plt.figure(figsize=(8.6, height))
     figure.suptitle(
-        "Where reconstructions fail, and whether they say so", fontsize=12, weight="bold", y=0.988
+        "Where reconstructions fail, and whether they say so",
+        fontsize=12,
+        weight="bold",
+        y=1.0 - 0.16 / height,
     )
-    lines = -(-(len(SWEEPS) + 1) // columns)
+    beside = columns == 2  # The key stands beside the panels or, in the large sheet, in the last cell.
+    lines = -(-(len(sweeps) + (not beside)) // columns)
     grid = figure.add_gridspec(
-        lines, columns, left=0.08, right=0.99, top=0.95, bottom=0.02, hspace=0.45, wspace=0.2
+        lines,
+        columns + beside,
+        left=0.08,
+        right=0.99,
+        top=1.0 - 0.67 / height,
+        bottom=0.27 / height,
+        hspace=0.45,
+        wspace=0.2,
+        width_ratios=[1.0] * columns + [0.8] * beside,
     )
-    for number, sweep in enumerate(SWEEPS):
+    for number, sweep in enumerate(sweeps):
         cell = grid[divmod(number, columns)].subgridspec(3, 1, height_ratios=(3, 1.2, 1.4), hspace=0.08)
         axes = [figure.add_subplot(part) for part in cell]
         of = {m: [row for row in rows if (row[0], row[2]) == (sweep.title, m)] for m in METHODS}
         panel(axes, sweep, of, number % columns == 0)
-    key(figure.add_subplot(grid[divmod(len(SWEEPS), columns)]))
-    plot.save(figure, "stability", caption, HEAD, rows)
+    key(figure.add_subplot(grid[0, columns] if beside else grid[divmod(len(sweeps), columns)]))
+    return figure
 
 
 def panel(axes, sweep, of, first):
@@ -558,9 +580,9 @@ def key(axes):
     lines = [
         *((line, color, f"{letter}  {method}") for method, (color, line, letter) in LOOKS.items()),
         (".", plot.BLUE, "bayes: mean height_std"),
-        ("s", (0.95, 0.65, 0.1), "share warned of"),
+        ("s", (0.95, 0.65, 0.1), "share with a warning"),
         ("s", (0.15, 0.15, 0.15), "share refused"),
-        ("s", "#dce8dc", "harmless: no warning is due"),
+        ("s", "#dce8dc", "harmless: no warning needed"),
     ]
     for number, (look, color, text) in enumerate(lines):
         y = 0.95 - 0.125 * number
@@ -578,7 +600,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=SEEDS, help="of the noise (%(default)s)")
     parser.add_argument("--untold", action="store_true", help="the first table alone")
+    parser.add_argument("--redraw", action="store_true", help="draw docs/charts/stability.csv again")
     options = parser.parse_args()
+    if options.redraw:
+        caption, _, rows = plot.stored("stability")
+        draw(rows, caption)
+        return
     keys = [
         Key(number, value, surface, seed)
         for number, sweep in enumerate(ALL)
@@ -599,7 +626,7 @@ def main():
         f"{options.seeds} seeds. All else is harmless: planes 60 degrees apart, {STEPS} steps to a "
         f"side, noise of {NOISE:g} "
         "mm, radii L of 12 to 15 mm. Error: mean |dz| over the domain. Below it are the condition number and "
-        f"the shares of the touches warned of and refused. On {machine('numpy', 'scipy', 'bpy')}."
+        f"the shares of the touches with a warning and of the refused. On {machine('numpy', 'scipy', 'bpy')}."
     )
     draw(rows_of(results), caption)
 

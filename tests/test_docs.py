@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 import core
-from tools import check_site
+from tools import check_site, figures
 
 ROOT = Path(__file__).parent.parent
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 SITE = ROOT / "build" / "site" / "html"
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^ *```.*?^ *```", re.DOTALL | re.MULTILINE)
-MOST_BYTES, MOST_LINES = 300_000, 75
+MOST_BYTES, MOST_LINES, MOST_WORDS = 300_000, 75, 30
 
 
 def slug(heading):
@@ -57,6 +57,43 @@ def test_commands_name_what_is_there(page):
         assert (ROOT / f"{module.replace('.', '/')}.py").is_file(), module
     for script in re.findall(r"`((?:benchmarks|examples|tools|tests)/[\w/]+\.\w+)", text):
         assert (ROOT / script).is_file(), script
+
+
+def test_the_page_of_figures_has_all_pictures_and_commands_draw_those_that_are_there():
+    page = (ROOT / "docs" / "figures.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([\w/]+\.(?:png|jpg|webp|svg))`", page))
+    docs = ROOT / "docs"
+    there = {
+        path.relative_to(docs).as_posix()
+        for path in docs.rglob("*")
+        if path.suffix in (".png", ".jpg", ".webp", ".svg")
+    }
+    assert named == there
+    drawn = {name for files in figures.DRAWN.values() for name in files}
+    windows = set(re.findall(r"\w+", re.search(r"build/gui/\{([^}]*)\}\.jpg", page)[1]))
+    assert {name for name in drawn if not name.endswith(".csv")} == (
+        there - {f"{window}.jpg" for window in windows} - {"data_flow.svg"}
+    )
+    assert all((docs / name).is_file() for name in drawn)
+    for words in figures.DRAWN:
+        assert (ROOT / f"{words[0].replace('.', '/')}.py").is_file()
+
+
+def test_sentences_have_thirty_words_at_most():
+    """Sentences have 30 words at most; tables may quote longer messages."""
+    for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        for sentence in sentences(page.read_text(encoding="utf-8")):
+            assert len(re.findall(r"[\w'’.%‰]+", sentence)) <= MOST_WORDS, sentence
+
+
+def sentences(text):
+    """The sentences of a page, without code, formulas, tables and headings; code counts as a word."""
+    text = re.sub(r"^\$\$.*?\$\$$", "", FENCE.sub("", text), flags=re.DOTALL | re.MULTILINE)
+    lines = [line for line in text.split("\n") if not re.match(r"\s*[|#!]", line)]
+    for block in re.split(r"\n\s*\n|\n\s*(?:[-*]|\d+\.) ", "\n".join(lines)):
+        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", block)
+        plain = re.sub(r"`[^`]*`|\$[^$]*\$", "Code", plain).replace("*", "")
+        yield from re.split(r"(?<=[.?!:])[\")”]?\s+(?=[A-Z0-9\"“(.])", " ".join(plain.split()))
 
 
 def test_the_readme_is_short_and_its_picture_small():

@@ -18,6 +18,8 @@ NOISE = 1.0 / 1200.0  # A share of the object's size, as 0.05 mm is of 60 mm.
 WIDTH, HEIGHT = 1200, 900
 BAR_STEPS = 128
 BAR_REACH = 1.5  # Half the length of the color bar, in radii of the patch.
+BESIDE = 1.3  # The patch is so many radii to the left of the middle, so that the bar is beside the object.
+BACKGROUND = (0.8, 0.82, 0.85, 1.0)
 
 
 def main():
@@ -105,7 +107,7 @@ def stage(extension, report):
     away = 100.0 * radius
     camera.data.clip_end = 10.0 * away
     axes = Matrix((right, view.cross(right), view)).transposed()
-    camera.matrix_world = Matrix.LocRotScale(point + away * view, axes, None)
+    camera.matrix_world = Matrix.LocRotScale(point + BESIDE * radius * right + away * view, axes, None)
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.data.angle = 2.0, 0.3
     sun.matrix_world = camera.matrix_world @ Matrix.Rotation(-0.6, 4, "X") @ Matrix.Rotation(-0.6, 4, "Y")
@@ -114,7 +116,10 @@ def stage(extension, report):
     scene.camera = camera
     look(scene, bpy.data.objects[report["source"]])
     ink = extension.tactile_addon.scene.mesh_data.emission("Ink", color=(0.01, 0.01, 0.01, 1.0))
-    return _Overlay(camera, radius, ink)
+    paper = extension.tactile_addon.scene.mesh_data.emission("Paper", color=BACKGROUND)
+    put = _Overlay(camera, radius, ink)
+    put.card(paper, -2.1)
+    return put
 
 
 class _Overlay:
@@ -123,15 +128,25 @@ class _Overlay:
     def __init__(self, camera, radius, ink):
         self.camera, self.radius, self.ink = camera, radius, ink
 
-    def add(self, name, data, x, y):
+    def add(self, name, data, x, y, behind=1.0):
         import bpy
 
         obj = bpy.data.objects.new(name, data)
         obj.parent = self.camera
-        obj.location = (x * self.radius, y * self.radius, -self.radius)
+        obj.location = (x * self.radius, y * self.radius, -behind * self.radius)
         obj.scale = (self.radius,) * 3
         bpy.context.scene.collection.objects.link(obj)
         return obj
+
+    def card(self, material, top):
+        """Adds a strip behind texts, as wide as the picture, from its lower edge to `top`."""
+        import bpy
+
+        strip = bpy.data.meshes.new("Card")
+        corners = [(-4.0, -4.0, 0.0), (4.0, -4.0, 0.0), (4.0, top, 0.0), (-4.0, top, 0.0)]
+        strip.from_pydata(corners, [], [(0, 1, 2, 3)])
+        strip.materials.append(material)
+        self.add("Card", strip, 0.0, 0.0, 1.1).visible_shadow = False
 
     def text(self, body, x, y, size):
         import bpy
@@ -143,7 +158,7 @@ class _Overlay:
 
 
 def color_bar(extension, put, limit, unit):
-    """Adds a strip with the patch's own material from -limit to limit, with ticks and a title."""
+    """Adds a strip with the patch's own material from -limit to limit, ticks and a title; returns them."""
     import bpy
 
     module = extension.tactile_addon
@@ -156,11 +171,13 @@ def color_bar(extension, put, limit, unit):
     strip = bpy.data.meshes.new("Color Bar")
     module.scene.mesh_data.fill(strip, points, triangles, attributes)
     strip.materials.append(bpy.data.materials["Tactile Curvature"])
-    put.add("Color Bar", strip, 2.35, 0.0)
-    put.text("Gaussian curvature", 1.6, BAR_REACH + 0.45, 0.18)
-    put.text(f"in 1/{unit}²", 2.25, BAR_REACH + 0.2, 0.18)
+    bar = [put.add("Color Bar", strip, 2.35, 0.0)]
+    bar.append(put.text("Gaussian curvature", 1.6, BAR_REACH + 0.45, 0.18))
+    bar.append(put.text(f"in 1/{unit}²", 2.25, BAR_REACH + 0.2, 0.18))
     for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
-        put.text(f"{share * limit:+.3g}" if share else "0", 2.62, BAR_REACH * share - 0.05, 0.15)
+        words = f"{share * limit:+.3g}" if share else "0"
+        bar.append(put.text(words, 2.62, BAR_REACH * share - 0.05, 0.15))
+    return bar
 
 
 def look(scene, source):
@@ -177,7 +194,7 @@ def look(scene, source):
     world = bpy.data.worlds.new("Light")
     if world.node_tree is None:
         world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.8, 0.82, 0.85, 1.0)
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = BACKGROUND
     scene.world = world
     scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
     scene.render.dither_intensity = 0.0

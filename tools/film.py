@@ -69,7 +69,7 @@ class Film:
         self.report = self.patch["tactile"].to_dict()
         put = demo.stage(extension, self.report)
         self.limit = self.report["color_limit"]
-        demo.color_bar(extension, put, self.limit, "m")
+        self.legend = demo.color_bar(extension, put, self.limit, "m")
         self.caption = put.text("", -3.3, -2.45, 0.24)
         scene = bpy.context.scene
         self.toward = scene.camera.matrix_world.col[2].xyz * scene.camera.data.ortho_scale * 0.05
@@ -80,7 +80,11 @@ class Film:
         """Yields (path, milliseconds) of each picture."""
         curves = [self.curve(contour) for contour in self.contours()]
         finger = self.finger()
+        for obj in self.legend:
+            obj.hide_render = True
         yield from self.slides(curves, finger)
+        for obj in self.legend:
+            obj.hide_render = False
         self.caption.data.body = CAPTIONS[1]
         self.show(self.patch)
         for turn in range(TURNS):

@@ -31,7 +31,10 @@ ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
 NEAREST = 12  # The nearest segment is one of so many whose middles are nearest.
 SAME = 1e-6  # Lengths that differ by a smaller share are the same.
 
-Offsets = Callable[[Array, Indices], Array]  # How far a surface is above points beside some places.
+PLACES_AT_ONCE = 1000  # A step feels so many places.
+
+# How far a surface is above points beside some places, found in steps.
+Offsets = Callable[[Array, Indices], Generator[float, None, Array]]
 
 
 class Border(NamedTuple):
@@ -54,22 +57,28 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     yield 0.0
     places = mesh.vertices[at]
 
-    def off(points: Array, which: Indices) -> Array:
+    def off(points: Array, which: Indices) -> Generator[float, None, Array]:
         """How far the surface is above points (k, 3) beside some of the places, (k,); NaN where it is not."""
-        each = zip(points.tolist(), normals[which].tolist(), strict=True)
-        contacts = ((p, n, finger.near(vector_of(p), vector_of(n), near)) for p, n in each)
-        return np.array([np.nan if c is None else np.dot(n, np.subtract(c[0], p)) for p, n, c in contacts])
+        found = np.full(len(points), np.nan)
+        for i, (p, n) in enumerate(zip(points.tolist(), normals[which].tolist(), strict=True)):
+            contact = finger.near(vector_of(p), vector_of(n), near)
+            if contact is not None:
+                found[i] = np.dot(n, np.subtract(contact[0], p))
+            if i % PLACES_AT_ONCE == PLACES_AT_ONCE - 1:
+                yield 0.0
+        return found
 
     lengths, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
     places = places + lengths[:, None] * ways
-    places += np.nan_to_num(off(places, np.arange(len(at))))[:, None] * normals
-    ended &= ~_bends_away(finger, places, normals, ways, STEP * mesh.edge)
+    places += np.nan_to_num((yield from off(places, np.arange(len(at)))))[:, None] * normals
+    ended &= ~(yield from _bends_away(finger, places, normals, ways, STEP * mesh.edge))
     some = ended[before] & ended[after]
     before, after = before[some], after[some]
     corners, sharp = _corners(places, before, after, mesh.edge)
     a, b = places[before], places[after]
     chords = 0.5 * (a + b)
-    above, beside = off(corners + INWARD * (chords - corners), before), off(chords, before)
+    above = yield from off(corners + INWARD * (chords - corners), before)
+    beside = yield from off(chords, before)
     sharp &= np.isnan(above) == np.isnan(beside)
     corners += np.nan_to_num(above)[:, None] * normals[before]
     yield 0.0
@@ -103,27 +112,33 @@ def _lengths(
 ) -> Generator[float, None, tuple[Array, NDArray[np.bool_]]]:
     """Lengths (n,) of a surface along ways (n, 3) from places (n, 3), and whether it ends there, (n,)."""
     every, low = np.arange(len(places)), np.zeros(len(places))
-    inside, ended = ~np.isnan(off(places, every)), np.zeros(len(places), dtype=bool)
+    inside, ended = ~np.isnan((yield from off(places, every))), np.zeros(len(places), dtype=bool)
     for i in range(1, round(REACH / STEP) + 1):
         left = np.flatnonzero(~ended)
         trial = np.where(inside[left], i * step, -i * step)
-        left = left[np.isnan(off(places[left] + trial[:, None] * ways[left], left)) == inside[left]]
+        above = yield from off(places[left] + trial[:, None] * ways[left], left)
+        left = left[np.isnan(above) == inside[left]]
         ended[left], low[left] = True, np.where(inside[left], i - 1, -i) * step
         yield 0.0
     high = low + step
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        met = ~np.isnan(off(places + middle[:, None] * ways, every))
+        met = ~np.isnan((yield from off(places + middle[:, None] * ways, every)))
         low, high = np.where(met, middle, low), np.where(met, high, middle)
         yield 0.0
     return low, ended
 
 
-def _bends_away(finger: Finger, places: Array, normals: Array, ways: Array, step: float) -> NDArray[np.bool_]:
+def _bends_away(
+    finger: Finger, places: Array, normals: Array, ways: Array, step: float
+) -> Generator[float, None, NDArray[np.bool_]]:
     """Whether a finger that goes a step beyond places (n, 3) still feels the surface, which bends away."""
-    each = zip(places.tolist(), normals.tolist(), ways.tolist(), strict=True)
-    found = (finger.ahead(vector_of(p), vector_of(n), vector_of(t), 2.0 * step, step) for p, n, t in each)
-    return np.array([contact is not None for contact in found], dtype=bool)
+    found = np.zeros(len(places), dtype=bool)
+    for i, (p, n, t) in enumerate(zip(places.tolist(), normals.tolist(), ways.tolist(), strict=True)):
+        found[i] = finger.ahead(vector_of(p), vector_of(n), vector_of(t), 2.0 * step, step) is not None
+        if i % PLACES_AT_ONCE == PLACES_AT_ONCE - 1:
+            yield 0.0
+    return found
 
 
 def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tuple[Array, NDArray[np.bool_]]:

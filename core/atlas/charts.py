@@ -7,7 +7,7 @@ a cubic B-spline, which is C2 and off the patch by less than a tenth of its devi
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -201,10 +201,12 @@ class Charts:
 
     def inside(self, share: float) -> NDArray[np.bool_]:
         """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""
-        every, found = self.knots(), []
-        for i, (x, y) in enumerate(zip(*every.reshape(2, len(self.radii), -1), strict=True)):
-            found.append(self.shares(x, y, np.full(len(x), i)) <= share)
-        return np.reshape(found, self.heights.shape)
+        x, y = self.knots().reshape(2, -1)
+        node, found = np.repeat(np.arange(len(self.radii)), SIDE**2), np.zeros(len(x), dtype=bool)
+        for start in range(0, len(x), CHUNK):
+            some = slice(start, start + CHUNK)
+            found[some] = self.shares(x[some], y[some], node[some]) <= share
+        return found.reshape(self.heights.shape)
 
     @cached_property
     def is_flat(self) -> NDArray[np.bool_]:
@@ -219,6 +221,12 @@ class Charts:
         """Local x and y of all knots, (2, n, SIDE, SIDE)."""
         along = self.halves[:, None] * np.linspace(-1.0, 1.0, SIDE)
         return np.array(np.broadcast_arrays(along[:, :, None], along[:, None]))
+
+    def widened(self, factor: float) -> "Charts":
+        """The same patches with deviations that are larger by a factor."""
+        found = replace(self, stds=factor * self.stds)
+        vars(found)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
+        return found
 
     def chosen(self, which: NDArray[Any]) -> "Charts":
         """The tables of some of the patches."""

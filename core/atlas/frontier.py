@@ -8,7 +8,7 @@ there meets only what is covered, or nothing.
 
 import heapq
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -176,6 +176,7 @@ class Frontier:
         """
         found = []
         for place in border_places(reference.mesh):
+            yield 1.0
             contacts = [
                 self.finger.ahead(place.point, place.normal, place.ahead, place.radius, share * place.radius)
                 for share in REACHES
@@ -183,7 +184,6 @@ class Frontier:
             # Across a notch the finger meets the mesh again.
             if contacts[0] is not None and reference.away(contacts[0][0]) > OFF * reference.edge:
                 found.append((place, next(contact for contact in contacts[::-1] if contact is not None)))
-            yield 1.0
         return found
 
     def _forget_covered(self) -> Generator[None, None, None]:
@@ -285,13 +285,13 @@ def _first_least(squares: Array) -> int:
     return int(np.argmax(squares <= squares.min() + TIE * np.abs(squares).max()))
 
 
-def border_places(mesh: Mesh) -> list[Place]:
+def border_places(mesh: Mesh) -> Iterator[Place]:
     """Places on the border of a mesh, some edges apart, with the way beyond it."""
     ends, corners = mesh.border, mesh.vertices
     if not len(ends):
-        return []
+        return
     radius = BORDER_RADIUS * mesh.edge
-    normals, found, taken = mesh.normals, [], np.zeros(len(ends), dtype=bool)
+    normals, taken = mesh.normals, np.zeros(len(ends), dtype=bool)
     middles = corners[ends].mean(axis=1)
     for i in range(len(ends)):
         a, b = ends[i]
@@ -302,5 +302,4 @@ def border_places(mesh: Mesh) -> list[Place]:
         up /= max(float(np.linalg.norm(up)), LEAST_DIVISOR)
         beyond = np.cross(corners[b] - corners[a], up)
         beyond /= max(float(np.linalg.norm(beyond)), LEAST_DIVISOR)
-        found.append(Place(vector_of(middles[i]), vector_of(up), vector_of(beyond), radius))
-    return found
+        yield Place(vector_of(middles[i]), vector_of(up), vector_of(beyond), radius)

@@ -15,7 +15,7 @@ from ..arguments import Array
 from ..contours.contour import Contour
 from ..contours.finger import FACING
 from ..patch.cubic_spline import SIDE, between
-from ..patch.smoothing_spline import smoothing_spline
+from ..patch.smoothing_spline import preparing, smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .field import LAYER, wall_facing
@@ -54,8 +54,15 @@ def joined(
         part = charts.pairs(points[start : start + PLACES_AT_ONCE])
         parts.append(part._replace(place=start + part.place))
         yield 0.0
-    pairs = Pairs(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    for _ in preparing():
+        yield 0.0
+    columns = []
+    for values in zip(*parts, strict=True):
+        columns.append(np.concatenate(values))
+        yield 0.0
+    pairs = Pairs(*columns)
     each = np.argsort(pairs.node, kind="stable")
+    yield 0.0
     bounds = np.searchsorted(pairs.node[each], np.arange(len(results) + 1))
     tables: list[Table] = []
     for i, r in enumerate(results):

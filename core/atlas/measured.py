@@ -40,7 +40,7 @@ def atlas_of(
 ) -> Atlas:
     """The atlas (paper, VI) of measured contacts: contours, with normals or without, and strokes (n, 3).
 
-    outward : (3,), a direction to the outer side of all contacts; required if some have no outward normals
+    outward : (3,), a direction to the outer side of all contacts without normals; required if there are such
     tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
     noise : standard deviation of a contact; None for the contours' own
 
@@ -98,10 +98,12 @@ def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -
     points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
     if len(points) < FEWEST:
         raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
-    if up is None:
-        normals = unit_vectors("normals", np.vstack([stroke.normals for stroke in strokes]))  # type: ignore[misc]
-    else:
-        normals = _normals(points, up)
+    own = [np.zeros(stroke.points.shape) if stroke.normals is None else stroke.normals for stroke in strokes]
+    missing = np.repeat([stroke.normals is None for stroke in strokes], [len(normals) for normals in own])
+    normals = np.vstack(own)
+    if up is not None and missing.any():
+        normals[missing] = _normals(points, up)[missing]
+    normals = unit_vectors("normals", normals)
     return points, normals, max(stroke.noise or 0.0 for stroke in strokes)
 
 

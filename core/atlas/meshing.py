@@ -149,6 +149,7 @@ def meshed(
         up = indicator.outward(vertices)
         yield 0.7
         vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
+    yield 0.9
     found = yield from creased(charts, vertices, triangles, surface.normal, edge)
     yield 0.9
     surface = surface.chosen(np.append(np.arange(len(vertices)), found.parents))
@@ -290,6 +291,7 @@ def _felt(
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
+    yield 0.9
     near = surface.share < MARGIN
     inside = near & ((surface.share < INSIDE) | (surface.creases > 0))
     beyond = triangles[~inside[triangles].all(axis=1)]

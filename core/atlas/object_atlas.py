@@ -30,6 +30,7 @@ from .samples import indicated
 FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
 LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above so many tolerances.
 OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from so many of both away.
+IMPROVABLE = 0.5  # A touch improves the surface where a contact is so many tolerances away.
 THIN = 0.9  # Walls are resolved from this share of the thickness that cells are made for.
 BORDER = 2.0  # Beyond the border of the mesh it does from so many edges away.
 WITHIN_90 = 1.645  # So many deviations are a 90 % interval.
@@ -52,11 +53,13 @@ class Check(NamedTuple):
 
     points, normals : (n, 3), where it met the object
     missed : (k, 3), places of the surface that it did not meet
+    at_random : so many contacts are at random places, and come first; the others are where errors are likely
     """
 
     points: Array
     normals: Array
     missed: Array
+    at_random: int
 
 
 def suggested_edge(patches: Sequence[Reconstruction], charts: Charts, indicator: Indicator) -> float:
@@ -192,11 +195,19 @@ class Atlas:
     @property
     def contradicting(self) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than is explained."""
+        stds = self._contacts[1]
+        return self._farther(np.maximum(OFF_STDS * stds, OFF_TOLERANCES * (self.tolerance or 0.0)))
+
+    @property
+    def improvable(self) -> NDArray[np.bool_]:
+        """Which contacts of the check (n,) are so far from the surface that a touch there improves it."""
+        return self._farther(IMPROVABLE * (self.tolerance or 0.0))
+
+    def _farther(self, length: Array | float) -> NDArray[np.bool_]:
+        """Which contacts of the check (n,) are farther from the surface than lengths (n,)."""
         distance, std = self._contacts
-        explained = np.maximum(OFF_STDS * std, OFF_TOLERANCES * (self.tolerance or 0.0))
         # The mesh may end an edge or so before a border of the object.
-        explained[np.isinf(std)] = BORDER * self.reference.edge
-        return np.abs(distance) > explained
+        return np.abs(distance) > np.where(np.isinf(std), BORDER * self.reference.edge, length)
 
     def widened(self) -> Generator[float, None, "Atlas"]:
         """The atlas with deviations so large that 90 % of its check's contacts are in the 90 % interval.
@@ -204,9 +215,12 @@ class Atlas:
         Those that contradict the surface do not count: they are of something else. What patches differ by is
         a part of a deviation and does not grow with theirs, so they grow more than once. Yields 1 each time.
         """
-        found, within = self, ~self.contradicting
+        if self.check is None:
+            return self
+        found, count = self, self.check.at_random
+        within = ~self.contradicting[:count]
         for _ in range(WIDENINGS):
-            distance, std = found._contacts
+            distance, std = (values[:count] for values in found._contacts)
             felt = np.isfinite(std) & within
             if not felt.any():
                 break
@@ -214,12 +228,8 @@ class Atlas:
             factor = float(np.quantile(stds, 0.9)) / WITHIN_90
             if factor <= 1.0:
                 break
-            mesh = found.reference.mesh
-            found = replace(
-                found,
-                charts=replace(found.charts, stds=factor * found.charts.stds),
-                reference=replace(found.reference, mesh=mesh._replace(std=factor * mesh.std)),
-            )
+            charts, reference = found.charts.widened(factor), found.reference.widened(factor)
+            found = replace(found, charts=charts, reference=reference)
             yield 1.0
         return found
 

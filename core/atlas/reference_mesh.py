@@ -3,7 +3,7 @@
 """Signed distances from the surface of an object: the nearest place on its mesh, moved onto the patches."""
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -23,6 +23,7 @@ NEAREST = 3  # The nearest triangle is looked for at so many of the nearest vert
 SAME = 1e-6  # Triangles that are nearer by a smaller share of the distance are as near.
 AHEAD = 0.95  # The normal at a foot gives the sign if the cosine of its angle to the way there is more.
 FAR = 2.0  # Places that are farther away than so many cells have the sign of the indicator.
+PREPARED = ("tree", "fans", "edge", "normals", "is_open", "angles")  # Each is found once for a mesh.
 ON_SIDE = 1e-6  # A foot with a smaller weight of a vertex is on the side across from it.
 
 
@@ -38,7 +39,7 @@ class ReferenceMesh:
         """A KD-tree of the vertices."""
         from scipy.spatial import cKDTree
 
-        return cKDTree(self.mesh.vertices)
+        return cKDTree(self.mesh.vertices, compact_nodes=False, balanced_tree=False)  # twice as fast to build
 
     @cached_property
     def fans(self) -> Indices:
@@ -71,9 +72,25 @@ class ReferenceMesh:
         found[self.mesh.border] = True
         return found
 
+    @cached_property
+    def angles(self) -> Array:
+        """The angles at each vertex (n,) of its triangles together: 2 pi where the surface is flat."""
+        corners = self.mesh.vertices[self.mesh.triangles]
+        sides = np.roll(corners, -1, axis=1) - corners
+        across = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)[:, None]
+        angles = np.arctan2(across, -np.einsum("nki,nki->nk", sides, np.roll(sides, 1, axis=1)))
+        found: Array = np.bincount(self.mesh.triangles.ravel(), angles.ravel(), len(self.mesh.vertices))
+        return found
+
+    def widened(self, factor: float) -> "ReferenceMesh":
+        """The same mesh with deviations that are larger by a factor."""
+        found = replace(self, mesh=self.mesh._replace(std=factor * self.mesh.std))
+        vars(found).update({name: vars(self)[name] for name in PREPARED if name in vars(self)})
+        return found
+
     def prepared(self) -> Generator[float, None, None]:
         """Finds what distances need, in steps; yields 1 after each."""
-        for name in ("tree", "fans", "edge", "normals", "is_open"):
+        for name in PREPARED:
             getattr(self, name)
             yield 1.0
 

@@ -105,6 +105,7 @@ def _spread(
     node, x, y, group, aside = (np.concatenate(values) for values in zip(*places, strict=True))
     # The sample in the middle of a group is first.
     order = np.lexsort((aside, group))
+    yield 0.0
     _, first, of = np.unique(group[order], return_index=True, return_inverse=True)
     group = np.empty(len(order), dtype=np.intp)
     group[order] = of

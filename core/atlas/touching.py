@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
@@ -38,6 +38,7 @@ NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
 AGAIN = 3  # Where something is missing or less certain, touches go on at most so often.
 CHECKS, CHECK_SEED = 256, 0  # So many rays from outside check the surface.
 HAIR = 0.01  # It is cast again this share of the tolerance aside.
+SHARPEST, SPIKES = 64, 16  # So many more go to its sharpest vertices, and to the triangles around so many.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
 BORDERS = 2  # So often a mesh is moved to the borders that are felt.
@@ -82,6 +83,9 @@ def touch_all_over(
     If it is sent anything false other than None, it stops touching and joins the patches so far. Arguments
     and errors are those of `explore_object`; errors are raised in the first step.
     """
+    # Otherwise later steps would import these, which takes longer than a step may.
+    from scipy import fft, linalg, ndimage, sparse, spatial  # noqa: F401
+
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     tolerance, noise = number("tolerance", tolerance, above=0.0), number("noise", noise, least=0.0)
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
@@ -226,41 +230,31 @@ class _Run:
         some, more = contacts[: self.most - self.done], True
         new: list[Exploration] = []
         if some:
-            new, more = yield from _told(self.touch(some, farthest, [SMALL] * len(some)), self.now)
+            new, more = yield from _told(self.touch(some, farthest, [NARROW] * len(some)), self.now)
         more = _goes_on((yield self.now(new=new))) and more
         return (yield from _all_over(self, more))
 
-    def check(self, reference: ReferenceMesh) -> Check:
+    def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
-        rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
-        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-        middle, far = 0.5 * (low + high), float(np.linalg.norm(high - low))
-        starts = rng.normal(size=(CHECKS, 3))
-        starts *= far / np.linalg.norm(starts, axis=1, keepdims=True)
-        starts += middle
-        # Half of the rays go to places of the surface, the others to any place near the object.
-        aims = middle + 0.5 * far * rng.uniform(-1.0, 1.0, (CHECKS, 3))
-        aimed = rng.integers(len(mesh.triangles), size=CHECKS // 2)
-        aims[: CHECKS // 2] = mesh.vertices[mesh.triangles[aimed]].mean(axis=1)
-        ways = aims - starts
-        away = np.linalg.norm(ways, axis=1)
-        ways /= away[:, None]
-        # The triangle's own normal counts: that of a vertex on a crease is between those of its walls.
-        facing = np.einsum("ni,ni->n", reference.normals[aimed], ways[: CHECKS // 2]) < -STRAIGHT
-        found, missed = [], []
-        for i in range(CHECKS):
-            # Between two faces of a mesh a ray may slip through. A hair's breadth aside it does not.
-            for aside in (0.0, HAIR * self.tolerance):
-                start = vector_of(starts[i] + aside)
-                contact = self.frontier.finger.met(start, vector_of(ways[i]), 3.0 * far)
-                if contact is not None:
-                    found.append(contact)
-                    break
-            else:
-                if i < len(facing) and facing[i]:
-                    missed.append(aims[i])
+        starts, aims, facing, length = rays_at(reference)
+        yield 1.0
+        ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
+        found, missed, at_random = [], [], 0
+        for i, (start, way, aim) in enumerate(zip(starts, ways, aims, strict=True)):
+            contact = self._met(start, vector_of(way), length)
+            if contact is not None:
+                found.append(contact)
+                at_random += i < CHECKS
+            elif i < len(facing) and facing[i]:
+                missed.append(aim)
         points, normals = np.array(found).reshape(-1, 2, 3).transpose(1, 0, 2)
-        return Check(points, normals, np.array(missed).reshape(-1, 3))
+        return Check(points, normals, np.array(missed).reshape(-1, 3), at_random)
+
+    def _met(self, start: Array, way: Vector, length: float) -> tuple[Vector, Vector] | None:
+        """The first contact of a ray: between faces of a mesh it may slip through, but not a hair aside."""
+        met = self.frontier.finger.met
+        aside = vector_of(start + HAIR * self.tolerance)
+        return met(vector_of(start), way, length) or met(aside, way, length)
 
     def atlas(
         self, known: dict[int, tuple[int, Table]]
@@ -274,18 +268,19 @@ class _Run:
         charts = yield from _part(agreed(charts), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
         reference = yield from _part(surfaced(patches, charts, self.tolerance), JOINED, 1.0)
+        yield 1.0
         for _ in range(BORDERS):
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
             border = yield from _part(steps, 1.0, 1.0)
             reference = replace(reference, mesh=bordered(reference.mesh, border))
         yield from reference.prepared()
-        check = self.check(reference)
+        check = yield from self.check(reference)
         yield 1.0
         uncovered = yield from self.frontier.uncovered(reference)
         places, taps = tuple(place for place, _ in uncovered), tuple(self.frontier.taps)
         cut_short = self.done >= self.most
         atlas = Atlas(patches, charts, reference, self.tolerance, places, check, taps, border, cut_short)
-        off = atlas.contradicting
+        off = atlas.improvable
         yield 1.0
         atlas = yield from atlas.widened()
         contacts: list[Contact] = [contact for _, contact in uncovered]
@@ -305,6 +300,36 @@ class _Run:
             apart = ROUGH_APART * self.frontier.charts.radii[mesh.patch[worst]]
             left = left[((mesh.vertices[left] - mesh.vertices[worst]) ** 2).sum(axis=1) > apart**2]
         return found
+
+
+def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], float]:
+    """Rays that check a mesh from outside all round: their starts, and places that they go to, (k, 3).
+
+    Also whether each of the first must meet something there, (CHECKS / 2,), and the length of all, which ends
+    beyond the mesh. The first CHECKS are random: one half goes to places of the surface, the other to any
+    place near it. Others go to the sharpest vertices, and straight down to triangles around some of these.
+    """
+    rng, mesh = np.random.default_rng(CHECK_SEED), reference.mesh
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    middle, far = 0.5 * (low + high), float(np.linalg.norm(high - low))
+    away = rng.normal(size=(CHECKS, 3))
+    away *= far / np.linalg.norm(away, axis=1, keepdims=True)
+    aims = middle + 0.5 * far * rng.uniform(-1.0, 1.0, (CHECKS, 3))
+    aimed = rng.integers(len(mesh.triangles), size=CHECKS // 2)
+    centers = mesh.vertices[mesh.triangles].mean(axis=1)
+    aims[: CHECKS // 2] = centers[aimed]
+    ways = (aims - middle - away)[: CHECKS // 2]
+    # The triangle's own normal counts: that of a vertex on a crease is between those of its walls.
+    ahead = np.einsum("ni,ni->n", reference.normals[aimed], ways)
+    facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
+    sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]
+    up = away[: len(sharpest)]
+    up = up * np.copysign(1.0, np.einsum("ni,ni->n", up, mesh.normals[sharpest]))[:, None]
+    around = np.unique(reference.fans[sharpest[:SPIKES]])
+    around = around[np.linalg.norm(reference.normals[around], axis=1) > STRAIGHT]  # The others have no area.
+    down = far * reference.normals[around]
+    starts = np.vstack([middle + away, mesh.vertices[sharpest] + up, centers[around] + down])
+    return starts, np.vstack([aims, mesh.vertices[sharpest], centers[around]]), facing, 3.0 * far
 
 
 def _joined(run: _Run, more: bool) -> Steps:

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import along, cross, dot, scaled
+from ..contours.local_geometry import UMBILIC
 from .evidence import Hyperparameters, hyperparameters
 from .posterior import SurfacePosterior
 from .prior import FREE, USUAL_WAVINESS, prior_mean, prior_variances
-from .sextic import Sextics, mean_given, posterior_given, sextics
+from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 
 # benchmarks.accuracy judges MISFIT, and the outliers of benchmarks.stability judge the last two.
 MISFIT = 2e-3  # The noise is at least this share of the radius, because no surface is a polynomial.
@@ -29,6 +30,7 @@ STALE_WEIGHT = 0.5  # Waviness and noise are found anew when a weight has change
 ALIKE_CURVATURES = 1e-4  # Curvatures that differ by less count as alike; heights change by an eighth of it.
 LEVEL = 5e-3  # Axes are level when the slope is less: heights change by its product with slope and height.
 OUTLYING = 5.0  # A contact off by more standard deviations is an outlier.
+DECIMALS = 9  # Heights and distances count to so many decimals, so that rounding does not choose.
 STUDENT = 4.0  # Outliers weigh as under a Student t distribution of so many degrees of freedom.
 
 
@@ -92,7 +94,7 @@ def joint_fit(
     contacts have in the end: where one is beyond OUTLYING standard deviations, they weigh as under a
     Student t distribution.
     """
-    axes = np.eye(3)[None].repeat(len(contacts), axis=0)
+    axes = _first_axes(contacts, weights, k1, k2)
     floor, usual = np.maximum(noise, MISFIT), prior_variances(np.full(len(contacts), USUAL_WAVINESS))
     given = _Given(contacts, contacts[:, :0] if normals is None else normals, tangent, floor)
     state = _State(axes, k1, k2, weights, usual, usual, floor, weights)
@@ -116,6 +118,23 @@ def joint_fit(
     return turns[back], SurfacePosterior(mean, root, noise, visibility), found_weights[back]
 
 
+def _first_axes(contacts: Array, weights: Array, k1: Array, k2: Array) -> Array:
+    """The axes (b, 3, 3) of the first pass: as given, or at an umbilic toward the highest contact.
+
+    At an umbilic the given ones follow the first curve, whichever that is, and the prior depends on axes. On
+    a plane they are toward the farthest contact.
+    """
+    axes = np.eye(3)[None].repeat(len(contacts), axis=0)
+    for i in np.flatnonzero(k2 - k1 <= 2.0 * UMBILIC * np.maximum(1.0, np.abs(k1))):
+        away = np.hypot(contacts[i, :, 0], contacts[i, :, 1]) * weights[i]
+        heights = (np.abs(contacts[i, :, 2]) * weights[i]).round(DECIMALS)
+        chosen = np.argmax(heights if heights.any() else away.round(DECIMALS))
+        if away[chosen]:
+            x, y = contacts[i, chosen, :2] / away[chosen]
+            axes[i, :2, :2] = (x, -y), (y, x)
+    return axes
+
+
 def _pass(
     given: _Given, state: _State, step: int, through: bool
 ) -> tuple[_State, NDArray[np.bool_], SurfacePosterior | None]:
@@ -127,9 +146,10 @@ def _pass(
         stale = np.abs(state.weights - state.of_weights).max(axis=1) > STALE_WEIGHT
         state = _with_evidence(state, data, given.floor, stale | (step == 1))
     found = mean_given(data, state.hyper)
+    if data.slopes is not None:
+        data = with_scatter(data, found)
+        found = mean_given(data, state.hyper)
     mean = expected + found
-    found_axes = [turned(*touch) for touch in zip(state.axes, mean, given.tangent, strict=True)]
-    axes, k1, k2, angle = (np.array(values) for values in zip(*found_axes, strict=True))
     # Outliers can be told only once the axes are level.
     level = np.hypot(mean[:, 0], mean[:, 1]) <= LEVEL if step < 2 else np.full(len(mean), True)
     weights, settled, surface = state.weights, np.full(len(mean), step == PASSES - 1), None
@@ -137,6 +157,10 @@ def _pass(
         students = _student_weights(data.residuals(found), weights > 0.0, given.floor)
         weights = np.where(level[:, None], students, weights)
         settled |= level & (np.abs(weights - state.weights).max(axis=1) <= SETTLED_WEIGHT)
+    # Axes follow the first curve in the end only, because the prior depends on them.
+    tangent = np.where(settled[:, None], given.tangent, state.axes[..., 0])
+    found_axes = [turned(*touch) for touch in zip(state.axes, mean, tangent, strict=True)]
+    axes, k1, k2, angle = (np.array(values) for values in zip(*found_axes, strict=True))
     if step and settled.any():
         which = slice(None) if settled.all() else settled
         surface = posterior_given(mean, data, state.hyper).at(which).rotated(angle[which])

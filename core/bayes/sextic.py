@@ -77,7 +77,8 @@ def sextics(local: Array, weights: Array, expected: Array, normals: Array, throu
         partials, steepness = slope_equations(normals, local, weights)
         steepness = steepness - (partials @ expected[..., None])[..., 0]
         columns = np.concatenate([partials, steepness[..., None]], axis=2)
-        slopes = NormalEquations(columns.transpose(0, 2, 1) @ columns, heights.contacts)
+        measured = normals.any(axis=2).sum(axis=1, dtype=float)
+        slopes = NormalEquations(columns.transpose(0, 2, 1) @ columns, measured)
     return Sextics(rows, weights, heights, slopes, pivot)
 
 
@@ -89,6 +90,19 @@ def mean_given(data: Sextics, hyper: Hyperparameters) -> Array:
     if data.slopes is not None:
         rhs = rhs + data.slopes.rhs
     return np.array([solved_definite(*each) for each in zip(precision, rhs, strict=True)])
+
+
+def with_scatter(data: Sextics, coefficients: Array) -> Sextics:
+    """The equations, where measured normals have at least the deviation by which they are off coefficients.
+
+    Normals of a texture scatter about the polynomial by more than their own deviation.
+    """
+    assert data.slopes is not None
+    off = np.concatenate([coefficients, np.full((len(coefficients), 1), -1.0)], axis=1)
+    squares = np.einsum("bi,bij,bj->b", off, data.slopes.bordered, off)
+    spread = np.maximum(squares / np.maximum(2.0 * data.slopes.contacts - FREE, 1.0), 1.0)
+    bordered = data.slopes.bordered / spread[:, None, None]
+    return data._replace(slopes=data.slopes._replace(bordered=bordered))
 
 
 def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> SurfacePosterior:

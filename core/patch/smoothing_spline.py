@@ -10,7 +10,7 @@ weigh as under a Student t distribution. Equations are banded, however many cont
 radius.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from math import comb
 from typing import Any, NamedTuple
@@ -219,6 +219,13 @@ def _heights_at_coarse_knots() -> Array:
     found = np.zeros((SIDE**2, len(at)), order="F")
     np.add.at(found, (at, np.arange(len(at))[:, None]), basis[0])
     return found
+
+
+def preparing() -> Iterator[None]:
+    """Finds in steps what all splines have in common; without it the first spline takes ten times as long."""
+    for order in ROUGHNESS:
+        _penalty(order)
+        yield
 
 
 @cache

@@ -78,7 +78,8 @@ def gathered(
     stroke = np.repeat(
         np.arange(len(contours) + len(arrays)), [*(len(c.points) for c in contours), *map(len, arrays)]
     )
-    return points[first], first + stroke[first], noise
+    # Repeated contacts leave no gaps: without them the same contacts follow each other.
+    return points[first], np.argsort(np.argsort(first)) + stroke[first], noise
 
 
 def means(
@@ -103,14 +104,15 @@ def means(
         return means(contacts, along, when, strips - 2)
     order = np.argsort(groups, kind="stable")  # Sums are the same whenever each contact was felt.
     counts = np.diff(starts, append=n)[:, None]
-    over = contacts[order]
-    basis = _basis(over)
+    # What they leave open of the quartic is as small as it can be in axes that they choose.
+    over, turn = contacts[order], np.array([[along[0], -along[1]], [along[1], along[0]]])
+    basis = _basis(over[:, :2] @ turn)
     # Singular values of the contacts are roots of those of their normal equations.
     inverse = np.linalg.pinv(basis.T @ basis, rcond=OPEN**2, hermitian=True)
     quartic = inverse @ (basis.T @ over[:, 2])
     over[:, 2] -= basis @ quartic
     found: Array = np.add.reduceat(over, starts, axis=0) / counts
-    found[:, 2] += _basis(found) @ quartic
+    found[:, 2] += _basis(found[:, :2] @ turn) @ quartic
     return found, int(counts.min())
 
 
@@ -138,8 +140,8 @@ def _equal(shares: Array, order: NDArray[np.intp], within: NDArray[np.intp], par
     return found
 
 
-def _basis(contacts: Array) -> Array:
-    return monomials(contacts[:, 0], contacts[:, 1], QUARTIC)
+def _basis(flat: Array) -> Array:
+    return monomials(flat[:, 0], flat[:, 1], QUARTIC)
 
 
 def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | DegenerateCurvesError:

@@ -424,6 +424,19 @@ def test_a_name_that_is_not_utf_8_costs_its_file_alone(command, objects, tmp_pat
         assert (good["ok"], bad["error"], bad["object"]) == (3, 3, r"caf\xe9")
 
 
+def test_a_mesh_with_vertices_that_are_not_finite_is_error_rows(command, objects, tmp_path):
+    lines = (objects / "pebble.ply").read_text().splitlines()
+    at = lines.index("end_header") + 7
+    for name, number in (("nan.ply", "nan"), ("far.ply", "1e39")):
+        (tmp_path / name).write_text("\n".join([*lines[:at], f"0 {number} 0", *lines[at + 1 :]]) + "\n")
+    words = (tmp_path, objects / "pebble.ply", "--touches", "3", "--output", tmp_path / "set")
+    code, output, error = command(*words)
+    assert code == 3 and "Traceback" not in error
+    assert output.count("has vertices whose coordinates are not finite in single precision") == 2
+    rows = {row["object"]: row for row in pq.read_table(tmp_path / "set" / "objects.parquet").to_pylist()}
+    assert (rows["pebble"]["ok"], rows["nan"]["error"], rows["far"]["error"]) == (3, 3, 3)
+
+
 def test_a_worker_whose_run_is_gone_finishes_the_file_that_it_writes(objects, plain, tmp_path):
     import json
 

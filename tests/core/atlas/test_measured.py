@@ -147,3 +147,15 @@ def test_an_empty_mesh_is_not_closed_and_has_edges_of_no_length():
     assert not mesh.is_closed
     assert mesh.edge == 0.0
     assert core.shortest_edge(mesh.vertices, mesh.triangles) == 0.0
+
+
+def test_normals_that_contacts_have_count_and_outward_is_for_the_others():
+    points = ball()
+    half = [core.Contour(points[:400], normals=points[:400]), points[400:][points[400:, 2] > 0.5]]
+    atlas = core.atlas_of([core.Contour(points, normals=points)], outward=(0, 0, 1), tolerance=0.05)
+    distance, std = atlas.distance([(0.0, 0.0, -0.8), (0.0, 0.0, -1.2), (0.0, 0.0, 0.8)])
+    assert np.isfinite(std).all()
+    assert np.sign(distance).tolist() == [-1.0, 1.0, -1.0]
+    with pytest.raises(ValueError, match="outward: expected a direction where contacts have no normals"):
+        core.atlas_of(half, tolerance=0.05)
+    assert core.atlas_of(half, outward=(0, 0, 1), tolerance=0.05).patches

@@ -10,6 +10,7 @@ import pytest
 import core
 from core.atlas.creases import creased
 from core.atlas.reference_mesh import ReferenceMesh, closest
+from core.atlas.touching import CHECKS, SHARPEST, rays_at
 from core.exploration.side_by_side import result_of
 from tests import solids
 
@@ -130,6 +131,24 @@ def test_a_tip_that_no_patch_reaches_is_where_the_planes_of_walls_meet(cone):
     assert np.isfinite(std).all()
     assert np.mean((off > 8.0 * std) & (off > 5e-3)) <= 1e-3
     assert np.mean(off <= 1.645 * std) > 0.85
+
+
+def test_the_sharpest_places_are_checked_and_touched_again():
+    cone = core.explore_object(CONE, CONE.start, CONE.outward, tolerance=TOLERANCE, noise=5e-4, rng=0)
+    assert cone.status == "ok"
+    mesh = cone.reference.mesh
+    assert mesh.vertices[mesh.vertices[:, 2].argmax()] == pytest.approx((0.0, 0.0, 1.0), abs=TOLERANCE)
+    starts, aims, _, length = rays_at(cone.reference)
+    assert np.linalg.norm(aims[CHECKS:][:SHARPEST] - (0.0, 0.0, 1.0), axis=1).min() < TOLERANCE
+    assert CONE.distances(starts).min() > 0.0
+    assert np.linalg.norm(aims - starts, axis=1).max() < length
+
+
+def test_angles_around_a_vertex_are_those_of_its_triangles(block):
+    angles = block.reference.angles
+    corners = np.linalg.norm(block.reference.mesh.vertices[:, None] - CORNERS, axis=2).argmin(axis=0)
+    assert angles[corners] == pytest.approx(1.5 * np.pi, abs=0.02)
+    assert (2.0 * np.pi - angles).sum() == pytest.approx(4.0 * np.pi)  # Gauss and Bonnet: 2 pi times 2
 
 
 @pytest.mark.parametrize("edge", [0.03, 0.012, 0.008, 0.006])

@@ -240,16 +240,16 @@ def test_contacts_off_the_surface_put_it_in_doubt(ball):
     """The tolerance is 4e-3, and the deviation less than 1e-3."""
     ways = np.random.default_rng(3).normal(size=(50, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    right = replace(ball, check=Check(ways, ways, np.zeros((0, 3))))
+    right = replace(ball, check=Check(ways, ways, np.zeros((0, 3)), len(ways)))
     assert right.status == "ok"
     off = ways * np.where(np.arange(50) < 2, 1.02, 1.0)[:, None]
-    wrong = replace(ball, check=Check(off, ways, np.zeros((0, 3))))
+    wrong = replace(ball, check=Check(off, ways, np.zeros((0, 3)), len(off)))
     assert wrong.contradicting.tolist() == [True, True] + 48 * [False]
     assert wrong.message.startswith("2 of 50 rays from outside meet something else than the surface")
-    missed = replace(ball, check=Check(ways[:49], ways[:49], ways[49:]))
+    missed = replace(ball, check=Check(ways[:49], ways[:49], ways[49:], 49))
     assert missed.message.startswith("1 of 50 rays from outside meet something else")
     beside = ways * np.where(np.arange(50) < 20, 1.004, 1.0)[:, None]
-    loose = replace(ball, check=Check(beside, ways, np.zeros((0, 3))))
+    loose = replace(ball, check=Check(beside, ways, np.zeros((0, 3)), len(beside)))
     assert not loose.contradicting.any()
     wide = result_of(loose.widened())
     distance, std = wide.distance(beside)

@@ -9,6 +9,7 @@ import surfaces
 from core import Contour, reconstruct
 
 TO_ROUNDING = 1e-6  # In deviations of the height. Rounding itself is a thousandth of this.
+TO_TILT = 1e-4  # Where d1 may be anywhere: the last tilt of the axes turns d1 by the square of its angle.
 
 
 def wavy(rng, rough):
@@ -47,14 +48,14 @@ def fitted(curves, strokes):
     return reconstruct((0, 0, 0), list(map(Contour, curves)), outward=(0, 0, 1), strokes=strokes)
 
 
-def require_same(one, other):
+def require_same(one, other, most=TO_ROUNDING):
     assert (other.status, other.patch.degree) == (one.status, one.patch.degree)
     assert other.mean_height_std == pytest.approx(one.mean_height_std, rel=1e-6)
     assert [other.patch.k1, other.patch.k2] == pytest.approx([one.patch.k1, one.patch.k2], abs=1e-7)
     x, y = one.domain.grid(100)[0].T
     there = other.frame.to_local(one.frame.to_world(np.column_stack([x, y, one.height(x, y)])))
     off = np.abs(there[:, 2] - other.height(*there[:, :2].T))
-    assert (off / one.height_std(x, y)).max() < TO_ROUNDING
+    assert (off / one.height_std(x, y)).max() < most
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -99,3 +100,39 @@ def test_measured_normals_and_ends_belong_to_their_contacts_in_any_order(count):
         require_same(one, other)
         assert other.domain.area == pytest.approx(one.domain.area)
         assert other.contradiction == pytest.approx(one.contradiction, rel=1e-6)
+
+
+def flat_at_the_point(kind, seed):
+    """Curves of a surface that is flat at the point, so that there the contacts tell no directions."""
+    rng = np.random.default_rng(seed)
+    crease, curves, beside = rng.uniform(0.0, 7.0), rng.integers(3, 7), np.linspace(-1.0, 1.0, 30)
+
+    def at(t, azimuth, off=0.0):
+        x, y = t * np.cos(azimuth) - off * np.sin(azimuth), t * np.sin(azimuth) + off * np.cos(azimuth)
+        fold = 0.3 * np.maximum(x * np.cos(crease) + y * np.sin(crease) - 0.3, 0.0)
+        z = {"fold": fold, "monkey": 0.2 * (x**3 - 3.0 * x * y**2), "plane": 0.0 * x}[kind]
+        return np.column_stack([x, y, z + rng.normal(0.0, 1e-4, len(x)) * (kind == "plane")])
+
+    azimuths = np.pi / curves * np.arange(curves) + rng.uniform(0.0, 7.0)
+    felt = [at(np.sort(rng.uniform(-1.0, rng.uniform(0.7, 1.0), rng.integers(60, 200))), a) for a in azimuths]
+    return felt, [at(beside, rng.uniform(0.0, 7.0), off) for off in np.linspace(-0.9, 0.9, 4)]
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", ["fold", "monkey", "plane"])
+def test_where_there_are_no_directions_any_curve_may_be_the_first(kind, seed):
+    felt, beside = flat_at_the_point(kind, seed)
+    for strokes in ([], beside):
+        one = fitted(felt, strokes)
+        require_same(one, fitted(felt[1:] + felt[:1], strokes), TO_TILT)
+        require_same(one, fitted(felt[::-1], strokes), TO_TILT)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("curves", [0, 4])
+def test_where_a_sensor_rests_in_a_stroke_contacts_count_once(curves, seed):
+    felt, beside = touched(60, 4, 40, seed)
+    one, rng = fitted(felt[:curves], beside), np.random.default_rng(seed)
+    require_same(one, fitted(felt[:curves], [np.repeat(points, 2, axis=0) for points in beside]))
+    some = [np.repeat(points, rng.integers(1, 4, len(points)), axis=0) for points in beside]
+    require_same(one, fitted(felt[:curves], some))
