@@ -182,8 +182,9 @@ class Frontier:
                 for share in REACHES
             ]
             # Across a notch the finger meets the mesh again.
-            if contacts[0] is not None and reference.away(contacts[0][0]) > OFF * reference.edge:
-                found.append((place, next(contact for contact in contacts[::-1] if contact is not None)))
+            off = [c for c in contacts if c is not None and reference.away(c[0]) > OFF * reference.edge]
+            if off:
+                found.append((place, off[-1]))
         return found
 
     def _forget_covered(self) -> Generator[None, None, None]:
