@@ -21,6 +21,7 @@ from .patch_record import (
 )
 
 LEAST_RANGE = 1e-3  # The range of colors is no smaller, in unit radius, so that a plane is pale green.
+LEAST_SHARE = 0.5  # That of K is no smaller than this share of the median curvedness, squared.
 LAYER = "tactile_layer"  # A patch's number among those that overlap; 0 is the lowest.
 ABOVE_OTHERS = "Above Other Patches"  # The modifier that draws it above those with lower numbers,
 APART = 2.0  # by so many deviations of the heights of both,
@@ -38,6 +39,10 @@ def recolor(obj):
     shades, record = values(mesh, shown), obj[RECORD if RECORD in obj else ATLAS_RECORD]
     floor = LEAST_RANGE * record["radius"] ** POWERS[shown]
     unknown = _unknown(mesh) if shown in CURVATURES else []
+    curvedness = np.delete(values(mesh, "curvedness"), unknown)
+    if shown == "gaussian_curvature" and len(curvedness):
+        # |K| is at most the square of the curvedness. Far below that, as on a cylinder, it is as good as 0.
+        floor = max(floor, LEAST_SHARE * float(np.median(curvedness)) ** 2)
     record["own_limit"] = colors.symmetric_range(np.delete(shades, unknown), floor)
     limit = obj.get(RANGE) or max(record["own_limit"], obj.get(COMMON_RANGE, 0.0))
     rgba = colors.diverging(shades, limit, unknown)
