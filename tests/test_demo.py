@@ -50,7 +50,7 @@ def test_a_rendered_pixel_has_the_color_that_the_bar_has_for_its_curvature(exten
         inside = np.hypot(*place[:2]) < 0.8 * patch["tactile"]["radius"]
         if clear and inside and np.abs(values).max() < 0.95 * limit:
             on_bar = [pixel(bar, (0.1, demo.BAR_REACH * value / limit, 0.0)) for value in values]
-            drawn = place + (0.0, 0.0, patch["tactile_above"])  # Renders draw it above the mesh.
+            drawn = np.add(place, (0.0, 0.0, patch["tactile_above"]))  # Renders draw it above the mesh.
             compared.append(np.abs(pixel(patch, drawn) - np.mean(on_bar, axis=0)).max())
     assert len(compared) > 200
     # Half a pixel of the bar is a 900th of its range; on the patch it is more where K changes fast.
