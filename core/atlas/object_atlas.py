@@ -199,9 +199,22 @@ class Atlas:
         return self._farther(np.maximum(OFF_STDS * stds, OFF_TOLERANCES * (self.tolerance or 0.0)))
 
     @property
-    def improvable(self) -> NDArray[np.bool_]:
-        """Which contacts of the check (n,) are so far from the surface that a touch there improves it."""
-        return self._farther(IMPROVABLE * (self.tolerance or 0.0))
+    def improvable(self) -> NDArray[np.intp]:
+        """The contacts of the check (k,) that are so far from the surface that a touch there improves it.
+
+        None is nearer to one before it than that is to the surface: a touch that finds another part of the
+        object is continued there.
+        """
+        far = np.flatnonzero(self._farther(IMPROVABLE * (self.tolerance or 0.0)))
+        if self.check is None or not len(far):
+            return far
+        away = np.abs(self._contacts[0])
+        chosen: list[int] = []
+        for i in far[np.argsort(-away[far], kind="stable")].tolist():
+            apart = np.linalg.norm(self.check.points[chosen] - self.check.points[i], axis=1)
+            if (apart >= away[chosen]).all():
+                chosen.append(i)
+        return np.array(chosen)
 
     def _farther(self, length: Array | float) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than lengths (n,)."""
