@@ -3,6 +3,7 @@
 """Exact objects touched all over: what is found of them, whether it is closed, and how far it is off."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -369,3 +370,15 @@ def test_false_while_patches_are_joined_ends_the_touching(when):
     except StopIteration as end:
         assert state.done == early
         assert len(end.value.patches) <= state.done
+
+
+def test_a_second_body_takes_no_more_touches_than_the_first():
+    def distance(x, y, z):
+        return math.hypot(abs(x) - 1.2, y, z) - 1.0
+
+    solid = solids.Solid(distance, (2.2, 0.0, 0.0), (1.0, 0.0, 0.0))
+    atlas = core.explore_object(solid, solid.start, solid.outward, tolerance=0.01, noise=1e-3, rng=0)
+    assert atlas.status == "ok"
+    assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 4, 2)
+    first = sum(r.frame.origin[0] > 0.0 for r in atlas.patches)
+    assert len(atlas.patches) - first <= 1.5 * first
