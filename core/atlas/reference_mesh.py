@@ -79,7 +79,8 @@ class ReferenceMesh:
         sides = np.roll(corners, -1, axis=1) - corners
         across = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)[:, None]
         angles = np.arctan2(across, -np.einsum("nki,nki->nk", sides, np.roll(sides, 1, axis=1)))
-        found: Array = np.bincount(self.mesh.triangles.ravel(), angles.ravel(), len(self.mesh.vertices))
+        count = len(self.mesh.vertices)
+        found: Array = np.bincount(self.mesh.triangles.ravel(), angles.ravel(), count).astype(np.float64)
         return found
 
     def widened(self, factor: float) -> "ReferenceMesh":

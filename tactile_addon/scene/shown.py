@@ -84,7 +84,7 @@ def _draw_above(patch, others):
     over = [obj for obj in others if _overlap(patch[RECORD], obj[RECORD])]
     taken = {obj.get(LAYER, 0) for obj in over}
     patch[LAYER] = next(number for number in range(len(taken) + 1) if number not in taken)
-    higher = [obj for obj in over if obj[LAYER] > patch[LAYER]]
+    higher = [obj for obj in over if obj.get(LAYER, 0) > patch[LAYER]]
     for obj in (patch, *sorted(higher, key=lambda each: each[LAYER])):
         below = [each for each in (patch, *others) if each.get(LAYER, 0) < obj[LAYER]]
         below = [each for each in below if _overlap(obj[RECORD], each[RECORD])]
