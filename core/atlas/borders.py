@@ -58,15 +58,8 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     places = mesh.vertices[at]
 
     def off(points: Array, which: Indices) -> Generator[float, None, Array]:
-        """How far the surface is above points (k, 3) beside some of the places, (k,); NaN where it is not."""
-        found = np.full(len(points), np.nan)
-        for i, (p, n) in enumerate(zip(points.tolist(), normals[which].tolist(), strict=True)):
-            contact = finger.near(vector_of(p), vector_of(n), near)
-            if contact is not None:
-                found[i] = np.dot(n, np.subtract(contact[0], p))
-            if i % PLACES_AT_ONCE == PLACES_AT_ONCE - 1:
-                yield 0.0
-        return found
+        """How far the surface is above points (k, 3) beside some of the places, (k,)."""
+        return _above(finger, near, points, normals[which])
 
     lengths, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
     places = places + lengths[:, None] * ways
@@ -86,6 +79,18 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     starts, ends = np.concatenate([a[~sharp], a[sharp], c]), np.concatenate([b[~sharp], c, b[sharp]])
     beyond = np.concatenate([(one + two)[~sharp], one[sharp], two[sharp]])
     return Border(np.stack([starts, ends], axis=1), beyond, c)
+
+
+def _above(finger: Finger, near: float, points: Array, normals: Array) -> Generator[float, None, Array]:
+    """How far the surface is above points (k, 3) along normals (k, 3), (k,); NaN where it is not."""
+    found = np.full(len(points), np.nan)
+    for i, (p, n) in enumerate(zip(points.tolist(), normals.tolist(), strict=True)):
+        contact = finger.near(vector_of(p), vector_of(n), near)
+        if contact is not None:
+            found[i] = np.dot(n, np.subtract(contact[0], p))
+        if i % PLACES_AT_ONCE == PLACES_AT_ONCE - 1:
+            yield 0.0
+    return found
 
 
 def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array, Array]:

@@ -223,7 +223,7 @@ class Charts:
         return np.array(np.broadcast_arrays(along[:, :, None], along[:, None]))
 
     def widened(self, factor: float) -> "Charts":
-        """The same patches with deviations that are larger by a factor."""
+        """Tables of these patches whose deviations are larger by a factor."""
         found = replace(self, stds=factor * self.stds)
         vars(found)["is_flat"] = self.is_flat  # where cached_property looks: it does not depend on these
         return found

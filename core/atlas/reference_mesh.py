@@ -84,7 +84,7 @@ class ReferenceMesh:
         return found
 
     def widened(self, factor: float) -> "ReferenceMesh":
-        """The same mesh with deviations that are larger by a factor."""
+        """A mesh of the same triangles whose deviations are larger by a factor."""
         found = replace(self, mesh=self.mesh._replace(std=factor * self.mesh.std))
         vars(found).update({name: vars(self)[name] for name in PREPARED if name in vars(self)})
         return found
