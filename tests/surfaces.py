@@ -264,3 +264,18 @@ def off_data(surface, r):
     """Mean |dz| of a reconstruction over its domain."""
     points, heights = heights_over(surface, r)
     return np.mean(np.abs(r.patch.height(*points.T) - heights))
+
+
+def wavy(rng, rough):
+    """The height of a random cubic with waves, which ask for a residual if they are `rough`."""
+    k, c = rng.uniform(-0.5, 0.5, 2), rng.normal(0.0, 0.1, 2)
+    lengths = rng.uniform(2.0, 12.0, 4) * (1.0 if rough else 0.3)
+    azimuths, phases, sizes = *rng.uniform(0.0, 7.0, (2, 4)), rng.uniform(0.002, 0.03, 4)
+
+    def height(x, y):
+        z = 0.5 * (k[0] * x**2 + k[1] * y**2) + c[0] * x**3 + c[1] * x**2 * y
+        for p, a, phase, size in zip(lengths, azimuths, phases, sizes, strict=True):
+            z = z + size * (np.cos(p * (x * np.cos(a) + y * np.sin(a)) + phase) - np.cos(phase))
+        return z
+
+    return height

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vector
 from ..contours.contour import EXTENT, Contour, SamplingPlane
-from ..contours.finger import Surface
+from ..contours.finger import ALIKE, Surface
 from ..contours.tracking import following, generator_of, track
 from ..reconstruction.deviations import with_height_stds
 from ..reconstruction.from_contours import fitted, options_of
@@ -26,10 +26,9 @@ from .taps import tapped
 MOST_EVEN = 24  # At most so many planes are laid out evenly.
 GLANCE_CONTACTS = 8  # A half curve has so many contacts where it is only asked whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
-# Touches with a given deviation, as those of a whole object, end where the surface bends by 40 degrees from
-# one contact to the next: an edge of 45 that is crossed aslant turns less in the plane
-# (python -m benchmarks.atlas --shapes).
-BENT, ANY = 0.77, -1.0
+# Touches with a given deviation, as those of a whole object, end where normals are not ALIKE from one
+# contact to the next; all others go on whatever the cosine between these.
+ANY = -1.0
 BISECTIONS = 6  # They narrow a factor of two to a 64th of it.
 
 Found = Generator[None, None, list[Exploration | ValueError]]
@@ -81,7 +80,7 @@ def touching(
         """The steps of one touch."""
         reference = SamplingPlane(0.0).axes(direction, tangent)
         place = surface, point, direction
-        cosine = BENT if wanted["largest_std"] else ANY
+        cosine = ALIKE if wanted["largest_std"] else ANY
         farthest = wanted["farthest"] or _farthest(partial(track, *place, wanted["planes"], tangent=tangent))
         follow = partial(following, *place, noise=noise, rng=generator, tangent=tangent, least_cosine=cosine)
         more = wanted | {"farthest": farthest, "tap": partial(tapped, surface)}

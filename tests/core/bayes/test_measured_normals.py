@@ -310,26 +310,12 @@ def test_right_normals_of_a_texture_are_not_doubted():
     assert max(tilts) > 0.35
 
 
-def rough(rng):
-    """The height of a random cubic with waves of half a radius and more."""
-    k, c, lengths = rng.uniform(-0.5, 0.5, 2), rng.normal(0.0, 0.1, 2), rng.uniform(2.0, 12.0, 4)
-    azimuths, phases, sizes = *rng.uniform(0.0, 7.0, (2, 4)), rng.uniform(0.002, 0.03, 4)
-
-    def height(x, y):
-        z = 0.5 * (k[0] * x**2 + k[1] * y**2) + c[0] * x**3 + c[1] * x**2 * y
-        for p, a, phase, size in zip(lengths, azimuths, phases, sizes, strict=True):
-            z = z + size * (np.cos(p * (x * np.cos(a) + y * np.sin(a)) + phase) - np.cos(phase))
-        return z
-
-    return height
-
-
 def test_normals_of_a_texture_that_noise_hides_make_fits_hardly_surer_than_they_are():
     """With noise of 1 % of the radius contacts ask for no process, and a sextic does not follow the waves."""
     off, step = [], 1e-5
     for seed in range(100, 160):
         rng = np.random.default_rng(seed)
-        height, contours, curves = rough(rng), [], 4 + seed % 2
+        height, contours, curves = surfaces.wavy(rng, rough=True), [], 4 + seed % 2
         for azimuth in np.pi / curves * np.arange(curves) + rng.uniform(0.0, 7.0):
             t = np.sort(rng.uniform(-1.0, 1.0, 100))
             x, y = t * np.cos(azimuth), t * np.sin(azimuth)

@@ -12,25 +12,10 @@ TO_ROUNDING = 1e-6  # In deviations of the height. Rounding itself is a thousand
 TO_TILT = 1e-4  # Where d1 may be anywhere: the last tilt of the axes turns d1 by the square of its angle.
 
 
-def wavy(rng, rough):
-    """The height of a random cubic with waves, which ask for a residual if they are `rough`."""
-    k, c = rng.uniform(-0.5, 0.5, 2), rng.normal(0.0, 0.1, 2)
-    lengths = rng.uniform(2.0, 12.0, 4) * (1.0 if rough else 0.3)
-    azimuths, phases, sizes = *rng.uniform(0.0, 7.0, (2, 4)), rng.uniform(0.002, 0.03, 4)
-
-    def height(x, y):
-        z = 0.5 * (k[0] * x**2 + k[1] * y**2) + c[0] * x**3 + c[1] * x**2 * y
-        for p, a, phase, size in zip(lengths, azimuths, phases, sizes, strict=True):
-            z = z + size * (np.cos(p * (x * np.cos(a) + y * np.sin(a)) + phase) - np.cos(phase))
-        return z
-
-    return height
-
-
 def touched(count, curves, strokes, seed):
     """Curves of up to `count` contacts with noise in all directions, and 12 strokes of some contacts each."""
     rng, noise = np.random.default_rng(seed), (0.0, 0.002, 0.01)[seed % 3]
-    height, felt = wavy(rng, seed % 2), []
+    height, felt = surfaces.wavy(rng, seed % 2), []
     for azimuth in np.pi / curves * np.arange(curves) + rng.uniform(0.0, 7.0):
         t = np.sort(rng.uniform(-rng.uniform(0.7, 1.0), 1.0, int(count * rng.uniform(0.7, 1.0))))
         felt.append(np.column_stack([t * np.cos(azimuth), t * np.sin(azimuth)]))
