@@ -30,14 +30,17 @@ from .contours.local_geometry import DegenerateCurvesError, Frame
 from .contours.tracking import track
 from .exploration.mesh_error import height_error, judged_by_mesh
 from .exploration.one_touch import Exploration
-from .exploration.touches import explore, explore_many, exploring_many
+from .exploration.options import ExplorationOptions
+from .exploration.side_by_side import exploring_many
+from .exploration.touches import explore, explore_many
 from .paper.by_method import SOLVERS
 from .patch.domain import Domain
 from .patch.geometry import Geometry, distances, fit_error, overlapped
 from .patch.monge import MongePatch
 from .reconstruction.deviations import mean_height_stds, with_height_stds
-from .reconstruction.from_contours import METHODS, reconstruct, reconstruct_many
+from .reconstruction.from_contours import reconstruct, reconstruct_many
 from .reconstruction.next_plane import azimuth_of, suggest_plane
+from .reconstruction.options import METHODS
 from .reconstruction.result import Reconstruction
 from .reconstruction.serialization import from_dict, to_dict
 from .scan.facets import has_few_facets
@@ -62,6 +65,7 @@ __all__ = [
     "Domain",
     "Edge",
     "Exploration",
+    "ExplorationOptions",
     "Frame",
     "Geometry",
     "Mesh",

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far touches all over an object are: about how many they will be, and which places they have covered."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,7 +9,8 @@ from ..arguments import LARGEST, Array, finite_array, number
 from ..contours.contour import tangent_of, vector_of
 from ..contours.finger import Finger, Surface, first_contact
 from ..contours.tracking import generator_of
-from ..exploration.touches import explore
+from ..exploration.options import ExplorationOptions
+from ..exploration.side_by_side import exploring_many, result_of
 from ..reconstruction.result import Reconstruction
 from .rims import felt_rim
 from .touching import FIRST_EXTENT, NEAR, SIZE
@@ -40,12 +39,12 @@ def expected_touches(
     """
     p, up = (finite_array(*given, (None, 3), LARGEST) for given in (("points", points), ("outward", outward)))
     number("area", area, above=0.0)
-    options: dict[str, Any] = {"noise": noise, "rng": generator_of(rng), "largest_std": SIZE * tolerance}
+    options = ExplorationOptions(
+        farthest=FIRST_EXTENT * tolerance, largest_std=SIZE * tolerance, noise=noise, rng=generator_of(rng)
+    )
     felt = []
-    for point, n in zip(p, up, strict=True):
-        try:
-            e = explore(surface, point, n, farthest=FIRST_EXTENT * tolerance, **options)
-        except ValueError:
+    for point, n, e in zip(p, up, result_of(exploring_many(surface, p, up, options)), strict=True):
+        if isinstance(e, ValueError):
             continue
         normal = vector_of(n)
         side = first_contact(surface, vector_of(point), normal, tangent_of(normal, None), e.step)[2]

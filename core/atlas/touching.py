@@ -15,8 +15,8 @@ from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, ve
 from ..contours.finger import FACING, Finger, Surface, contact_of, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
-from ..exploration.side_by_side import exploring
-from ..exploration.touches import explore
+from ..exploration.options import ExplorationOptions
+from ..exploration.side_by_side import exploring_many, result_of
 from .borders import bordered, felt_border
 from .charts import Charts
 from .frontier import Frontier
@@ -91,7 +91,8 @@ def touch_all_over(
     most, generator = int(number("most", most, least=1.0)), generator_of(rng)
     if tolerance < noise:
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
-    run = _Run(surface, tolerance, most, {"noise": noise, "rng": generator, "largest_std": SIZE * tolerance})
+    options = ExplorationOptions(noise=noise, rng=generator, largest_std=SIZE * tolerance)
+    run = _Run(surface, tolerance, most, options)
     more = _goes_on((yield run.first(p, up)))
     more = yield from _all_over(run, more)
     return (yield from _joined(run, more))
@@ -134,8 +135,8 @@ def _goes_on(answer: object) -> bool:
 class _Run:
     """The touches so far, and what all of them have in common."""
 
-    def __init__(self, surface: Surface, tolerance: float, most: int, wanted: dict[str, Any]) -> None:
-        self.surface, self.tolerance, self.most, self.wanted = surface, tolerance, most, wanted
+    def __init__(self, surface: Surface, tolerance: float, most: int, options: ExplorationOptions) -> None:
+        self.surface, self.tolerance, self.most, self.options = surface, tolerance, most, options
         self.found: list[Exploration] = []
         self.done = 0
 
@@ -146,11 +147,11 @@ class _Run:
         """
         p, n = vector_of(point), vector_of(up)
         best, why = None, None
+        options = replace(self.options, farthest=FIRST_EXTENT * self.tolerance)
         for at, outward in self._places(p, n):
-            try:
-                e = explore(self.surface, at, outward, farthest=FIRST_EXTENT * self.tolerance, **self.wanted)
-            except ValueError as error:
-                why = why or error
+            (e,) = result_of(exploring_many(self.surface, [at], [outward], options))
+            if isinstance(e, ValueError):
+                why = why or e
                 continue
             if best is None or e.result.radius > best[0].result.radius:
                 best = e, at, outward
@@ -165,8 +166,8 @@ class _Run:
             Finger(self.surface, side),
             NEAR * self.tolerance,
             np.pi * (SMALL * self.tolerance) ** 2,
-            self.wanted["noise"],
-            self.wanted["rng"],
+            self.options.noise,
+            generator_of(self.options.rng),
         )
         if not self.frontier.add(first.result):
             raise ValueError("point: expected a surface within three tolerances of the first patch, got none")
@@ -202,7 +203,9 @@ class _Run:
         least : the least radius of each, in tolerances; along a crease narrow ones would go on without end
         """
         points, outward = (np.array(values) for values in zip(*contacts, strict=True))
-        results = yield from exploring(self.surface, points, outward, farthest=farthest, **self.wanted)
+        results = yield from exploring_many(
+            self.surface, points, outward, replace(self.options, farthest=farthest)
+        )
         new = []
         for e, point, up, times in zip(results, points, outward, least, strict=True):
             # At an edge a fit may end up on the other side.
@@ -223,7 +226,7 @@ class _Run:
         contours = [[*e.contours, taps] for e, taps in zip(self.found, self.frontier.taps, strict=True)]
         results = [e.result for e in self.found]
         yield 0.0
-        return (yield from joined(contours, results, self.frontier.charts, self.wanted["noise"], known))
+        return (yield from joined(contours, results, self.frontier.charts, self.options.noise, known))
 
     def going_on(self, contacts: Sequence[Contact], farthest: float) -> Generator[Progress, object, bool]:
         """Touches at contacts, and all over from there. Returns whether to go on."""

@@ -15,6 +15,7 @@ from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from .enough import CONTACT_COUNTS, SHORTEST, is_enough, spacing
 from .growth import FELT, STRETCH, Counts, Feel, Felt, Grown, grown
+from .options import ExplorationOptions
 from .taps import Tapped, beside
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
@@ -61,39 +62,24 @@ class Touch:
     follow : takes planes and a step, returns what follows their contours to a given extent
     point : (3,)
     reference : columns e1, n and e1 x n, from which azimuths are measured
-    extent, step : lengths; None where they are to be chosen
     farthest : a length that no half curve exceeds
-    tolerance : mean deviation of the height to reach by adding planes; None adds no planes
-    largest_std : mean deviation of the height up to which curves grow; None for a share of the radius
     tap : taps the surface between the curves of a fit, see taps.py
-    is_grown : whether the caller asks for the same fit that makes the curves grow
     """
 
     follow: Callable[..., Callable[[float], list[Contour]]]
     point: Array
     reference: Array
-    planes: tuple[SamplingPlane, ...]
-    extent: float | None
-    step: float | None
     farthest: float
-    tolerance: float | None
-    most_planes: float
-    largest_std: float | None
     tap: Callable[[Reconstruction], Tapped]
-    is_grown: bool
-
-    @property
-    def is_tapped(self) -> bool:
-        """Whether the finger taps between the curves: only if shares of the radius choose their length."""
-        return self.extent is None and self.largest_std is None
+    options: ExplorationOptions
 
     def steps(self) -> Steps:
         """The touch, with planes added while they help. They make a patch more certain, not larger."""
-        found = yield from (self._grown() if self.extent is None else self._of_extent(self.extent))
+        extent, tolerance = self.options.extent, self.options.tolerance
+        found = yield from (self._grown() if extent is None else self._of_extent(extent))
         stds = [found.result.mean_height_std]
-        while (
-            self.tolerance is not None and stds[-1] > self.tolerance and len(found.planes) < self.most_planes
-        ):
+        most = self.options.most_planes
+        while tolerance is not None and stds[-1] > tolerance and len(found.planes) < most:
             plane, expected = suggest_plane(found.result, self.reference[:, 1], self.reference[:, 0])
             if expected > (1.0 - HELPS) * stds[-1]:
                 break
@@ -102,47 +88,49 @@ class Touch:
             except ValueError:  # Nothing can be felt along that plane. What was felt so far stays.
                 break
             stds.append(found.result.mean_height_std)
-        if self.is_tapped and found.result.taps is None:
+        if self.options.is_tapped and found.result.taps is None:
             found, _ = self._tapped(found)
         return replace(found, stds=tuple(stds))
 
     def _of_extent(self, extent: float) -> Steps:
-        steps = [extent / count for count in CONTACT_COUNTS] if self.step is None else [self.step]
+        steps = (
+            [extent / count for count in CONTACT_COUNTS] if self.options.step is None else [self.options.step]
+        )
 
         def at(step: float) -> Contacts:
             """The contacts this step apart."""
-            contours = self.follow(self.planes, step=step)(extent)
-            return contours if self.extent else [_open(c) for c in contours], step, None
+            contours = self.follow(self.options.planes, step=step)(extent)
+            return contours if self.options.extent else [_open(c) for c in contours], step, None
 
         return (yield from self._enough(at, extent, steps))
 
     def _grown(self) -> Steps:
         """The touch as large as it can be trusted."""
-        between = max(self.step or 0.0, self.farthest / FELT)
+        between = max(self.options.step or 0.0, self.farthest / FELT)
         try:
             largest = yield from self._longest(between)
         except DegenerateCurvesError:
-            if self.step is not None:
+            if self.options.step is not None:
                 raise
             # The surface may be too narrow for this step: a strip along an edge, or a fillet.
             largest = yield from self._longest(between / FINER)
         counts = largest.counts
         found = yield from self._of_reaches(largest, counts)
-        if largest.sure and found.result.status != "ok" and self.is_grown:
+        if largest.sure and found.result.status != "ok" and self.options.is_grown:
             # The step was chosen anew, so these are other contacts than those that were explained.
             counts = np.floor(counts / STRETCH).astype(np.intp)
             found = yield from self._of_reaches(largest, counts)
-        if not self.is_tapped:
+        if not self.options.is_tapped:
             return found
         found = yield from self._agreeing(largest, counts, found)
-        return (yield from self._shortened(found)) if self.is_grown else found
+        return (yield from self._shortened(found)) if self.options.is_grown else found
 
     def _longest(self, step: float) -> Generator[Ask, Answer, Grown]:
         """The longest half curves that fits explain, of contacts this step apart."""
         fits = grown(self._feeling(step), self.farthest, step)
         contours = next(fits)
         while True:
-            answer = yield Ask(contours, growing=not self.is_grown)
+            answer = yield Ask(contours, growing=not self.options.is_grown)
             try:
                 contours = fits.send(answer)
             except StopIteration as end:
@@ -152,7 +140,7 @@ class Touch:
     def _agreeing(self, largest: Grown, counts: Counts, found: Exploration) -> Steps:
         """The touch with curves so short that no tap contradicts it, or `found` if there is none."""
         r, (found, where) = found.result, self._tapped(found)
-        if not (len(where) and self.is_grown and r.status == "ok"):
+        if not (len(where) and self.options.is_grown and r.status == "ok"):
             return found
         shorter = found
         while len(where):
@@ -187,12 +175,12 @@ class Touch:
 
     def _feeling(self, step: float) -> Feel:
         """The function that follows half curves along the planes, each time from where they ended before."""
-        feel = self.follow(self.planes, step=step)
+        feel = self.follow(self.options.planes, step=step)
 
         def felt(length: float) -> Felt:
             """The half curves to this length."""
             contours = feel(min(length, self.farthest))
-            return Felt(contours, self.point, step, self.largest_std, partial=length < self.farthest)
+            return Felt(contours, self.point, step, self.options.largest_std, partial=length < self.farthest)
 
         return felt
 
@@ -205,16 +193,20 @@ class Touch:
             """The contacts this step apart, or somewhat nearer to each other."""
             stride = int(step / felt.step * (1.0 + 1e-6))
             if stride:
-                same = self.is_grown and counts is largest.counts and stride == largest.stride
+                same = self.options.is_grown and counts is largest.counts and stride == largest.stride
                 known = largest.result if same else None
                 return felt.shortened(counts, stride), stride * felt.step, known
             # One step more shows whether a half curve ends there.
-            longer = self.follow(self.planes, step=step)(min(length + step, self.farthest))
-            again = Felt(longer, self.point, step, self.largest_std)
+            longer = self.follow(self.options.planes, step=step)(min(length + step, self.farthest))
+            again = Felt(longer, self.point, step, self.options.largest_std)
             fewer = np.minimum((reaches / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
             return again.shortened(fewer), step, None
 
-        steps = [spacing(reaches, count) for count in CONTACT_COUNTS] if self.step is None else [self.step]
+        steps = (
+            [spacing(reaches, count) for count in CONTACT_COUNTS]
+            if self.options.step is None
+            else [self.options.step]
+        )
         return (yield from self._enough(at, length, steps))
 
     def _enough(self, at: Callable[[float], Contacts], extent: float, steps: list[float]) -> Steps:
@@ -228,7 +220,7 @@ class Touch:
             elif wanted == steps[-1] or is_enough(r):
                 break
         assert isinstance(r, Reconstruction)
-        return Exploration(contours, r, extent, step, self.planes)
+        return Exploration(contours, r, extent, step, tuple(self.options.planes))
 
     def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more, along which curves are as long as the fit explains their contacts.
@@ -238,7 +230,7 @@ class Touch:
         """
         half = 0.5 * found.step
         contours = self.follow((plane,), step=half)(found.extent)
-        felt = Felt(contours, self.point, half, self.largest_std)
+        felt = Felt(contours, self.point, half, self.options.largest_std)
         counts = felt.whole // 2 * 2
         while True:
             contours = [*found.contours, *felt.shortened(counts, 2)]
@@ -247,7 +239,11 @@ class Touch:
                 raise r
             misfits = felt.misfits(counts, r)
             worst = int(np.argmax(misfits))
-            if self.extent is not None or misfits.flat[worst] <= 1.0 or counts.flat[worst] <= 2 * SHORTEST:
+            if (
+                self.options.extent is not None
+                or misfits.flat[worst] <= 1.0
+                or counts.flat[worst] <= 2 * SHORTEST
+            ):
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
             counts.flat[worst] = max(2 * SHORTEST, int(counts.flat[worst] / STRETCH) // 2 * 2)
 

@@ -2,28 +2,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Many touches side by side that choose their size, in steps; the fits that they ask for come in stacks."""
 
-import math
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import LARGEST, Array, finite_array, list_of, number, unit_vector
+from ..arguments import LARGEST, Array, finite_array, unit_vector
 from ..contours.contour import EXTENT, Contour, SamplingPlane
 from ..contours.finger import ALIKE, Surface
 from ..contours.tracking import following, generator_of, track
 from ..reconstruction.deviations import with_height_stds
-from ..reconstruction.from_contours import fitted, options_of
+from ..reconstruction.from_contours import fitted
+from ..reconstruction.options import FitOptions
 from ..reconstruction.result import Reconstruction
-from ..reconstruction.stacks import Options
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
 from .one_touch import Answer, Ask, Exploration, Steps, Touch
+from .options import ExplorationOptions
 from .taps import tapped
 
-MOST_EVEN = 24  # At most so many planes are laid out evenly.
 GLANCE_CONTACTS = 8  # A half curve has so many contacts where it is only asked whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
 # Touches with a given deviation, as those of a whole object, end where normals are not ALIKE from one
@@ -34,59 +34,33 @@ BISECTIONS = 6  # They narrow a factor of two to a 64th of it.
 Found = Generator[None, None, list[Exploration | ValueError]]
 
 
-def exploring(
-    surface: Surface,
-    points: ArrayLike,
-    outward: ArrayLike,
-    *,
-    farthest: float,
-    largest_std: float,
-    noise: float,
-    rng: np.random.Generator,
+def exploring_many(
+    surface: Surface, points: ArrayLike, outward: ArrayLike, options: ExplorationOptions
 ) -> Found:
-    """What `explore_many` gives with its defaults, in steps: yields a few times for each touch."""
-    wanted: dict[str, Any] = {
-        "planes": planes_of(3),
-        "extent": None,
-        "step": None,
-        "farthest": farthest,
-        "largest_std": largest_std,
-        "tolerance": None,
-        "most_planes": 6,
-        "is_grown": True,
-    }
-    return touching(
-        surface, points, outward, wanted, noise, rng, None, options_of("bayes", "auto", None, None, "fast")
-    )
+    """What `explore_many` gives, in steps: yields after each contour and each stack of fits.
 
+    points, outward : (m, 3)
 
-def touching(
-    surface: Surface,
-    points: ArrayLike,
-    outward: ArrayLike,
-    wanted: dict[str, Any],
-    noise: float,
-    rng: np.random.Generator | int | None,
-    tangent: ArrayLike | None,
-    fit: Options,
-) -> Found:
-    """Touches at points (m, 3), side by side; `wanted` is what Touch takes besides the place."""
+    Raises ValueError for bad arguments, and where curves do not end and there is no farthest length.
+    """
     p = finite_array("points", points, (None, 3), LARGEST)
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
-    noise, generator = number("noise", noise, least=0.0), generator_of(rng)
+    generator, tangent = generator_of(options.rng), options.tangent
+    cosine = ALIKE if options.largest_std else ANY
 
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
         reference = SamplingPlane(0.0).axes(direction, tangent)
         place = surface, point, direction
-        cosine = ALIKE if wanted["largest_std"] else ANY
-        farthest = wanted["farthest"] or _farthest(partial(track, *place, wanted["planes"], tangent=tangent))
-        follow = partial(following, *place, noise=noise, rng=generator, tangent=tangent, least_cosine=cosine)
-        more = wanted | {"farthest": farthest, "tap": partial(tapped, surface)}
-        return (yield from Touch(follow, point, reference, **more).steps())
+        farthest = options.farthest or _farthest(partial(track, *place, options.planes, tangent=tangent))
+        follow = partial(
+            following, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
+        )
+        touch = Touch(follow, point, reference, farthest, partial(tapped, surface), options)
+        return (yield from touch.steps())
 
-    return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, fit)
+    return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
 
 
 def result_of(steps: Generator[Any, Any, Any]) -> Any:
@@ -96,18 +70,6 @@ def result_of(steps: Generator[Any, Any, Any]) -> Any:
             next(steps)
     except StopIteration as end:
         return end.value
-
-
-def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
-    """So many evenly spread planes, or the planes that are given."""
-    if not isinstance(planes, int | np.integer):
-        found = tuple(list_of("planes", planes, SamplingPlane))
-        if not found:
-            raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got none")
-        return found
-    if not 3 <= planes <= MOST_EVEN:
-        raise ValueError(f"planes: expected 3 to {MOST_EVEN}, or sampling planes, got {planes}")
-    return tuple(SamplingPlane(math.pi * i / planes) for i in range(planes))
 
 
 def _farthest(feel: Callable[..., list[Contour]]) -> float:
@@ -143,13 +105,7 @@ def _farthest(feel: Callable[..., list[Contour]]) -> float:
     return most
 
 
-def given(name: str, length: float | str) -> float | None:
-    """The length checked, or None for "auto"."""
-    automatic = isinstance(length, str) and length == "auto"
-    return None if automatic else number(name, length, above=0.0)  # type: ignore[arg-type]
-
-
-def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Options) -> Found:
+def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: FitOptions) -> Found:
     """The results of b touches at points (b, 3) with outward directions (b, 3); fits are done in stacks.
 
     Yields after each contour and each stack.
@@ -169,7 +125,7 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Op
         answers = {}
         for growing in (True, False):
             which = [i for i, ask in asked.items() if ask.growing is growing]
-            options = fit._replace(method="bayes") if growing else fit
+            options = replace(fit, method="bayes") if growing else fit
             touches = [Given(asked[i].contours, *gathered(())) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import LARGEST, finite_array, number, unit_vector
+from ..arguments import LARGEST, finite_array, unit_vector
 from ..contours.contour import SamplingPlane
 from ..contours.finger import Surface
-from ..reconstruction.from_contours import options_of
 from .one_touch import Exploration
-from .side_by_side import Found, given, planes_of, result_of, touching
+from .options import ExplorationOptions, planes_of
+from .side_by_side import exploring_many, result_of
 
 
 def explore(
@@ -72,28 +72,27 @@ def explore(
     ('ok', -1.0, True)
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
-    (found,) = explore_many(
-        surface,
-        p[None],
-        up[None],
-        planes,
-        farthest=farthest,
-        largest_std=largest_std,
-        tolerance=tolerance,
-        most_planes=most_planes,
-        extent=extent,
-        step=step,
-        noise=noise,
-        rng=rng,
-        tangent=tangent,
-        method=method,
-        degree=degree,
-        weight=weight,
-        solver=solver,
+    options = ExplorationOptions(
+        planes_of(planes),
+        farthest,
+        largest_std,
+        tolerance,
+        most_planes,
+        extent,  # type: ignore[arg-type]  # "auto" becomes None
+        step,  # type: ignore[arg-type]
+        noise,
+        rng,
+        tangent,
+        method,
+        degree,
+        weight,
+        solver,
     )
+    (found,) = result_of(exploring_many(surface, p[None], up[None], options))
     if isinstance(found, ValueError):
         raise found
-    return found
+    touch: Exploration = found
+    return touch
 
 
 def explore_many(
@@ -101,82 +100,15 @@ def explore_many(
     points: ArrayLike,
     outward: ArrayLike,
     planes: int | Sequence[SamplingPlane] = 3,
-    *,
-    farthest: float | None = None,
-    largest_std: float | None = None,
-    tolerance: float | None = None,
-    most_planes: int = 6,
-    extent: float | str = "auto",
-    step: float | str = "auto",
-    noise: float = 0.0,
-    rng: np.random.Generator | int | None = None,
-    tangent: ArrayLike | None = None,
-    method: str = "bayes",
-    degree: int | str = "auto",
-    weight: float | None = None,
-    solver: str = "fast",
+    **options: Any,
 ) -> list[Exploration | ValueError]:
     """What `explore` gives at each of m points; side by side, with their fits in stacks, which is faster.
 
-    points, outward : (m, 3); all else as in `explore`, of all of them
+    points, outward : (m, 3)
+    planes, options : as in `explore`, of all of them
 
     A touch that is not possible is returned as its error. Raises ValueError for bad arguments.
     """
-    found: list[Exploration | ValueError] = result_of(
-        exploring_many(
-            surface,
-            points,
-            outward,
-            planes,
-            farthest=farthest,
-            largest_std=largest_std,
-            tolerance=tolerance,
-            most_planes=most_planes,
-            extent=extent,
-            step=step,
-            noise=noise,
-            rng=rng,
-            tangent=tangent,
-            method=method,
-            degree=degree,
-            weight=weight,
-            solver=solver,
-        )
-    )
+    wanted = ExplorationOptions(planes_of(planes), **options)
+    found: list[Exploration | ValueError] = result_of(exploring_many(surface, points, outward, wanted))
     return found
-
-
-def exploring_many(
-    surface: Surface,
-    points: ArrayLike,
-    outward: ArrayLike,
-    planes: int | Sequence[SamplingPlane] = 3,
-    *,
-    farthest: float | None = None,
-    largest_std: float | None = None,
-    tolerance: float | None = None,
-    most_planes: int = 6,
-    extent: float | str = "auto",
-    step: float | str = "auto",
-    noise: float = 0.0,
-    rng: np.random.Generator | int | None = None,
-    tangent: ArrayLike | None = None,
-    method: str = "bayes",
-    degree: int | str = "auto",
-    weight: float | None = None,
-    solver: str = "fast",
-) -> Found:
-    """What `explore_many` gives, in steps: yields after each contour and each stack of fits."""
-    length = given("extent", extent)
-    wanted: dict[str, Any] = {
-        "planes": planes_of(planes),
-        "extent": length,
-        "step": given("step", step),
-        "farthest": length or (None if farthest is None else number("farthest", farthest, above=0.0)),
-        "largest_std": None if largest_std is None else number("largest_std", largest_std, above=0.0),
-        "tolerance": None if tolerance is None else number("tolerance", tolerance, least=0.0),
-        "most_planes": number("most_planes", most_planes, least=3.0),
-        "is_grown": method == "bayes",
-    }
-    fit = options_of(method, degree, None, weight, solver)
-    return (yield from touching(surface, points, outward, wanted, noise, rng, tangent, fit))

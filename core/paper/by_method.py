@@ -11,18 +11,29 @@ from . import least_squares, tagc
 
 PAPER_METHODS = ("tagc", "quadratic-variation", "least-squares")
 SOLVERS = ("fast", "descent")
+# Default weights lambda L^2. That of TAGC is the paper's, 9.99/mm^2 at L = 10 mm. The paper minimizes
+# quadratic variation subject to f = 0, to which 1e5 comes near.
+WEIGHTS = {"tagc": 1e3, "quadratic-variation": 1e5}
 
 
 def coefficients(
-    curves: Curves, k1: float, k2: float, degree: int, domain: Domain, method: str, weight: float, solver: str
+    curves: Curves,
+    k1: float,
+    k2: float,
+    degree: int,
+    domain: Domain,
+    method: str,
+    weight: float | None,
+    solver: str,
 ) -> tuple[Array, bool]:
     """The coefficients (m,) of (1) for the curves of one touch and these curvatures; whether it converged.
 
-    weight : lambda L^2; degree, method and solver are those of `reconstruct`
+    weight : lambda L^2, None for the default of WEIGHTS; degree, method and solver are those of `reconstruct`
     """
     data = least_squares.problem(k1, k2, degree, curves.points[curves.present])
     if method == "least-squares":
         return least_squares.least_squares(data), True
+    weight = WEIGHTS[method] if weight is None else weight
     if method == "quadratic-variation":
         return least_squares.quadratic_variation(data, domain, weight), True
     objective = tagc.Objective(data, domain, weight)

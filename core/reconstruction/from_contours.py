@@ -3,6 +3,7 @@
 """The way from contacts to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,23 +13,17 @@ from ..arguments import (
     Array,
     finite_array,
     list_of,
-    number,
-    shown,
     unit_vector,
 )
 from ..contours.contour import Contour
 from ..contours.curves import has_measured_normals
 from ..contours.local_geometry import DegenerateCurvesError
-from ..paper.by_method import PAPER_METHODS, SOLVERS
+from .options import FitOptions
 from .result import Reconstruction
-from .stacks import Options, fitted_stack
+from .stacks import fitted_stack
 from .start import Given
 from .strokes import gathered
 
-METHODS = ("bayes", *PAPER_METHODS)
-# Default weights lambda L^2. That of TAGC is the paper's, 9.99/mm^2 at L = 10 mm. The paper minimizes
-# quadratic variation subject to f = 0, to which 1e5 comes near.
-WEIGHTS = {"tagc": 1e3, "quadratic-variation": 1e5}
 STACK = 4000  # So many contacts at once fit into a processor's cache (benchmarks.speed).
 
 
@@ -70,7 +65,7 @@ def reconstruct(
     (-1.0, -1.0, 'ok')
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
-    options = options_of(method, degree, noise, weight, solver, radius)
+    options = FitOptions(method, degree, noise, weight, solver, radius)
     touch = _given(list_of("contours", contours, Contour), strokes, options)
     (result,) = fitted_stack(p[None], [touch], up[None], options)
     if isinstance(result, DegenerateCurvesError):
@@ -84,22 +79,18 @@ def reconstruct_many(
     *,
     outward: ArrayLike,
     strokes_list: Sequence[Sequence[ArrayLike | Contour]] | None = None,
-    radius: float | None = None,
-    method: str = "bayes",
-    degree: int | str = "auto",
-    noise: float | None = None,
-    weight: float | None = None,
-    solver: str = "fast",
+    **options: Any,
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """What `reconstruct` gives for each of n touches, in stacks, in which "bayes" is several times as fast.
 
     points : (n, 3); contours_list : n lists of contours; outward : (n, 3); strokes_list : n lists of strokes
+    options : the other keywords of `reconstruct`
 
     A touch that cannot carry the method is returned as its DegenerateCurvesError. Raises
     ValueError for bad arguments.
     """
     p = finite_array("points", points, (None, 3), LARGEST)
-    options = options_of(method, degree, noise, weight, solver, radius)
+    fit = FitOptions(**options)
     lists = list_of("contours_list", contours_list, Sequence)  # type: ignore[type-abstract]
     beside = [()] * len(lists) if strokes_list is None else list_of("strokes_list", strokes_list, Sequence)  # type: ignore[type-abstract]
     for name, given in (("contours_list", lists), ("strokes_list", beside)):
@@ -107,14 +98,12 @@ def reconstruct_many(
             raise ValueError(f"{name}: expected {len(p)} lists of {name[:-5]}, got {len(given)}")
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
-    touches = [
-        _given(list_of("contours", c, Contour), s, options) for c, s in zip(lists, beside, strict=True)
-    ]
-    return fitted(p, touches, up, options)
+    touches = [_given(list_of("contours", c, Contour), s, fit) for c, s in zip(lists, beside, strict=True)]
+    return fitted(p, touches, up, fit)
 
 
 def fitted(
-    points: Array, touches: Sequence[Given], outward: Array, options: Options
+    points: Array, touches: Sequence[Given], outward: Array, options: FitOptions
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """What `reconstruct_many` gives for checked points (n, 3), n touches and outward directions (n, 3)."""
     # A stack has room for its longest contour in all places, so touches of similar size go together.
@@ -133,31 +122,7 @@ def fitted(
     return [results[i] for i in range(len(touches))]
 
 
-def options_of(
-    method: str,
-    degree: int | str,
-    noise: float | None,
-    weight: float | None,
-    solver: str,
-    radius: float | None = None,
-) -> Options:
-    """The checked options of a fit. Raises ValueError for bad ones."""
-    for name, value, choices in (("method", method, METHODS), ("solver", solver, SOLVERS)):
-        if not isinstance(value, str) or value not in choices:
-            raise ValueError(f"{name}: expected one of {', '.join(choices)}, got {shown(value)}")
-    if not isinstance(degree, int | np.integer | str) or degree not in ("auto", 2, 3, 4, 5, 6):
-        raise ValueError(f'degree: expected a whole number from 2 to 6 or "auto", got {shown(degree)}')
-    return Options(
-        method,
-        None if isinstance(degree, str) else int(degree),
-        None if noise is None else number("noise", noise, least=0.0),
-        WEIGHTS.get(method, 1.0) if weight is None else number("weight", weight, above=0.0),
-        solver,
-        None if radius is None else number("radius", radius, above=0.0),
-    )
-
-
-def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: Options) -> Given:
+def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: FitOptions) -> Given:
     found = Given(contours, *gathered(strokes, contours))
     if len(found.strokes) and options.method != "bayes":
         raise ValueError(

@@ -17,7 +17,7 @@ from ..contours.local_geometry import Frame
 from ..patch.domain import closed_spline_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import TERMS, MongePatch
-from .from_contours import METHODS
+from .options import METHODS
 from .result import Reconstruction
 from .status import Taps
 

@@ -19,19 +19,9 @@ from ..paper.by_method import coefficients
 from ..patch.domain import Domain, hull_domain
 from ..patch.geometry import Geometry
 from ..patch.monge import HeightField, MongePatch
+from .options import FitOptions
 from .result import Reconstruction
 from .start import Given, Start, away_from, curves_start, domain_of, strokes_start
-
-
-class Options(NamedTuple):
-    """The options of a fit, checked."""
-
-    method: str
-    degree: int | None  # None for "auto"
-    noise: float | None  # None for the contours' own
-    weight: float
-    solver: str
-    radius: float | None  # of strokes alone
 
 
 class _Fit(NamedTuple):
@@ -46,7 +36,7 @@ class _Fit(NamedTuple):
 
 
 def fitted_stack(
-    points: Array, touches: Sequence[Given], outward: Array, options: Options
+    points: Array, touches: Sequence[Given], outward: Array, options: FitOptions
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """The results of touches whose arguments are checked, and which are all of strokes alone or none is."""
     if touches[0].is_of_strokes:
@@ -66,16 +56,16 @@ def fitted_stack(
     return found
 
 
-def _fit(start: Start, options: Options) -> _Fit:
+def _fit(start: Start, options: FitOptions) -> _Fit:
     """The touches in the frames of the paper, or in those of the joint fit."""
     contacts, present = start.contacts()
-    degrees = [options.degree or 0] * len(start.points)
+    degrees = [0 if isinstance(options.degree, str) else options.degree] * len(start.points)
     plain = _Fit(start.points, start.axes, start.radii, contacts, degrees, None)
-    if options.method != "bayes" and options.degree is not None:
+    if options.method != "bayes" and options.degree != "auto":
         return plain
     turns, posteriors, weights = _joint(start, contacts, present)
     turned = contacts @ turns
-    if options.degree is None:
+    if options.degree == "auto":
         degrees = [posteriors.at(i).degree_shown(turned[i][present[i]]) for i in range(len(degrees))]
     if options.method != "bayes":
         return plain._replace(degrees=degrees)
@@ -144,7 +134,7 @@ def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
 
 
 def _result(
-    start: Start, fit: _Fit, i: int, contours: Sequence[Contour], outward: Array, options: Options
+    start: Start, fit: _Fit, i: int, contours: Sequence[Contour], outward: Array, options: FitOptions
 ) -> Reconstruction | DegenerateCurvesError:
     """What touch i of the stack has found."""
     if fit.axes[i, :, 2] @ outward <= 0.0:

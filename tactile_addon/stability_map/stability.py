@@ -116,17 +116,17 @@ class StabilityMap:
     def _touch(self, numbers):
         """Makes the touches with these numbers, as a generator like `steps`."""
         surface, chosen = self.surface, [self.chosen[number] for number in numbers]
-        found = yield from core.exploring_many(
-            surface,
-            surface.points[chosen],
-            surface.normals[chosen],
+        options = core.ExplorationOptions(
             self.planes,
             farthest=self._farthest,
-            extent=self.extent or "auto",
-            step=self.step or "auto",
+            extent=self.extent,
+            step=self.step,
             noise=self.noise,
             rng=self._rng,
             **self.fit,
+        )
+        found = yield from core.exploring_many(
+            surface, surface.points[chosen], surface.normals[chosen], options
         )
         for number, vertex, touch in zip(numbers, chosen, found, strict=True):
             if isinstance(touch, ValueError):
