@@ -109,6 +109,16 @@ class Atlas:
     border: Border | None = None
     is_cut_short: bool = False
 
+    def __repr__(self) -> str:
+        mesh, size = self.reference.mesh, self.reference.indicator.size
+        ended = "closed" if mesh.is_closed else f"open at {len(mesh.border)} edges"
+        return (
+            f"Atlas, {self.status}: {self.message}\n"
+            f"  {len(self.patches)} patches, size {size:.4g}, {len(self.uncovered)} uncovered places\n"
+            f"  mesh of {len(mesh.triangles)} triangles, {ended}, edges {self.reference.edge:.3g}, "
+            f"+- {mesh.std.mean() if len(mesh.std) else 0.0:.2g} in the mean"
+        )
+
     @cached_property
     def edges(self) -> list[Edge]:
         """All pairs of patches that share a boundary, each with this boundary."""

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import Array
+from ..arguments import LARGEST, Array, finite_array
 from ..bayes.joint_fit import posterior_of
 from ..bayes.normals import contradiction, measured_normals, scatter
 from ..bayes.other_curves import contradicting_curve
@@ -62,6 +62,18 @@ class Reconstruction:
     def __post_init__(self) -> None:
         object.__setattr__(self, "contours", tuple(contour.copied() for contour in self.contours))
         object.__setattr__(self, "strokes", read_only(self.strokes))
+
+    def __repr__(self) -> str:
+        point = ", ".join(f"{x:.4g}" for x in self.frame.origin)
+        normal = ", ".join(f"{x:.4f}" for x in self.normal)
+        felt = f"{len(self.contours)} contours" if self.contours else "strokes"
+        return (
+            f"Reconstruction, {self.status}: {self.message}\n"
+            f"  point ({point}), normal ({normal}), L {self.radius:.4g}\n"
+            f"  k1 {self.k1:.4g} +- {self.k1_std:.2g}, k2 {self.k2:.4g} +- {self.k2_std:.2g}\n"
+            f"  height +- {self.mean_height_std:.2g} in the mean, {self.method}, degree {self.patch.degree}, "
+            f"{len(self.contacts)} contacts of {felt}"
+        )
 
     @property
     def frame(self) -> Frame:
@@ -143,12 +155,40 @@ class Reconstruction:
         """height_std at the domain's nodes, (n,)."""
         return self._height_std(self.domain.nodes[0], self.widening(self.domain.node_places))
 
+    def surface_at(self, points: ArrayLike) -> tuple[Array, Array, Array]:
+        """The surface above or below world points (n, 3), along the normal at the reference point.
+
+        Places on it (n, 3) and its unit normals there (n, 3), in the world, and standard deviations (n,) of
+        the heights. `domain.contains` has whether the patch is valid there. Raises ValueError for bad points.
+        """
+        x, y, _ = self.frame.to_local(finite_array("points", points, (None, 3), LARGEST)).T
+        d, std = self.geometry.derivatives(x, y), self.height_std(x, y)
+        local = np.column_stack([-d.x, -d.y, np.ones(len(x))])
+        normals = local @ self.frame.axes.T / np.linalg.norm(local, axis=1, keepdims=True)
+        return self.frame.to_world(np.column_stack([x, y, d.z])), normals, std
+
     def mesh(self) -> tuple[Array, NDArray[np.intp]]:
         """The patch as points (n, 3), in the frame, and counterclockwise triangles (m, 3).
 
         It is as fine as the patch is certain: off the patch by at most 0.6 times mean_height_std.
         """
         return self.geometry.mesh(MESH_SHARE * self.mean_height_std)
+
+    @property
+    def k1(self) -> float:
+        """The smaller principal curvature at the point, in 1/length."""
+        return self.patch.k1
+
+    @property
+    def k2(self) -> float:
+        """The larger principal curvature at the point, in 1/length."""
+        return self.patch.k2
+
+    @property
+    def normal(self) -> Array:
+        """The outward unit normal at the point, (3,)."""
+        normal: Array = self.frame.axes[:, 2]
+        return normal
 
     @property
     def k1_std(self) -> float:

@@ -48,6 +48,16 @@ def test_a_ball_is_closed_and_as_near_as_asked(ball):
     assert len(ball.patches) < 30
 
 
+def test_an_atlas_is_printed_in_a_few_lines(ball):
+    lines = repr(ball).splitlines()
+    assert lines[0] == f"Atlas, {ball.status}: {ball.message}"
+    assert len(lines) == 3
+    assert ", closed, " in lines[2]
+    mesh = ball.reference.mesh
+    part = replace(ball.reference, mesh=mesh.chosen(mesh.vertices[mesh.triangles[:, 0], 2] > 0.0))
+    assert ", open at " in repr(replace(ball, reference=part))
+
+
 def test_edges_longer_than_the_object_are_refused(ball):
     with pytest.raises(ValueError, match="edge: expected at most the size of what was felt, 2, got 1e"):
         ball.mesh(1e30)

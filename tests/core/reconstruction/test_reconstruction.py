@@ -88,6 +88,33 @@ def test_degree_2_is_the_quadric_alone():
         assert r.patch.height(1.0, 2.0) == pytest.approx(r.patch.k1 / 2 + 2 * r.patch.k2)
 
 
+def test_places_and_normals_of_the_surface_at_points_of_the_world():
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    r = s.fit(s.track(UPRIGHT, extent=5, step=0.5))
+    x, y, h = np.array([0.0, 1.0, -2.0]), np.array([0.0, 2.0, 0.5]), 1e-4
+    above = r.frame.to_world(np.column_stack([x, y, np.full(3, 7.0)]))
+    places, normals, stds = r.surface_at(above)
+    assert r.frame.to_local(places) == pytest.approx(np.column_stack([x, y, r.height(x, y)]))
+    assert stds == pytest.approx(r.height_std(x, y))
+    for axis in r.frame.axes[:, :2].T:  # The normals are across the surface.
+        ahead, back = (r.surface_at(above + way * h * axis)[0] for way in (1.0, -1.0))
+        assert np.einsum("ni,ni->n", ahead - back, normals) == pytest.approx(0.0, abs=1e-8)
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0)
+    assert (normals @ r.normal > 0.9).all()
+    with pytest.raises(ValueError, match="points: expected finite numbers"):
+        r.surface_at([(0.0, np.nan, 0.0)])
+
+
+def test_a_reconstruction_is_printed_in_a_few_lines():
+    s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
+    r = s.fit(s.track(UPRIGHT, extent=5, step=0.5))
+    lines = repr(r).splitlines()
+    assert 3 <= len(lines) <= 6
+    assert lines[0] == f"Reconstruction, {r.status}: {r.message}"
+    assert f"k1 {r.k1:.4g} +- {r.k1_std:.2g}" in lines[2]
+    assert max(map(len, lines[1:])) < 120
+
+
 @pytest.mark.parametrize("degree", [3, 5, 6])
 def test_other_degrees(degree):
     s = surfaces.ellipsoid(35, 25, 20, 0.6, 0.5)
