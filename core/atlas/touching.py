@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
-from ..contours.finger import FACING, Finger, Surface, contact_of, first_contact
+from ..contours.finger import Surface, contact_of, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many, result_of
 from .borders import bordered, felt_border
 from .charts import Charts
+from .finger import FACING, Finger
 from .frontier import Frontier
 from .join import Table, agreed, joined
 from .meshing import Mesh
