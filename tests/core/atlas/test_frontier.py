@@ -12,7 +12,7 @@ from core.atlas.finger import Finger
 from core.atlas.frontier import Frontier, _between
 from core.atlas.meshing import Mesh
 from core.atlas.reference_mesh import ReferenceMesh
-from core.exploration.side_by_side import result_of
+from core.steps import result_of
 from tests import solids
 
 BALL, NEAR = solids.ball(), 0.03

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from core.atlas import smoothing_spline as splines
 from core.atlas.cubic_spline import SIDE, bases, between
 from core.atlas.smoothing_spline import smoothing_spline
-from core.atlas import smoothing_spline as splines
 
 HALF = 1.3
 

@@ -11,6 +11,7 @@ from core.exploration import growth, one_touch, side_by_side
 from core.exploration.sampling_density import NOTICEABLE, suffices
 from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
+from core.steps import result_of
 
 PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
 UP = (0.0, 0.0, 1.0)
@@ -176,7 +177,7 @@ def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, mon
     monkeypatch.setattr(growth, "tried", tried)
     felt = Felt()
     felt.largest_std = largest_std
-    found = side_by_side.result_of(growth._seed(lambda length: felt, 1.0, []))
+    found = result_of(growth._seed(lambda length: felt, 1.0, []))
     assert found.counts.max() == (12 if largest_std is None else 3)
 
 
