@@ -17,6 +17,8 @@ READY := $(VENV)/.ready
 PEERS := $(VENV)/.peers
 CLUSTER := $(VENV)/.cluster
 SITE := build/site
+# The checkout as the package that Blender makes of it, whatever its folder is called: mypy imports from there.
+TYPED := build/typed/tactile_patch
 # Tests run beside each other, one process a processor, each with one thread.
 BESIDE := -n auto --dist worksteal
 # Tests of core share touched objects, so one process runs a whole file; the longest files come first.
@@ -27,7 +29,7 @@ test test-core test-cluster: export OPENBLAS_NUM_THREADS = 1
 ZIP := build/tactile_patch.zip
 # Folders too, so that a deleted file counts as a change.
 SOURCES := blender_manifest.toml __init__.py LICENSE tools/build.py \
-	$(shell find core presets tactile_addon docs -name __pycache__ -prune -o -print)
+	$(shell find core tactile_addon docs -name __pycache__ -prune -o -print)
 
 .PHONY: help demo dataset test test-core test-cluster fuzz chart paper stability site figures film lesson sample zip zip-nowheels \
 	release clean
@@ -41,7 +43,7 @@ help:
 	@echo 'make paper             repeat the experiments of the paper, beside its figures'
 	@echo 'make stability         take every method to its limits, and count the warnings'
 	@echo 'make dataset           touch some objects with two workers, tabulate and draw the results, in build'
-	@echo 'make test-cluster      run the tests of data sets, with Dask'
+	@echo 'make test-cluster      check the types and run the tests of data sets, with Dask'
 	@echo 'make site              build the site of the documentation, in build/site/html'
 	@echo 'make figures [ONLY=X]  draw every picture of the documentation again that a command draws, or those named X'
 	@echo 'make film              draw the moving picture of the README again'
@@ -56,16 +58,18 @@ help:
 demo: $(ZIP)
 	$(VENV_PY) -m tools.demo --zip $(ZIP) --mesh "$(MESH)"
 
-test: $(ZIP)
+test: $(ZIP) | $(TYPED)
 	$(VENV_PY) -m ruff check
 	$(VENV_PY) -m ruff format --check
 	$(VENV_PY) -m mypy core
+	$(VENV_PY) -m mypy -p tactile_patch.tactile_addon
 	TACTILE_ZIP="$(CURDIR)/$(ZIP)" $(VENV_PY) -m pytest $(BESIDE) --ignore tests/cluster
 
 test-core: $(READY)
 	$(VENV_PY) -m pytest $(BESIDE) --hypothesis-profile=quick tests/core/scan tests/core tests/test_rooms.py
 
 test-cluster: $(CLUSTER)
+	$(VENV_PY) -m mypy cluster
 	$(VENV_PY) -m pytest tests/cluster
 
 dataset: $(CLUSTER) $(PEERS)
@@ -119,6 +123,9 @@ clean:
 # The environment has to be there to build, but a new one is no reason to build again.
 $(ZIP): $(SOURCES) | $(READY)
 	@zip=$$($(VENV_PY) tools/build.py --output build) && mv "$$zip" $@
+
+$(TYPED):
+	@mkdir -p $(@D) && ln -sfn ../.. $@
 
 $(SITE)/.ready: tools/site_requirements.txt
 	@echo 'Installing what the site is made with, in $(SITE): once.'

@@ -73,11 +73,12 @@ def _interruptible() -> Iterator[None]:
 
 def _options(given: argparse.Namespace) -> Options:
     azimuths = given.azimuths or [180.0 * i / given.planes for i in range(given.planes)]
-    lengths = ("extent", "step", "noise", "tolerance")
+    names = ("extent", "step", "noise", "tolerance")
+    lengths: dict[str, Any] = {name: vars(given)[name] and str(vars(given)[name]) for name in names}
     return Options(
         azimuths=tuple(azimuths),
         tilts=tuple(given.tilts or [0.0] * len(azimuths)),
-        **{name: vars(given)[name] and str(vars(given)[name]) for name in lengths},
+        **lengths,
         **{
             name: vars(given)[name]
             for name in ("touches", "block", "seed", "method", "degree", "weight", "solver")

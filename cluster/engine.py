@@ -106,7 +106,8 @@ class Engine:
         What is lost with a worker, or with a scheduler that is restarted, is ordered again. Raises
         EngineError if the scheduler does not come back.
         """
-        waiting, out = iter(orders), {}
+        waiting = iter(orders)
+        out: dict[Future[Any], Order] = {}
         running = as_completed()
         while True:
             for order in islice(waiting, self._room() - len(out)):
@@ -121,7 +122,7 @@ class Engine:
                 else:
                     self._submit(order, out, running)
 
-    def _submit(self, order: Order, out: dict[Future, Order], running: as_completed) -> None:
+    def _submit(self, order: Order, out: dict[Future[Any], Order], running: as_completed) -> None:
         self._require_scheduler()
         self._number += 1
         # The scheduler groups tasks by the first part, and its logs show the label.
@@ -131,13 +132,13 @@ class Engine:
         out[future] = order
         running.add(future)
 
-    def _outcomes(self, futures: Iterable[Future]) -> dict[Future, tuple[str, Any, list[str]]]:
+    def _outcomes(self, orders: dict[Future[Any], Order]) -> dict[Future[Any], tuple[str, Any, list[str]]]:
         """How orders went, by their futures; those that are lost are left out."""
-        found = {}
-        finished = [future for future in futures if future.status == "finished"]
+        found: dict[Future[Any], tuple[str, Any, list[str]]] = {}
+        finished = [future for future in orders if future.status == "finished"]
         with suppress(CancelledError, OSError, TimeoutError):
             found |= zip(finished, self.client.gather(finished), strict=True)
-        for future in futures:
+        for future, order in orders.items():
             if future.status == "error":
                 error = future.exception()
                 if not isinstance(error, KilledWorker):
@@ -146,7 +147,7 @@ class Engine:
                         f"the scheduler or a worker cannot take orders ({words}): start them in the same "
                         "environment, with this checkout on their PYTHONPATH"
                     ) from error
-                found[future] = FAILED, GONE, [f"{future.key[1]}: {GONE}"]
+                found[future] = FAILED, GONE, [f"{order.label}: {GONE}"]
         return found
 
     def _room(self) -> int:

@@ -86,7 +86,7 @@ class Run:
             if path not in known | self._misnamed
         )
         self.progress.note(f"{len(self.files) - len(known):,} files to look through")
-        facts = {path: [] for path in self.files}
+        facts: dict[str, list[dict[str, Any]]] = {path: [] for path in self.files}
         facts |= {path: [_broken(path, MISNAMED)] for path in self._misnamed - known}
         for outcome in self._outcomes(engine, orders):
             path = outcome.order.label

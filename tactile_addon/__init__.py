@@ -3,6 +3,7 @@
 """All that uses Blender: surfaces to touch, probes, operators, panels, handles, patches, the command line."""
 
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -42,8 +43,9 @@ MENUS = (
     *export_operators.MENUS,
     *report_operator.MENUS,
 )
-_commands, _drawings = [], []
-TOP = str(Path(__file__).resolve().parents[1])  # It holds presets/.
+_commands: list[Any] = []
+_drawings: list[Any] = []
+HERE = str(Path(__file__).resolve().parent)  # It holds presets/.
 
 
 def register():
@@ -58,7 +60,7 @@ def register():
     for menu, draw in MENUS:
         getattr(bpy.types, menu).append(draw)
     bpy.utils.register_manual_map(preferences.manual_map)
-    bpy.utils.register_preset_path(TOP)
+    bpy.utils.register_preset_path(HERE)
     change_handlers.register()
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
     _drawings.extend(overlay.draw_handlers())
@@ -69,7 +71,7 @@ def unregister():
         bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
     change_handlers.unregister()
     bpy.utils.unregister_cli_command(_commands.pop())
-    bpy.utils.unregister_preset_path(TOP)
+    bpy.utils.unregister_preset_path(HERE)
     bpy.utils.unregister_manual_map(preferences.manual_map)
     for menu, draw in MENUS:
         getattr(bpy.types, menu).remove(draw)

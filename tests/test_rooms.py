@@ -37,9 +37,10 @@ ROOMS = {
 
 
 def modules(package):
-    """The dotted name, from the package on, and the path of each module."""
+    """The dotted name, from the package on, and the path of each module; presets are scripts of Blender."""
     for path in sorted((ROOT / package).rglob("*.py")):
-        yield ".".join(path.relative_to(ROOT).with_suffix("").parts), path
+        if "presets" not in path.parts:
+            yield ".".join(path.relative_to(ROOT).with_suffix("").parts), path
 
 
 @cache
@@ -106,4 +107,4 @@ def test_the_tree_for_contributors_is_that_of_the_files():
     named = re.findall(r"^ +(\w+)/? ", tree, re.MULTILINE)
     there = [p.stem for package in ROOMS for _, p in modules(package) if p.name != "__init__.py"]
     rooms = [room for package, rooms in ROOMS.items() for room in rooms if (ROOT / package / room).is_dir()]
-    assert sorted(named) == sorted([*there, *rooms])
+    assert sorted(named) == sorted([*there, *rooms, "presets"])

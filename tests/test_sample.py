@@ -12,7 +12,8 @@ pytest.importorskip("bpy", reason="needs Blender as a Python module: run make te
 from tools import sample
 
 ROOT = Path(__file__).resolve().parents[1]
-PRESETS = sorted((ROOT / "presets").rglob("*.py"))
+FOLDER = ROOT / "tactile_addon" / "presets"
+PRESETS = sorted(FOLDER.rglob("*.py"))
 
 
 def test_the_sample_opens_with_a_probe_whose_patch_is_good_and_follows(empty):
@@ -37,7 +38,7 @@ def test_the_sample_opens_with_a_probe_whose_patch_is_good_and_follows(empty):
 
 @pytest.mark.parametrize("path", PRESETS, ids=lambda path: path.parent.name)
 def test_the_preset_is_the_papers_method_in_blenders_own_list(extension, empty, ball, path, monkeypatch):
-    folder = path.parent.relative_to(ROOT / "presets")
+    folder = path.parent.relative_to(FOLDER)
     listed = [Path(each) / path.name for each in empty.utils.preset_paths(str(folder))]
     (found,) = (each for each in listed if each.is_file() and "tactile_patch" in each.parts)
     settings = SimpleNamespace()

@@ -27,7 +27,7 @@ MANIFEST = ROOT / "blender_manifest.toml"
 PROJECT = ROOT / "pyproject.toml"
 # Blender's own list of patterns can only exclude files. So what ships is named here, and nothing else that
 # lies in a checkout, such as an environment or a scan, can get into a release.
-SHIPPED = ("__init__.py", "LICENSE", "core", "presets", "tactile_addon")
+SHIPPED = ("__init__.py", "LICENSE", "core", "tactile_addon")
 # These pages ship as HTML, with their pictures: the first is what Blender's Online Manual opens, the others
 # are those that it leads to.
 DOCS = ROOT / "docs"

@@ -132,7 +132,7 @@ class DataSet:
 
 def write_block(
     path: Path, rows: list[dict[str, Any]], facts: dict[str, Any], seconds: float, counts: dict[str, int]
-) -> dict:
+) -> dict[str, Any]:
     """Writes rows about the object of these facts with the counts of their kinds; returns the file's summary.
 
     Raises OSError, with a sentence, if the file cannot be written.

@@ -9,6 +9,7 @@ from typing import Any
 from .. import extension
 from .folder import DataSet, whole_file
 from .options import Options
+from .whole_options import WholeOptions
 
 FORMAT = 2
 PACKAGES = ("bpy", "numpy", "scipy")
@@ -45,7 +46,7 @@ def read(data_set: DataSet) -> dict[str, Any] | None:
     return found
 
 
-def begun(data_set: DataSet, options: Options) -> dict[str, Any] | None:
+def begun(data_set: DataSet, options: Options | WholeOptions) -> dict[str, Any] | None:
     """What `read` returns. Raises ValueError if the data set was made by other versions or options."""
     old = read(data_set)
     if old is None:
@@ -72,7 +73,7 @@ def require_same_objects(old: dict[str, Any], files: dict[str, Any]) -> None:
             )
 
 
-def write(data_set: DataSet, options: Options, files: dict[str, Any]) -> None:
+def write(data_set: DataSet, options: Options | WholeOptions, files: dict[str, Any]) -> None:
     """Writes the manifest; `files` are the hashes of objects by their names, by the paths of files."""
     content = {"versions": versions(), "options": options.to_dict(), "files": files}
     whole_file.write_text(data_set.manifest, json.dumps(content, indent=1) + "\n")

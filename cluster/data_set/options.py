@@ -99,7 +99,7 @@ class Options(Lengths):
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "Options":
         """The options that `to_dict` made `values` from, perhaps through JSON, which has no tuples."""
-        plain = {field.name: values.get(field.name) for field in fields(cls)}
+        plain: dict[str, Any] = {field.name: values.get(field.name) for field in fields(cls)}
         return cls(**plain | {name: tuple(plain[name]) for name in ("azimuths", "tilts")})
 
     def to_dict(self) -> dict[str, Any]:

@@ -104,7 +104,8 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # The process that started it handles Ctrl+C.
     with suppress(OSError):  # Blender's own folder would stay, because this process is killed in the end.
         os.rmdir(bpy.app.tempdir)
-    connection, orders = Connection(int(sys.argv[1])), queue.SimpleQueue()
+    connection = Connection(int(sys.argv[1]))
+    orders: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(connection, orders), daemon=True).start()
     hand = Hand()
     connection.send("ready")

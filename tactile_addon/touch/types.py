@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The names of types in annotations: of arrays and places, and of what Blender's stubs do not know."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import bpy
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[Any]
+Point: TypeAlias = Sequence[float] | Array  # Three numbers: a place, a direction or a normal.
+Triple: TypeAlias = tuple[float, float, float]
+# A bpy.types.Object. The stubs know neither the custom properties of objects nor those that add-ons register,
+# and they let no object's data be taken for a mesh.
+Object: TypeAlias = Any
+
+# What operators and panels inherit besides these. Blender does not look for properties in a mixin that is
+# itself a subclass of its types, so only the type checker takes it for one.
+if TYPE_CHECKING:
+    OperatorMixin = bpy.types.Operator
+    PanelMixin = bpy.types.Panel
+else:
+    OperatorMixin = PanelMixin = object
