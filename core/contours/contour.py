@@ -4,7 +4,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,11 +32,14 @@ Vector = tuple[float, float, float]
 class SamplingPlane:
     """A plane through the reference point (paper, II): it holds the tangent at `azimuth`, leaning by `tilt`.
 
-    Both angles are in radians.
+    Both angles are in radians. Other planes are equal if both are.
+
+    direction : the tangent in the world, which does not depend on where azimuths begin, if it is known
     """
 
     azimuth: float
     tilt: float = 0.0
+    direction: Vector | None = field(default=None, compare=False)
 
     def axes(self, normal: ArrayLike, tangent: ArrayLike | None = None) -> Array:
         """Columns t (the tangent), u (up, in the plane) and t x u (the plane's normal), (3, 3).

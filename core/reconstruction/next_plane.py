@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, unit_vector
-from ..contours.contour import SamplingPlane
+from ..contours.contour import SamplingPlane, vector_of
 from .result import Reconstruction
 
 # Azimuths that are tried: a plane that is 1.5 degrees off ends a 38th of L aside.
@@ -25,7 +25,8 @@ def suggest_plane(
 ) -> tuple[SamplingPlane, float]:
     """The sampling plane that would lower the mean variance of the height over the domain most.
 
-    outward, tangent : as in `track`, from which the azimuth is measured; n and d1 of the frame by default
+    outward, tangent : as in `track`, from which the azimuth is measured; n and d1 of the frame by default,
+        which `SamplingPlane.axes` has to be given then. The plane's `direction` is its tangent in the world
 
     Also returns the mean height_std that is expected after it, in the caller's unit.
 
@@ -47,10 +48,11 @@ def suggest_plane(
     near = tried[[np.argmax(lost(tried, FEW_CONTACTS) @ weights)]] + NEARBY
     best = near[[np.argmax(lost(near, FEW_CONTACTS) @ weights)]] % len(TRIED)
     variance = np.maximum((r.node_stds / r.radius) ** 2 - lost(best, TELLING_CONTACTS)[0], 0.0)
-    plane = SamplingPlane(float(TRIED[best[0]]))
+    azimuth, (d1, _, n) = float(TRIED[best[0]]), r.frame.axes.T
+    direction = SamplingPlane(azimuth).axes(n, d1)[:, 0]
     if outward is not None:
-        d1, _, n = r.frame.axes.T
-        plane = SamplingPlane(azimuth_of(plane.axes(n, d1)[:, 0], outward, tangent))
+        azimuth = azimuth_of(direction, outward, tangent)
+    plane = SamplingPlane(azimuth, direction=vector_of(direction))
     return plane, r.radius * float(weights @ np.sqrt(variance))
 
 

@@ -431,9 +431,11 @@ def test_the_suggested_plane_is_measured_as_the_contours_were_tracked():
     plane, expected = suggest_plane(r)
     d1, _, n = r.frame.axes.T
     along = plane.axes(n, d1)[:, 0]
+    assert plane.direction == pytest.approx(along)
     for tangent in (None, (0.3, -1.0, 0.2)):
         other, same = suggest_plane(r, s.normal, tangent)
         assert same == expected
+        assert other.direction == plane.direction
         t = other.axes(s.normal, tangent)[:, 0]
         assert abs(np.cross(t, along) @ s.normal) < 1e-3  # the fit's normal is not quite the true one
 
