@@ -23,6 +23,7 @@ from .indicator import Indicator
 CELL = 2.1  # A cube of the lattice is as long as so many edges of the mesh.
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
 SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
+BETWEEN = 1.5  # A place is felt up to so many times as far from a contact as its neighbors are.
 BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator are bridged.
 # Vertices that were off by more cells, or are of folded triangles, are moved again, so often.
 FAR, STEPS = 0.05, 4
@@ -94,6 +95,27 @@ class Mesh(NamedTuple):
         return len(self.triangles) > 0 and bool((self._edges[2] == 2).all())
 
 
+class Contacts(NamedTuple):
+    """Contacts that were measured: there the surface was felt, though patches may leave gaps between them.
+
+    points, normals : (n, 3)
+    reach : (n,), how far neighbors reach around each
+    """
+
+    points: Array
+    normals: Array
+    reach: Array
+
+    def near(self, points: Array, normals: Array) -> NDArray[np.bool_]:
+        """Which places (k, 3) with normals (k, 3) have a contact beside them that faces alike."""
+        from scipy.spatial import cKDTree
+
+        away, at = cKDTree(self.points).query(points)
+        alike = np.einsum("ki,ki->k", self.normals[at], normals) > 0.0
+        found: NDArray[np.bool_] = alike & (away < BETWEEN * self.reach[at])
+        return found
+
+
 def memory_of(vertices: Array, triangles: Indices, edge: float, lattice: float = np.inf) -> float:
     """About how many bytes it takes to mesh the surface of triangles (m, 3) with edges of a length.
 
@@ -117,10 +139,15 @@ def lattice_of(indicator: Indicator, edge: float) -> tuple[float, int]:
     return size, halvings
 
 
-def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float, None, Mesh]:
-    """The mesh of the surface; yields the share that is done.
+def meshed(
+    charts: Charts, indicator: Indicator, edge: float, contacts: Contacts | None = None
+) -> Generator[float, None, tuple[Mesh, Mesh]]:
+    """The mesh of the surface, and that of what the indicator has where nothing was felt.
 
     edge : about the length of its edges, which are shorter than a quarter of the thinnest wall
+    contacts : the surface was felt there, too
+
+    Yields the share that is done.
     """
     edge = min(edge, WALL * indicator.resolved)
     size, halvings = lattice_of(indicator, edge)
@@ -134,7 +161,7 @@ def meshed(charts: Charts, indicator: Indicator, edge: float) -> Generator[float
         vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
     found = yield from creased(charts, vertices, triangles, surface.normal, edge)
     at = np.append(np.arange(len(vertices)), found.parents)
-    return _felt(found.vertices, found.triangles, surface.chosen(at), indicator.cell)
+    return _felt(found.vertices, found.triangles, surface.chosen(at), indicator, contacts)
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -240,8 +267,10 @@ def _onto(
     return surface
 
 
-def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) -> Mesh:
-    """The mesh without triangles where nothing was felt.
+def _felt(
+    vertices: Array, triangles: Indices, surface: Surface, indicator: Indicator, contacts: Contacts | None
+) -> tuple[Mesh, Mesh]:
+    """The mesh without triangles where nothing was felt, and these.
 
     Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
     as small as some cells of the indicator is bridged.
@@ -259,6 +288,12 @@ def _felt(vertices: Array, triangles: Indices, surface: Surface, cell: float) ->
     far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
     areas = np.bincount(piece[beyond[:, 0]], far, count)
     beside = np.bincount(piece[inside], minlength=count) > 0
+    cell = indicator.cell
     gone = ~inside & ((areas > BRIDGED * cell**2) | ~beside)[piece]
+    some = np.flatnonzero(gone)
+    if contacts is not None:
+        gone[some] = ~contacts.near(vertices[some], indicator.outward(vertices[some]))
     std = np.where(surface.node < 0, cell, surface.std)
-    return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))
+    std[some] = np.hypot(std[some], cell)  # No patch is there.
+    mesh, unfelt = Mesh(vertices, triangles, std, surface.node), gone[triangles].any(axis=1)
+    return mesh.chosen(~unfelt), mesh.chosen(unfelt)
