@@ -81,7 +81,7 @@ def cover_contacts(
     noise = None if noise is None else number("noise", noise, least=0.0)
     contacts, noise, doubt = _contacts(contours_or_strokes, outward, noise)
     yield 0.0
-    cloud = _Cloud(contacts, cKDTree(contacts.points), noise, largest)
+    cloud = _Cloud(contacts, cKDTree(contacts.points), _linked(contacts.links), noise, largest)
     found, charts = yield from _patches(cloud)
     steps = surfaced(found, charts, largest, contacts)
     while True:
@@ -122,7 +122,7 @@ def _contacts(
         normals[~known] = found[~known]
     else:
         _require_one_side(points, normals)
-    return Contacts(points, normals, planes.reach), noise, doubt_of(points, normals, planes)
+    return Contacts(points, normals, planes.reach, planes.links), noise, doubt_of(points, normals, planes)
 
 
 def _require_one_side(points: Array, normals: Array) -> None:
@@ -165,23 +165,36 @@ def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> str:
     )
 
 
+def _linked(links: NDArray[np.intp]) -> Any:
+    """The sparse matrix (n, n) of links (n, k)."""
+    from scipy.sparse import csr_array
+
+    n, k = links.shape
+    return csr_array((np.ones(n * k), links.ravel(), np.arange(n + 1) * k), (n, n))
+
+
 class _Cloud(NamedTuple):
-    """Contacts, a KD-tree, the noise, and the deviation up to which patches grow."""
+    """Contacts, a KD-tree, a matrix of links, the noise, and the deviation up to which patches grow."""
 
     contacts: Contacts
     tree: Any
+    links: Any
     noise: float
     largest: float | None
 
     def alike(self, i: int, radius: float) -> NDArray[np.intp]:
-        """Those contacts around contact i that face the same way."""
+        """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
+        from scipy.sparse.csgraph import connected_components
+
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
-        found: NDArray[np.intp] = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
+        near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
+        wall = connected_components(self.links[near][:, near], directed=False)[1]
+        found: NDArray[np.intp] = near[wall == wall[np.flatnonzero(near == i)]]
         return found
 
     def patch(self, i: int, radius: float) -> Reconstruction | None:
         """The patch of those contacts around contact i that face the same way, or None if they carry none."""
-        points, normals, _ = self.contacts
+        points, normals = self.contacts.points, self.contacts.normals
         strokes, place, outward = [[points[self.alike(i, radius)]]], points[i][None], normals[i][None]
         (r,) = reconstruct_many(place, [()], outward=outward, strokes_list=strokes, noise=self.noise)
         return r if isinstance(r, Reconstruction) else None

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..contours.finger import FACING
 from ..patch.tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
 from .charts import MARGIN, Charts
 from .creases import creased
@@ -23,7 +24,9 @@ from .indicator import Indicator
 CELL = 2.1  # A cube of the lattice is as long as so many edges of the mesh.
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
 SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
-BETWEEN = 1.5  # A place is felt up to so many times as far from a contact as its neighbors are.
+BESIDE = 8  # A place is felt if it is beside one of so many contacts that are nearest:
+BETWEEN = 1.5  # up to so many times as far from it as its neighbors are,
+ONE_SIDED = 0.75  # if the mean of the directions to these is shorter; it is 2 / pi on a straight border.
 BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator are bridged.
 # Vertices that were off by more cells, or are of folded triangles, are moved again, so often.
 FAR, STEPS = 0.05, 4
@@ -111,19 +114,24 @@ class Contacts(NamedTuple):
 
     points, normals : (n, 3)
     reach : (n,), how far neighbors reach around each
+    links : (n, k), some of these
     """
 
     points: Array
     normals: Array
     reach: Array
+    links: Indices
 
     def near(self, points: Array, normals: Array) -> NDArray[np.bool_]:
-        """Which places (k, 3) with normals (k, 3) have a contact beside them that faces alike."""
+        """Which places (k, 3) with normals (k, 3) are between contacts, of which one beside faces alike."""
         from scipy.spatial import cKDTree
 
-        away, at = cKDTree(self.points).query(points)
-        alike = np.einsum("ki,ki->k", self.normals[at], normals) > 0.0
-        found: NDArray[np.bool_] = alike & (away < BETWEEN * self.reach[at])
+        away, at = cKDTree(self.points).query(points, BESIDE)
+        alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > FACING
+        ways = self.points[self.links[at]] - points[:, None, None]
+        ways /= np.maximum(np.linalg.norm(ways, axis=3, keepdims=True), LEAST_DIVISOR)
+        between = np.linalg.norm(ways.mean(axis=2), axis=2) < ONE_SIDED
+        found: NDArray[np.bool_] = (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
         return found
 
 
