@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that compares a patch, where it is now, with any mesh, and the work behind it."""
 
+from collections.abc import Iterator, Sequence
+from typing import Any
+
 import bpy
 import numpy as np
 from bpy.props import StringProperty
@@ -13,7 +16,8 @@ from ..probes.in_slices import InSlices
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
-from ..touch.touch_report import judgment
+from ..touch.touch_report import TouchReport, judgment
+from ..touch.types import Array, Object
 from .verification_wording import verification_summary
 
 VERTICES_AT_ONCE = 2000  # A step looks at so many vertices.
@@ -27,14 +31,16 @@ class Verification:
     Raises ValueError, with a sentence, if they cannot be compared.
     """
 
-    def __init__(self, patch, target):
+    def __init__(self, patch: Object, target: Object) -> None:
         probe.require_unlocked(patch)
         self._r = patch_record.reconstruction_of(patch)
         self._patch, self.patch, self.target = patch.session_uid, patch.name, target.name
         self._target, self._given = target.session_uid, _inputs(patch, target)
-        self._surface, self._found, self.done, self.count = None, {}, 0, 0
+        self._surface: MeshSurface | None = None
+        self._found: dict[str, Any] = {}
+        self.done, self.count = 0, 0
 
-    def look(self, depsgraph):
+    def look(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Lets the steps go on in the scene as it is now. Raises ValueError if patch or mesh have changed."""
         patch, target = self._objects()
         # When Blender evaluates again, it frees what it has evaluated before.
@@ -44,11 +50,11 @@ class Verification:
                 f'"{self.patch}" or "{self.target}" was changed while it was verified: start again'
             )
 
-    def ray_cast(self, *ray):
+    def ray_cast(self, *ray: Any) -> tuple[Sequence[float], Sequence[float]] | None:
         """Casts a ray at the target, as MeshSurface does."""
         return self._surface.ray_cast(*ray)
 
-    def steps(self):
+    def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         r = self._r
         _, vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
@@ -64,7 +70,7 @@ class Verification:
             self._found = found
             yield
 
-    def write(self):
+    def write(self) -> TouchReport:
         """Writes what was found to the patch: its deviations, and `verification` in its record."""
         (patch, _), r, surface = self._objects(), self._r, self._surface
         record = patch[patch_record.RECORD]
@@ -80,7 +86,7 @@ class Verification:
             record.update(judgment(r, mean, record["ended"], record.get("few_facets", False)))
         return record.to_dict()
 
-    def _objects(self):
+    def _objects(self) -> tuple[Object, Object]:
         """The patch and the target. Raises ValueError if they are no longer there."""
         found = {obj.session_uid: obj for obj in bpy.data.objects}
         if self._patch not in found or self._target not in found:
@@ -88,7 +94,7 @@ class Verification:
         return found[self._patch], found[self._target]
 
 
-def verify_patch(patch, target, depsgraph):
+def verify_patch(patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) -> None:
     """Compares the patch object with the mesh object `target`; its record gets the result as `verification`.
 
     Raises ValueError with a sentence, and changes nothing, if that cannot be done.
@@ -100,17 +106,18 @@ def verify_patch(patch, target, depsgraph):
     verification.write()
 
 
-def _inputs(patch, target):
+def _inputs(patch: Object, target: Object) -> tuple[Any, ...]:
     """The properties of patch and target that must not change meanwhile."""
     return patch[patch_record.RECONSTRUCTION], *(
         tuple(map(tuple, obj.matrix_world)) for obj in (patch, target)
     )
 
 
-def _vertices(mesh, r, scale):
+def _vertices(mesh: bpy.types.Mesh, r: core.Reconstruction, scale: float) -> tuple[Array, Array]:
     """Points and unit normals of the patch's vertices, in its frame and scaled by `scale`."""
-    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", points.ravel())
+    points: Array = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    position: Any = mesh.attributes["position"]
+    position.data.foreach_get("vector", points.ravel())
     points = scale * points.astype(float)
     return points, r.geometry.normal(points[:, 0], points[:, 1])
 
@@ -166,7 +173,7 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
         layout.prop_search(self, "target", context.scene, "objects")
 
 
-def chosen_mesh(context, patch):
+def chosen_mesh(context: bpy.types.Context, patch: Object) -> str:
     """The name of the selected mesh, or of the patch's own target, or of the mesh it was touched on.
 
     Raises ValueError if there is none, or if several meshes are selected.

@@ -45,6 +45,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
     bl_label = "Import Contact Data"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
+    filepath: str
     filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.ply", options={"HIDDEN"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
@@ -200,7 +201,7 @@ class TACTILE_FH_contacts(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def draw_import(self, context):
+def draw_import(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.operator(TACTILE_OT_import_contacts.bl_idname, text="Contact Data (.csv, .ply)")
 
 

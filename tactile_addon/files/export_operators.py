@@ -3,6 +3,7 @@
 """The export of patches: File > Export."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -13,12 +14,16 @@ from ... import core
 from ..probes import probe
 from ..probes.operators import report_error
 from ..scene import patch_record
+from ..touch.types import Object, OperatorMixin
 from . import contact_file, patch_table
 
 
-class ObjectExport(ExportHelper):
+class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `invoke`, by the stubs
     """For operators that write what is active to inherit: a patch, by itself, its probe or its contours."""
 
+    filepath: str
+    filename_ext: str
+    write: Callable[[Object], None]
     hint = "Select a patch, its probe or its contours first"
 
     @staticmethod
@@ -78,12 +83,13 @@ class TACTILE_OT_export_patch(ObjectExport, bpy.types.Operator):
         contact_file.write_patch(self.filepath, patch_record.reconstruction_of(patch))
 
 
-class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):
+class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore[misc]  # as above
     """Write what all patches have found as CSV, one row a probe, in the scene's units"""
 
     bl_idname = "tactile.export_table"
     bl_label = "Export Table of Patches"
     filename_ext = ".csv"
+    filepath: str
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
     use_selection: BoolProperty(
         name="Selected Only", description="Write the selected probes and patches only", default=False
@@ -107,7 +113,7 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):
         return {"FINISHED"}
 
 
-def draw_export(self, context):
+def draw_export(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.operator(TACTILE_OT_export_contacts.bl_idname, text="Contact Data (.csv)")
     self.layout.operator(TACTILE_OT_export_patch.bl_idname, text="Tactile Patch (.json)")
     self.layout.operator(TACTILE_OT_export_table.bl_idname, text="Table of Tactile Patches (.csv)")

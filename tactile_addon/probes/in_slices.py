@@ -3,12 +3,15 @@
 """Long work that is done in slices between a window's events, with progress and Esc."""
 
 import sys
+from collections.abc import Callable, Iterator
 from time import perf_counter
+from typing import Any
 
 import bpy
 from bpy.props import BoolProperty
 
 from ..touch.settings import UNSAVED
+from ..touch.types import OperatorMixin
 from .operators import report_error, target_object
 
 # These are seconds.
@@ -18,7 +21,7 @@ NEXT = 0.01  # The next slice begins after this time.
 SAY = 1.0  # Without a window, a line of progress is printed each time.
 
 
-class InSlices:
+class InSlices(OperatorMixin):
     """For operators whose work is a generator to inherit.
 
     Each has `_begin(context)`, which sets `_steps`; `_check(context)`, called before each slice, because the
@@ -32,7 +35,12 @@ class InSlices:
         options={"HIDDEN", *UNSAVED},
     )
 
-    _timer = None  # There is one while it runs in a window.
+    target: Any  # The property of operators that have one.
+    _steps: Iterator[Any]
+    _begin: Callable[[bpy.types.Context], None]
+    _done: Callable[[], tuple[str, float | None]]
+    _finish: Callable[[bpy.types.Context], set[Any]]
+    _timer: bpy.types.Timer | None = None  # There is one while it runs in a window.
     _in_window = False  # Whether a dialog was confirmed, after which it goes on in slices.
     stop = "Stop"  # What Esc does.
     meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
@@ -125,10 +133,10 @@ class InSlices:
             print(f"{self.bl_label}: stopped because the file or the window was closed", file=sys.stderr)
 
 
-def _status(stop, words, share=None):
+def _status(stop: str, words: str, share: float | None = None) -> Callable[[Any, bpy.types.Context], None]:
     """The function that draws the status bar meanwhile; it may outlive the operator by a redraw."""
 
-    def draw(header, context):
+    def draw(header: Any, context: bpy.types.Context) -> None:
         layout = header.layout
         layout.label(text="", icon="EVENT_ESC")
         layout.label(text=f" {stop}")

@@ -3,6 +3,8 @@
 """The buttons of the panels besides picking: planes, another touch, deletion, and a viewport with colors."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import bpy
 from bpy.props import IntProperty
@@ -11,6 +13,7 @@ from ..scene import color_range, patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
 from ..touch.settings import MOST_PLANES, length_property
+from ..touch.types import OperatorMixin
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
 from .operators import has_patch, is_in_object_mode, is_unlocked, report_error, waiting
@@ -19,7 +22,7 @@ SUBDIVISIONS = 3  # A target gets so many levels at once,
 MOST_FACES = 500_000  # as long as it has no more faces then.
 
 
-class _ProbeOperator:
+class _ProbeOperator(OperatorMixin):
     """For operators on the active probe, or on that of the active patch or contours, to inherit."""
 
     bl_options = {"REGISTER", "UNDO"}
@@ -93,7 +96,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         self.layout.prop(self, "tolerance")
 
 
-def _add(settings, suggested):
+def _add(settings: Any, suggested: Mapping[str, Any] | None) -> None:
     """Adds one more plane, at the suggested azimuth, or with the angles it had before."""
     number = settings.plane_count
     if suggested is not None:
@@ -168,7 +171,7 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
         touch_again.refresh(found, context)
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))
-        record = probe.record_of(found).to_dict()
+        record = probe.record_of(found)
         self.report({"INFO"}, verdict(record, units.unit_of(context.scene, record["radius"])))
         return {"FINISHED"}
 

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page of a stability map: the painted object from three sides, and the errors of its touches."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import bpy
 import numpy as np
 
@@ -11,10 +14,12 @@ from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
 from ..stability_map.stability import NOTHING
 from ..touch import units
+from ..touch.types import Array, Object
+from ..touch.units import Unit
 from . import page, parts, views
 
 
-def map_page(painted):
+def map_page(painted: Object) -> str:
     """The page of a map object."""
     record = painted[patch_record.MAP_RECORD].to_dict()
     unit = units.unit_of(bpy.context.scene, record["spacing"])
@@ -31,7 +36,7 @@ def map_page(painted):
     return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
 
 
-def _legend(painted, record, unit):
+def _legend(painted: Object, record: Mapping[str, Any], unit: Unit) -> str:
     """The legend of the colors."""
     shown = painted.tactile_map_colors
     swatches = "".join(page.swatch(color, words) for words, color in map_object.swatches(painted))
@@ -43,7 +48,7 @@ def _legend(painted, record, unit):
     return page.words(f"{title}: pale green at {low}, dark red from {high} on.") + swatches
 
 
-def _errors(mesh, record, unit):
+def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list[str]:
     errors = values(mesh, "error")
     known = errors != NOTHING
     if not known.any():
@@ -63,9 +68,9 @@ def _errors(mesh, record, unit):
     ]
 
 
-def _screen_colors(mesh):
+def _screen_colors(mesh: bpy.types.Mesh) -> Array:
     """The colors of the vertices in sRGB, (n, 4)."""
-    attribute = mesh.attributes[map_object.MAP_COLOR]
+    attribute: Any = mesh.attributes[map_object.MAP_COLOR]
     rgba = np.empty((len(attribute.data), 4), dtype=np.float32)
     attribute.data.foreach_get("color_srgb", rgba.ravel())
     return rgba

@@ -2,15 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page of a patch: pictures along its normal, and how far the mesh or the contacts are from it."""
 
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
 
+from ... import core
 from ..scene import patch_record
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
 from ..touch import units
+from ..touch.types import Object
+from ..touch.units import Unit
 from ..touch.wording import readable_rows
 from . import drawing, page, parts
 
@@ -29,7 +33,7 @@ class Deviations(NamedTuple):
     words: str
 
 
-def patch_page(patch, r):
+def patch_page(patch: Object, r: core.Reconstruction) -> str:
     """The page of a patch object and its core.Reconstruction."""
     record = patch[patch_record.RECORD].to_dict()
     unit = units.unit_of(bpy.context.scene, r.radius)
@@ -46,7 +50,7 @@ def patch_page(patch, r):
     return page.page(f"{patch.name}: a patch of {record['source']}", sections)
 
 
-def _pictures(patch, r, record, unit):
+def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], unit: Unit) -> Iterator[str]:
     points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
@@ -58,11 +62,11 @@ def _pictures(patch, r, record, unit):
         yield page.figure(f"{picture}<br>{scale}", f"{title}, along the normal, with the contacts")
 
 
-def _has_mesh(record):
+def _has_mesh(record: Mapping[str, Any]) -> bool:
     return bool(record.get("vertices") or record.get("verification"))
 
 
-def _deviations(patch, r, record):
+def _deviations(patch: Object, r: core.Reconstruction, record: Mapping[str, Any]) -> Deviations:
     if _has_mesh(record):
         points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
         words = (

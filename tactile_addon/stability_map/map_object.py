@@ -3,6 +3,7 @@
 """A stability map as an object: a painted copy of the mesh that was touched."""
 
 import math
+from typing import Any
 
 import bpy
 import numpy as np
@@ -13,7 +14,8 @@ from ..scene.mesh_data import emission
 from ..scene.shown import LEAST_RANGE
 from ..scene.viewports import show_colors
 from ..touch.settings import MOST_PLANES
-from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
+from ..touch.types import Array, Object
+from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS, StabilityMap
 
 MAP_COLOR = "stability_color"
 TOUCHED = "is_touched"
@@ -51,7 +53,7 @@ REASON_COLORS = np.array([
 ])  # fmt: skip
 
 
-def insert(context, obj, touched):
+def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Object:
     """Adds a copy of `obj`, painted by the StabilityMap `touched`, to the scene, and returns it."""
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = obj.evaluated_get(depsgraph)
@@ -63,7 +65,7 @@ def insert(context, obj, touched):
     mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
     # It would lie in the mesh it describes, so it is shown a little above it. It is not shown in front,
     # because patches that lie in it are.
-    above = painted.modifiers.new("Above the Mesh", "DISPLACE")
+    above: Any = painted.modifiers.new("Above the Mesh", "DISPLACE")
     above.mid_level, above.strength = 0.0, SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
     _paint(mesh, touched)
     mesh.materials.clear()
@@ -75,23 +77,24 @@ def insert(context, obj, touched):
     return painted
 
 
-def _paint(mesh, touched):
+def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
     """Gives each vertex the values of the nearest touch."""
     attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in MEASURES]
     attributes.append(("reason", "INT", touched.reason))
     for name in (*MEASURES, "reason", TOUCHED, MAP_COLOR):
         if name in mesh.attributes:  # The source may have one of this name and another type.
             mesh.attributes.remove(mesh.attributes[name])
+    added: Any = mesh.attributes
     for name, kind, values in attributes:
-        mesh.attributes.new(name, kind, "POINT").data.foreach_set("value", values[touched.nearest])
+        added.new(name, kind, "POINT").data.foreach_set("value", values[touched.nearest])
     is_touched = np.zeros(len(mesh.vertices), dtype=bool)
     is_touched[touched.chosen[: touched.done]] = True
-    mesh.attributes.new(TOUCHED, "BOOLEAN", "POINT").data.foreach_set("value", is_touched)
+    added.new(TOUCHED, "BOOLEAN", "POINT").data.foreach_set("value", is_touched)
     mesh.attributes.new(MAP_COLOR, "FLOAT_COLOR", "POINT")
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
 
 
-def recolor(painted):
+def recolor(painted: Object) -> None:
     """Colors the map by the quantity that it is set to show, and keeps the range in its record."""
     shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
     values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == "reason" else np.float32)
@@ -112,7 +115,7 @@ def recolor(painted):
     record["color_limit"] = limit
 
 
-def _limit(shown, values, spacing):
+def _limit(shown: str, values: Array, spacing: float) -> float:
     """The end of the colors' range."""
     if shown == "blind_share":
         return 1.0
@@ -120,7 +123,7 @@ def _limit(shown, values, spacing):
     return colors.symmetric_range(values, floor) if len(values) else floor
 
 
-def swatches(painted):
+def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
     """(name, sRGB color) of all that is not on the scale: reasons that occur, or that there is no patch."""
     record = painted[patch_record.MAP_RECORD]
     counts = {"patch": record["patches"] - record["in_doubt"], "doubt": record["in_doubt"]}
@@ -132,7 +135,7 @@ def swatches(painted):
     return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
 
 
-def touched_near(painted, location):
+def touched_near(painted: Object, location: list[float]) -> list[float]:
     """The point nearest to a location at which a map was touched.
 
     It is the location itself if that point is farther away than the spacing, as where the target was moved.
@@ -151,7 +154,7 @@ def touched_near(painted, location):
     return places[nearest].tolist() if is_near else location
 
 
-def inputs_of(painted):
+def inputs_of(painted: Object) -> dict[str, Any]:
     """The settings that a map was touched with, by name: with them a probe finds what the map shows."""
     record = painted[patch_record.MAP_RECORD].to_dict()
     angles = np.radians(record["planes"] + [[0.0, 0.0]] * (MOST_PLANES - len(record["planes"])))
@@ -165,14 +168,21 @@ def inputs_of(painted):
     }
 
 
-def register():
-    bpy.types.Object.tactile_map_colors = EnumProperty(
+def _show(obj: Object, context: bpy.types.Context) -> None:
+    if patch_record.MAP_RECORD in obj:
+        recolor(obj)
+
+
+def register() -> None:
+    objects: Any = bpy.types.Object
+    objects.tactile_map_colors = EnumProperty(
         name="Colors",
         description="What the colors of the map show",
         items=[item[:3] for item in MAP_QUANTITIES],
-        update=lambda obj, _: recolor(obj) if patch_record.MAP_RECORD in obj else None,
+        update=_show,
     )
 
 
-def unregister():
-    del bpy.types.Object.tactile_map_colors
+def unregister() -> None:
+    objects: Any = bpy.types.Object
+    del objects.tactile_map_colors

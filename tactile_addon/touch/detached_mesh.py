@@ -4,11 +4,14 @@
 
 import zlib
 from time import perf_counter
+from typing import Any
 
+import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object
+from .types import Array, Object, Point, Triple
 
 PAUSE = 50.0  # The shape is compared again after so many times as long as that takes.
 
@@ -27,7 +30,7 @@ class DetachedMesh(PlacedMesh):
     spacing : the largest distance of neighboring float32 numbers in the mesh
     """
 
-    def __init__(self, obj, depsgraph):
+    def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
         co = coordinates(obj.name, evaluated)
@@ -55,7 +58,7 @@ class DetachedMesh(PlacedMesh):
         rays = self._tree.ray_cast
         super().__init__(linear, np.zeros(3), lambda *ray: rays(*ray)[:2])
 
-    def require_source(self, context):
+    def require_source(self, context: bpy.types.Context) -> Object:
         """The object it was made from. Raises ValueError, with a sentence, if that is gone or was moved.
 
         Now and then it also does what `require_same` does, so that long work does not go on in vain.
@@ -75,34 +78,34 @@ class DetachedMesh(PlacedMesh):
             self._compared_until = perf_counter() + PAUSE * (perf_counter() - begin)
         return found
 
-    def require_same(self, context):
+    def require_same(self, context: bpy.types.Context) -> Object:
         """The object that `require_source` finds. Raises ValueError if that has another shape now."""
         self._compared_until = 0.0
         return self.require_source(context)
 
     @property
-    def origin(self):
+    def origin(self) -> Array:
         """The origin of the points, in the world."""
         return np.array(self.matrix.translation, dtype=float)
 
-    def project(self, location):
+    def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The point of the mesh nearest to a place, the unit normal there, and the distance."""
         return self._foot(location, location)
 
-    def _nearest(self, local):
+    def _nearest(self, local: Any) -> Any:
         return self._tree.find_nearest(local)[:2]
 
-    def face_near(self, point):
+    def face_near(self, point: Point) -> int:
         """The number of the face nearest to a point."""
         return self._tree.find_nearest(self._to_local(point))[2]
 
-    def corners_of(self, number):
+    def corners_of(self, number: int) -> Array:
         """The corners (k, 3) of a face, in order."""
         start, end = self._starts[number : number + 2]
         return self.points[self._corners[start:end]]
 
 
-def _arrays_of(mesh):
+def _arrays_of(mesh: bpy.types.Mesh) -> tuple[Array, Array, Array, Array]:
     """Normals (n, 3) of a mesh's vertices, those of its corners, its faces' first corners, its triangles."""
     normals = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.vertex_normals.foreach_get("vector", normals.ravel())

@@ -14,6 +14,7 @@ from ..touch import units
 from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import plane_axes
+from ..touch.types import Object
 from .mouse import draw_hints, mouse_ray
 
 DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
@@ -121,7 +122,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
             surface = MeshSurface(probe.probe_of(context.object).tactile_probe.target, depsgraph, sound=True)
             if not context.region_data.is_perspective:
                 origin -= context.space_data.clip_end * direction
-            hit = surface.ray_cast(list(origin), list(direction), 4.0 * context.space_data.clip_end)
+            hit = surface.ray_cast(origin.to_tuple(), direction.to_tuple(), 4.0 * context.space_data.clip_end)
         except (ValueError, AttributeError):  # The target is gone or cannot be touched; the panel says so.
             return
         if hit is None:
@@ -130,7 +131,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if upright.dot(direction) * normal.dot(direction) < 0.0:  # It stays on its side.
             normal.negate()
         turn = upright.rotation_difference(normal) @ self._matrix.to_quaternion()
-        self._set(context, Matrix.LocRotScale(Vector(hit[0]), turn, self._matrix.to_scale()))
+        self._set(context, Matrix.LocRotScale(list(hit[0]), turn, self._matrix.to_scale()))
 
     def _below(self, context, event):
         """The angle of the mouse, or its distance from the point; None if that cannot be told."""
@@ -139,9 +140,8 @@ class TACTILE_OT_drag(bpy.types.Operator):
         e1 = self._matrix.col[0].xyz.normalized()
         right, up = e1, normal.cross(e1)
         if self.what == DRAG_TILT:
-            t = Vector(
-                plane_axes(self._matrix, probe.probe_of(context.object).tactile_probe, self.plane)[:, 0]
-            )
+            settings = probe.probe_of(context.object).tactile_probe
+            t = Vector(plane_axes(self._matrix, settings, self.plane)[:, 0].tolist())
             right, up, normal = normal, normal.cross(t), t
         if abs(direction.dot(normal)) < EDGE_ON:
             return None
@@ -190,7 +190,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
             touch_again.refresh(found, context)
 
 
-def shown_probe(context):
+def shown_probe(context: bpy.types.Context) -> Object | None:
     """The probe whose handles are shown: the active one, or that of the active patch or contours; or None."""
     found = probe.probe_of(context.object)
     if found is None or not found.visible_get() or probe.lock_of(found) is not None:

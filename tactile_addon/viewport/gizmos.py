@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The handles of the active probe: they move its point, turn and tilt sampling planes, and set the extent."""
 
+from typing import Any
+
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
@@ -67,7 +69,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         center = np.array(matrix.translation, dtype=float)
         apart = self._shrink(context, matrix.translation, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
-        self.point.matrix_basis = Matrix.Translation(center)
+        self.point.matrix_basis = Matrix.Translation(center.tolist())
         self.point.hide = settings.target is None
         ahead = _line_of_sight(context.region_data, matrix.translation)
         for i, (turn, tilt) in enumerate(zip(self.turns, self.tilts, strict=True)):
@@ -90,7 +92,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         Returns a function that tells whether a place is apart from the center in the view.
         """
 
-        def seen(place):
+        def seen(place: Vector) -> Any:
             """Where a place is in the region, or None."""
             return location_3d_to_region_2d(context.region, context.region_data, place)
 
@@ -103,20 +105,22 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         for ball in (self.point, *self.turns, *self.tilts):
             ball.scale_basis = scale
 
-        def is_apart(place):
+        def is_apart(place: Vector) -> bool:
             at = seen(place)
             return at is None or (at - here).length >= APART * ui_scale
 
         return is_apart
 
 
-def _right(context):
+def _right(context: bpy.types.Context) -> Vector:
     """The direction to the right in the view."""
-    return context.region_data.view_matrix.inverted_safe().col[0].xyz.normalized()
+    to_world: Any = context.region_data.view_matrix.inverted_safe()
+    return to_world.col[0].xyz.normalized()
 
 
-def _line_of_sight(view, point):
+def _line_of_sight(view: bpy.types.RegionView3D, point: Vector) -> Vector:
     """The direction from the eye to a point of the world."""
+    to_world: Any = view.view_matrix.inverted_safe()
     if view.is_perspective:
-        return (point - view.view_matrix.inverted_safe().translation).normalized()
-    return -view.view_matrix.inverted_safe().col[2].xyz.normalized()
+        return (point - to_world.translation).normalized()
+    return -to_world.col[2].xyz.normalized()

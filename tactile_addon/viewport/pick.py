@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pick Reference Point: hover to see how the surface lies, click to have a probe and a patch there."""
 
+from typing import Any
+
 import bpy
 from bpy.props import BoolProperty
 
@@ -86,7 +88,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         if self.at_once:
             return self._click(context, event)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
-        self._seen = {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}
+        self._seen: dict[str, Any] = {
+            "touched": None,
+            "refusal": None,
+            "mouse": (event.mouse_x, event.mouse_y),
+        }
         self._drawings = overlay.draw_pick(self._seen)
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
@@ -157,7 +163,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         settings.is_probe = True
         make_active(context, found)
         show_colors(context.space_data)
-        report = probe.record_of(found).to_dict()
+        report = probe.record_of(found)
         unit = units.unit_of(context.scene, report["radius"])
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, verdict(report, unit))
         return {"FINISHED"}
@@ -221,8 +227,8 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
                 unit = units.unit_of(context.scene, touched.result.radius)
-                found = curvatures(touched.report, unit)
-                words = short = f"{touched.report['source']}: principal curvatures {found}"
+                bends = curvatures(touched.report, unit)
+                words = short = f"{touched.report['source']}: principal curvatures {bends}"
         except ValueError as error:
             words = self._seen["refusal"] = sentence(error)
             short = "No touch is possible here"
@@ -242,7 +248,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         context.window.cursor_modal_set("EYEDROPPER")
 
 
-def _redraw(context):
+def _redraw(context: bpy.types.Context) -> None:
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             area.tag_redraw()

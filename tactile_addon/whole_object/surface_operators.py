@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel's buttons for the surface of a whole object: where it is farthest off, and another mesh of it."""
 
+from typing import Any
+
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -12,15 +14,16 @@ from ..probes.operators import is_in_object_mode, make_active, report_error
 from ..scene import patch_record
 from ..scene.mesh_data import own_mesh
 from ..touch.settings import draw_chosen, length_property
+from ..touch.types import Object, Point
 from . import kept, whole_mesh
 from .object_report import object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
 
 
-def surface_of(context):
+def surface_of(context: bpy.types.Context) -> Object | None:
     """The active object if it is a whole object, or None."""
-    obj = context.view_layer.objects.active
+    obj: Object = context.view_layer.objects.active
     return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
 
 
@@ -61,7 +64,7 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _select_nearest(mesh, place):
+def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     """Selects the vertex nearest to a place, and nothing else, and returns it."""
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.vertices.foreach_get("co", points.ravel())
