@@ -6,7 +6,7 @@ import numpy as np
 
 from core.atlas.join import agreed, charts_of, joined
 from core.atlas.object_atlas import Atlas, surfaced
-from core.exploration.side_by_side import result_of
+from core.steps import result_of
 
 NOISE = 0.0005
 EDGE = 0.008  # The length of an edge of the mesh; those of Poisson at depth 8 are half as long.

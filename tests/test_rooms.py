@@ -17,6 +17,7 @@ ROOMS = {
     "core": (
         "arguments",
         "lapack",
+        "steps",
         "contours",
         "contact_data",
         "patch",

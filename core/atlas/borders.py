@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import vector_of
-from ..contours.finger import Finger
-from ..patch.tetrahedra import Indices, split_sides
+from .finger import Finger
 from .meshing import LEAST_DIVISOR, Mesh
+from .tetrahedra import Indices, split_sides
 
 # python -m benchmarks.atlas judges these.
 REACH, STEP = 6.0, 0.5  # A border is looked for within so many edges of the mesh's, in such steps,

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.finger import FACING
 from ..patch.monge import TERMS, derived_monomials
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts
 from .field import LAYER, least_of, node_weights
+from .finger import FACING
 
 # Boundaries are looked for on so many rays from each patch's middle, at so many places.
 RAYS, RAY_PLACES = 32, 16

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..patch.cubic_spline import CUBIC, SIDE, cubics, weights_at
+from .cubic_spline import CUBIC, SIDE, cubics, weights_at
 
 # python -m benchmarks.atlas judges these.
 MARGIN = 1.12  # A patch counts to this share of its domain's radius: beside a crease it ends a step early.

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..patch.tetrahedra import Indices, sides_of, split_sides
 from .charts import Charts
 from .field import wall_facing
+from .tetrahedra import Indices, sides_of, split_sides
 
 # python -m benchmarks.atlas judges these.
 SHARP = 0.87  # Two walls meet at a crease where the cosine between their normals is less.

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import Array
-from ..patch.tetrahedra import Indices
 from .creases import SHARP
 from .meshing import LEAST_DIVISOR, Mesh
+from .tetrahedra import Indices
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
 SAGITTA = 80.0  # A quadric is so wide that its sagitta is so many deviations of the surface.

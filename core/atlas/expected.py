@@ -7,11 +7,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number
 from ..contours.contour import tangent_of, vector_of
-from ..contours.finger import Finger, Surface, first_contact
+from ..contours.finger import Surface, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.options import ExplorationOptions
-from ..exploration.side_by_side import exploring_many, result_of
+from ..exploration.side_by_side import exploring_many
 from ..reconstruction.result import Reconstruction
+from ..steps import result_of
+from .finger import Finger
 from .rims import felt_rim
 from .touching import FIRST_EXTENT, NEAR, SIZE
 

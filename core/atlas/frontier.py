@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Contour, Vector, cross, dot, vector_of
-from ..contours.finger import DISK_PLACES, Contact, Finger
+from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, Charts
 from .field import INSIDE, covered
+from .finger import DISK_PLACES, Finger
 from .join import stacked, table_of
 from .meshing import LEAST_DIVISOR, Mesh
 from .reference_mesh import ReferenceMesh

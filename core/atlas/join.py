@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Contour
-from ..contours.finger import FACING
-from ..patch.cubic_spline import SIDE, between
-from ..patch.smoothing_spline import preparing, smoothing_spline
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
+from .cubic_spline import SIDE, between
 from .field import LAYER, wall_facing
+from .finger import FACING
+from .smoothing_spline import preparing, smoothing_spline
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.

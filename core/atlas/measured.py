@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
 from ..contours.contour import Contour
-from ..contours.finger import FACING
-from ..exploration.side_by_side import result_of
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
+from ..steps import result_of
+from .finger import FACING
 from .join import charts_of
 from .object_atlas import Atlas, surfaced
 

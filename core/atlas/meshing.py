@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..patch.tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
 from .charts import MARGIN, Charts
 from .creases import creased
 from .field import INSIDE, Surface, surface_at
 from .indicator import Indicator
+from .tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
 
 # python -m benchmarks.atlas judges these.
 CELL = 2.1  # A cube of the lattice is as long as so many edges of the mesh.

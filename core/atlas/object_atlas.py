@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number
 from ..contours.contour import Contour
-from ..exploration.side_by_side import result_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
+from ..steps import result_of
 from .borders import Border, bordered
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector
-from ..patch.tetrahedra import Indices
 from .charts import Charts
 from .field import Surface, patched
 from .indicator import Indicator
 from .meshing import LEAST_DIVISOR, Mesh
+from .tetrahedra import Indices
 
 # python -m benchmarks.atlas judges these.
 NEAREST = 3  # The nearest triangle is looked for at so many of the nearest vertices.

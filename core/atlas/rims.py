@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import vector_of
-from ..contours.finger import Finger
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS
+from .finger import Finger
 from .join import FARTHEST_RIM
 
 # python -m benchmarks.atlas judges these.

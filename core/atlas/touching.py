@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number, unit_vector
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of, vector_of
-from ..contours.finger import FACING, Finger, Surface, contact_of, first_contact
+from ..contours.finger import Surface, contact_of, first_contact
 from ..contours.tracking import generator_of
 from ..exploration.one_touch import Exploration
 from ..exploration.options import ExplorationOptions
-from ..exploration.side_by_side import exploring_many, result_of
+from ..exploration.side_by_side import exploring_many
+from ..steps import part_of, result_of
 from .borders import bordered, felt_border
 from .charts import Charts
+from .finger import FACING, Finger
 from .frontier import Frontier
 from .join import Table, agreed, joined
 from .meshing import Mesh
@@ -93,43 +95,24 @@ def touch_all_over(
         raise ValueError(f"tolerance: expected the noise {noise:g} or more, got {tolerance:g}")
     options = ExplorationOptions(noise=noise, rng=generator, largest_std=SIZE * tolerance)
     run = _Run(surface, tolerance, most, options)
-    more = _goes_on((yield run.first(p, up)))
-    more = yield from _all_over(run, more)
-    return (yield from _joined(run, more))
+    yield from run.show(run.first(p, up))
+    yield from _all_over(run)
+    return (yield from _joined(run))
 
 
-def _all_over(run: "_Run", more: bool) -> Generator[Progress, object, bool]:
-    """Touches until nothing within reach is uncovered. Returns whether to go on."""
-    while more and run.done < run.most:
-        chosen, more = yield from _told(run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)), run.now)
-        if not chosen or not more:
+def _all_over(run: "_Run") -> Generator[Progress, object, None]:
+    """Touches until nothing within reach is uncovered."""
+    while not run.is_stopped and run.done < run.most:
+        chosen = yield from run.showing(run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)))
+        if not chosen or run.is_stopped:
             break
         farthest = LARGER * max(touch.place.radius for touch in chosen)
         contacts = [(touch.point, touch.outward) for touch in chosen]
         least = [NARROW if touch.place.tried else SMALL for touch in chosen]
-        new, more = yield from _told(run.touch(contacts, farthest, least), run.now)
+        new = yield from run.showing(run.touching(contacts, farthest, least))
         for touch in chosen:
             run.frontier.tried(touch)
-        more = _goes_on((yield run.now(new=new))) and more
-    return more
-
-
-def _told(
-    steps: Generator[Any, None, Any], progress_of: Callable[[Any], Progress]
-) -> Generator[Progress, object, tuple[Any, bool]]:
-    """Runs steps and yields a Progress for each. Returns their result, and whether to go on."""
-    more = True
-    while True:
-        try:
-            progress = progress_of(next(steps))
-        except StopIteration as end:
-            return end.value, more
-        more = _goes_on((yield progress)) and more
-
-
-def _goes_on(answer: object) -> bool:
-    """Whether touches go on after an answer to a Progress: what is false stops them, except None."""
-    return answer is None or bool(answer)
+        yield from run.show(run.now(new=new))
 
 
 class _Run:
@@ -138,7 +121,21 @@ class _Run:
     def __init__(self, surface: Surface, tolerance: float, most: int, options: ExplorationOptions) -> None:
         self.surface, self.tolerance, self.most, self.options = surface, tolerance, most, options
         self.found: list[Exploration] = []
-        self.done = 0
+        self.done, self.is_stopped = 0, False
+
+    def show(self, progress: Progress) -> Generator[Progress, object, None]:
+        """Yields a Progress. An answer that is false stops the touches, except None."""
+        answer = yield progress
+        self.is_stopped |= answer is not None and not answer
+
+    def showing(self, steps: Generator[Any, None, Any]) -> Generator[Progress, object, Any]:
+        """Runs steps, and shows how far they are after each: a share of joining, or None."""
+        while True:
+            try:
+                joining = next(steps)
+            except StopIteration as end:
+                return end.value
+            yield from self.show(self.now(joining))
 
     def first(self, point: Array, up: Array) -> Progress:
         """Makes the touch from which all others go on. Raises ValueError if it fails, and those beside it.
@@ -195,7 +192,7 @@ class _Run:
         rims = (self.frontier.charts.rims * self.frontier.charts.radii[:, None])[-len(new) :] if new else ()
         return Progress(self.done, len(self.frontier.queue), tuple(new), joining, tuple(rims))
 
-    def touch(
+    def touching(
         self, contacts: Sequence[Contact], farthest: float, least: Sequence[float]
     ) -> Generator[None, None, list[Exploration]]:
         """Touches at contacts; returns those that succeed, and adds their rims to the frontier.
@@ -228,14 +225,14 @@ class _Run:
         yield 0.0
         return (yield from joined(contours, results, self.frontier.charts, self.options.noise, known))
 
-    def going_on(self, contacts: Sequence[Contact], farthest: float) -> Generator[Progress, object, bool]:
-        """Touches at contacts, and all over from there. Returns whether to go on."""
-        some, more = contacts[: self.most - self.done], True
+    def going_on(self, contacts: Sequence[Contact], farthest: float) -> Generator[Progress, object, None]:
+        """Touches at contacts, and all over from there."""
+        few = contacts[: self.most - self.done]
         new: list[Exploration] = []
-        if some:
-            new, more = yield from _told(self.touch(some, farthest, [NARROW] * len(some)), self.now)
-        more = _goes_on((yield self.now(new=new))) and more
-        return (yield from _all_over(self, more))
+        if few:
+            new = yield from self.showing(self.touching(few, farthest, [NARROW] * len(few)))
+        yield from self.show(self.now(new=new))
+        yield from _all_over(self)
 
     def check(self, reference: ReferenceMesh) -> Generator[float, None, Check]:
         """Contacts of a finger that comes from outside all round, and places of the mesh that it misses."""
@@ -267,14 +264,14 @@ class _Run:
         These are where the joined surface ends though the object goes on, where a finger from outside meets
         something else, and where the surface is less certain than the tolerance.
         """
-        charts = yield from _part(self.joining(known), 0.0, JOINED)
-        charts = yield from _part(agreed(charts), 0.0, JOINED)
+        charts = yield from part_of(self.joining(known), 0.0, JOINED)
+        charts = yield from part_of(agreed(charts), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
-        reference = yield from _part(surfaced(patches, charts, self.tolerance), JOINED, 1.0)
+        reference = yield from part_of(surfaced(patches, charts, self.tolerance), JOINED, 1.0)
         yield 1.0
         for _ in range(BORDERS):
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
-            border = yield from _part(steps, 1.0, 1.0)
+            border = yield from part_of(steps, 1.0, 1.0)
             reference = replace(reference, mesh=bordered(reference.mesh, border))
         yield from reference.prepared()
         check = yield from self.check(reference)
@@ -335,28 +332,18 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     return starts, np.vstack([aims, mesh.vertices[sharpest], centers[around]]), facing, 3.0 * far
 
 
-def _joined(run: _Run, more: bool) -> Steps:
+def _joined(run: _Run) -> Steps:
     """The atlas of what was found, after more touches where something is missing or less certain."""
     known: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
-        (atlas, contacts), still = yield from _told(run.atlas(known), run.now)
-        before, more = len(run.found), more and still
-        if not (again and more and contacts):
+        atlas, contacts = yield from run.showing(run.atlas(known))
+        before = len(run.found)
+        if not again or run.is_stopped or not contacts:
             break
-        more = yield from run.going_on(contacts, float(atlas.charts.radii.max()))
+        yield from run.going_on(contacts, float(atlas.charts.radii.max()))
         if len(run.found) == before:
             break
-    return atlas if more else replace(atlas, is_cut_short=True)
-
-
-def _part(steps: Generator[float, None, Any], start: float, end: float) -> Generator[float, None, Any]:
-    """Runs steps that yield the share that is done, which is a part of more."""
-    while True:
-        try:
-            share = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield start + (end - start) * share
+    return replace(atlas, is_cut_short=True) if run.is_stopped else atlas
 
 
 def explore_object(

@@ -30,7 +30,7 @@ WHERE = {  # The stops in words.
     NOT_MONGE: "where the surface turns away",
     UNEXPLAINED: "where the patch could no longer be trusted",
 }
-BRINKS = (NO_CONTACT, CREASE)  # The surface ends at these stops.
+OPEN_STOPS = (NO_CONTACT, CREASE)  # The surface ends at these stops.
 
 Vector = tuple[float, float, float]
 

@@ -13,9 +13,9 @@ from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
-from .enough import CONTACT_COUNTS, SHORTEST, is_enough, spacing
-from .growth import FELT, STRETCH, Counts, Feel, Felt, Grown, grown
+from .growth import MOST_STEPS, STRETCH, Counts, GrowthTrial, Track, TrackedContours, grown
 from .options import ExplorationOptions
+from .sampling_density import CONTACT_COUNTS, SHORTEST, spacing, suffices
 from .taps import Tapped, beside
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
@@ -102,11 +102,11 @@ class Touch:
             contours = self.follow(self.options.planes, step=step)(extent)
             return contours if self.options.extent else [_open(c) for c in contours], step, None
 
-        return (yield from self._enough(at, extent, steps))
+        return (yield from self._dense(at, extent, steps))
 
     def _grown(self) -> Steps:
         """The touch as large as it can be trusted."""
-        between = max(self.options.step or 0.0, self.farthest / FELT)
+        between = max(self.options.step or 0.0, self.farthest / MOST_STEPS)
         try:
             largest = yield from self._longest(between)
         except DegenerateCurvesError:
@@ -115,29 +115,29 @@ class Touch:
             # The surface may be too narrow for this step: a strip along an edge, or a fillet.
             largest = yield from self._longest(between / FINER)
         counts = largest.counts
-        found = yield from self._of_reaches(largest, counts)
-        if largest.sure and found.result.status != "ok" and self.options.is_grown:
+        found = yield from self._of_half_lengths(largest, counts)
+        if largest.is_sure and found.result.status != "ok" and self.options.is_grown:
             # The step was chosen anew, so these are other contacts than those that were explained.
             counts = np.floor(counts / STRETCH).astype(np.intp)
-            found = yield from self._of_reaches(largest, counts)
+            found = yield from self._of_half_lengths(largest, counts)
         if not self.options.is_tapped:
             return found
         found = yield from self._agreeing(largest, counts, found)
         return (yield from self._shortened(found)) if self.options.is_grown else found
 
-    def _longest(self, step: float) -> Generator[Ask, Answer, Grown]:
+    def _longest(self, step: float) -> Generator[Ask, Answer, GrowthTrial]:
         """The longest half curves that fits explain, of contacts this step apart."""
-        fits = grown(self._feeling(step), self.farthest, step)
+        fits = grown(self._tracking(step), self.farthest, step)
         contours = next(fits)
         while True:
             answer = yield Ask(contours, growing=not self.options.is_grown)
             try:
                 contours = fits.send(answer)
             except StopIteration as end:
-                largest: Grown = end.value
+                largest: GrowthTrial = end.value
                 return largest
 
-    def _agreeing(self, largest: Grown, counts: Counts, found: Exploration) -> Steps:
+    def _agreeing(self, largest: GrowthTrial, counts: Counts, found: Exploration) -> Steps:
         """The touch with curves so short that no tap contradicts it, or `found` if there is none."""
         r, (found, where) = found.result, self._tapped(found)
         if not (len(where) and self.options.is_grown and r.status == "ok"):
@@ -149,7 +149,7 @@ class Touch:
             if counts.flat[worst].min() < SHORTEST:
                 break
             try:
-                shorter, where = self._tapped((yield from self._of_reaches(largest, counts)))
+                shorter, where = self._tapped((yield from self._of_half_lengths(largest, counts)))
             except DegenerateCurvesError:
                 break
         return shorter if shorter.result.status == "ok" else found
@@ -173,51 +173,52 @@ class Touch:
         taps, where = self.tap(r)
         return replace(found, result=replace(r, taps=taps, known_height_std=r.mean_height_std)), where
 
-    def _feeling(self, step: float) -> Feel:
+    def _tracking(self, step: float) -> Track:
         """The function that follows half curves along the planes, each time from where they ended before."""
         feel = self.follow(self.options.planes, step=step)
 
-        def felt(length: float) -> Felt:
+        def tracked(length: float) -> TrackedContours:
             """The half curves to this length."""
             contours = feel(min(length, self.farthest))
-            return Felt(contours, self.point, step, self.options.largest_std, partial=length < self.farthest)
+            partial = length < self.farthest
+            return TrackedContours(contours, self.point, step, self.options.largest_std, partial)
 
-        return felt
+        return tracked
 
-    def _of_reaches(self, largest: Grown, counts: Counts) -> Steps:
-        """The touch with half curves as long as so many felt contacts, consisting of these if possible."""
-        felt, reaches = largest.felt, largest.felt.step * counts.astype(np.float64)
-        length = float(reaches.max())
+    def _of_half_lengths(self, largest: GrowthTrial, counts: Counts) -> Steps:
+        """The touch with half curves of these numbers of contacts, made of tracked ones if possible."""
+        tracked, half_lengths = largest.tracked, largest.tracked.step * counts.astype(np.float64)
+        length = float(half_lengths.max())
 
         def at(step: float) -> Contacts:
             """The contacts this step apart, or somewhat nearer to each other."""
-            stride = int(step / felt.step * (1.0 + 1e-6))
+            stride = int(step / tracked.step * (1.0 + 1e-6))
             if stride:
                 same = self.options.is_grown and counts is largest.counts and stride == largest.stride
                 known = largest.result if same else None
-                return felt.shortened(counts, stride), stride * felt.step, known
+                return tracked.shortened(counts, stride), stride * tracked.step, known
             # One step more shows whether a half curve ends there.
             longer = self.follow(self.options.planes, step=step)(min(length + step, self.farthest))
-            again = Felt(longer, self.point, step, self.options.largest_std)
-            fewer = np.minimum((reaches / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
+            again = TrackedContours(longer, self.point, step, self.options.largest_std)
+            fewer = np.minimum((half_lengths / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
             return again.shortened(fewer), step, None
 
         steps = (
-            [spacing(reaches, count) for count in CONTACT_COUNTS]
+            [spacing(half_lengths, count) for count in CONTACT_COUNTS]
             if self.options.step is None
             else [self.options.step]
         )
-        return (yield from self._enough(at, length, steps))
+        return (yield from self._dense(at, length, steps))
 
-    def _enough(self, at: Callable[[float], Contacts], extent: float, steps: list[float]) -> Steps:
+    def _dense(self, at: Callable[[float], Contacts], extent: float, steps: list[float]) -> Steps:
         """The touch with the first of these steps that brings enough contacts, or else with the last."""
-        for wanted in dict.fromkeys(steps):
-            contours, step, known = at(wanted)
+        for longest in dict.fromkeys(steps):
+            contours, step, known = at(longest)
             r = known or (yield Ask(contours))
             if isinstance(r, DegenerateCurvesError):
-                if wanted == steps[-1]:
+                if longest == steps[-1]:
                     raise r
-            elif wanted == steps[-1] or is_enough(r):
+            elif longest == steps[-1] or suffices(r):
                 break
         assert isinstance(r, Reconstruction)
         return Exploration(contours, r, extent, step, tuple(self.options.planes))
@@ -225,19 +226,19 @@ class Touch:
     def _with_plane(self, found: Exploration, plane: SamplingPlane) -> Steps:
         """The touch with one plane more, along which curves are as long as the fit explains their contacts.
 
-        They are felt twice as densely as fitted: the contacts between tell whether the fit explains them.
+        They are tracked twice as densely as fitted: the contacts between show whether the fit explains them.
         Raises ValueError if nothing can be felt along the plane.
         """
         half = 0.5 * found.step
         contours = self.follow((plane,), step=half)(found.extent)
-        felt = Felt(contours, self.point, half, self.options.largest_std)
-        counts = felt.whole // 2 * 2
+        tracked = TrackedContours(contours, self.point, half, self.options.largest_std)
+        counts = tracked.whole // 2 * 2
         while True:
-            contours = [*found.contours, *felt.shortened(counts, 2)]
+            contours = [*found.contours, *tracked.shortened(counts, 2)]
             r = yield Ask(contours)
             if isinstance(r, DegenerateCurvesError):
                 raise r
-            misfits = felt.misfits(counts, r)
+            misfits = tracked.misfits(counts, r)
             worst = int(np.argmax(misfits))
             if (
                 self.options.extent is not None

@@ -5,7 +5,6 @@
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,15 +60,6 @@ def exploring_many(
         return (yield from touch.steps())
 
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
-
-
-def result_of(steps: Generator[Any, Any, Any]) -> Any:
-    """What steps return once they are done."""
-    try:
-        while True:
-            next(steps)
-    except StopIteration as end:
-        return end.value
 
 
 def _farthest(feel: Callable[..., list[Contour]]) -> float:

@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from ..arguments import LARGEST, finite_array, unit_vector
 from ..contours.contour import SamplingPlane
 from ..contours.finger import Surface
+from ..steps import result_of
 from .one_touch import Exploration
 from .options import ExplorationOptions, planes_of
-from .side_by_side import exploring_many, result_of
+from .side_by_side import exploring_many
 
 
 def explore(

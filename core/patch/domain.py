@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The domain D of a patch: inside a closed cubic spline through the projected curve ends (paper, IV-A).
 
-Where the surface itself ends, the spline would bulge over what is not there. So it is straight beside such
+Where the surface itself ends, the spline would bulge over what is not there. So it is straight next to such
 ends.
 """
 
@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array
 
-GRID = 600  # The grid (8) over a domain has about so many points.
-BOUNDARY_SAMPLES = 1024  # With so many samples of the boundary its radius is right to 1e-5.
-HULL_PLACES = 32  # So many places on the hull of contacts bound a domain.
+GRID = 600  # The grid (8) over a domain has about this number of points.
+BOUNDARY_SAMPLES = 1024  # With this number of samples the radius of the boundary is right to 1e-5.
+HULL_PLACES = 32  # This number of places on the hull of contacts bounds a domain.
 INSIDE_HULL = 0.05  # The origin is inside such a hull by at least this share of the radius.
 QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])  # It turns rows counterclockwise.
 # Ends this near to each other, as a share of the radius, count once; near the origin, not at all.
@@ -25,8 +25,11 @@ SAME_END = 1e-3
 # Ends of two or three curves are at most 90 degrees apart: if these are more, one between was at the origin.
 WIDE = np.radians(100.0)
 SHORTEST = 1e-6  # No length is divided by less than this share of the farthest end's distance.
-BRINK = 0.01  # Where the surface ends at the origin, the domain ends this share of the radius away.
-GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Means over the domain take so many Gauss points between ends, and outward.
+AT_POINT = 0.01  # Where the surface ends at the origin, the domain ends this share of the radius away.
+GAUSS_ALONG, GAUSS_ACROSS = (
+    4,
+    3,
+)  # Gauss points between ends, and outward, for means over the domain.
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,27 +37,27 @@ class Domain:
     """The part of the tangent plane over which a patch is valid (paper, IV-A); star-shaped about the origin.
 
     ends : (m, 2), m >= 3, the projected ends of the contours, sorted by azimuth
-    brinks : (m,), whether the surface ends there, at a crease or at its border; None if it ends nowhere
+    open_ends : (m,), whether the surface ends there, at a crease or at its border; None if it ends nowhere
     """
 
     ends: Array
-    brinks: NDArray[np.bool_] | None = None
+    open_ends: NDArray[np.bool_] | None = None
 
     def scaled(self, factor: float) -> "Domain":
         """The domain with every length multiplied by `factor`."""
-        return Domain(factor * self.ends, self.brinks)
+        return Domain(factor * self.ends, self.open_ends)
 
     @property
     def _straight(self) -> NDArray[np.bool_] | None:
         """A mask (m,) of the pieces of the boundary, from one end to the next, that are straight, or None."""
-        return None if self.brinks is None else self.brinks | np.roll(self.brinks, -1)
+        return None if self.open_ends is None else self.open_ends | np.roll(self.open_ends, -1)
 
     @cached_property
     def _boundary(self) -> tuple[Array, Array]:
         """The lengths (m,) of the chords, and the closed cubic spline over them by powers, (4, m, 2).
 
-        Its slopes at the ends follow from the continuity of its second derivative. Beside straight pieces,
-        which are chords, it begins across the ray to the end, as a circle would.
+        Its slopes at the ends follow from the continuity of its second derivative. Next to straight
+        pieces, which are chords, it begins across the ray to the end, as a circle would.
         """
         rows = np.arange(len(self.ends))
         last, following = rows - 1, rows + 1 - len(rows)  # The rows before and after, in a circle.
@@ -68,9 +71,9 @@ class Domain:
         right = 3.0 * (over * rise[last] + before[:, None] * rise)
         straight = self._straight
         if straight is not None:
-            beside = straight | straight[last]
-            system[beside], right[beside] = np.eye(len(rows))[beside], self.ends[beside] @ QUARTER
-            right[beside] /= np.linalg.norm(self.ends[beside], axis=1, keepdims=True)
+            adjacent = straight | straight[last]
+            system[adjacent], right[adjacent] = np.eye(len(rows))[adjacent], self.ends[adjacent] @ QUARTER
+            right[adjacent] /= np.linalg.norm(self.ends[adjacent], axis=1, keepdims=True)
         slopes = np.linalg.solve(system, right)
         bend = (slopes + slopes[following] - 2.0 * rise) / over
         pieces = np.array([self.ends, slopes, (rise - slopes) / over - bend, bend / over])
@@ -170,7 +173,7 @@ class Domain:
         i = np.searchsorted(at, turns, side="right")
         before, after, last, following = turns - at[i - 1], at[i] - turns, out[i - 1], out[i]
         across = np.maximum(last * np.sin(before) + following * np.sin(after), SHORTEST * out.max())
-        line = np.maximum(last * following * np.sin(before + after) / across, BRINK * out.max())
+        line = np.maximum(last * following * np.sin(before + after) / across, AT_POINT * out.max())
         apart = (before + after > WIDE) | (
             np.minimum(last, following) < unequal * np.maximum(last, following)
         )
@@ -214,23 +217,23 @@ def _gauss(ends: int) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
     )
 
 
-def closed_spline_domain(ends: ArrayLike, radius: float, brinks: ArrayLike | None = None) -> Domain:
-    """The domain through projected curve ends (m, 2), in any order; `brinks` as in Domain.
+def closed_spline_domain(ends: ArrayLike, radius: float, open_ends: ArrayLike | None = None) -> Domain:
+    """The domain through projected curve ends (m, 2), in any order; `open_ends` as in Domain.
 
     Ends within SAME_END of the origin, as of a curve that goes to one side only, or of another end do not
     count. Raises ValueError if fewer than three are left.
     """
     x, y = np.asarray(ends, dtype=float).T
-    is_brink = np.zeros(len(x), dtype=bool) if brinks is None else np.asarray(brinks, dtype=bool)
+    is_open = np.zeros(len(x), dtype=bool) if open_ends is None else np.asarray(open_ends, dtype=bool)
     out = np.flatnonzero(x * x + y * y > (SAME_END * radius) ** 2)
     order = out[np.argsort(np.arctan2(y[out], x[out]), kind="stable")]
-    x, y, is_brink = x[order], y[order], is_brink[order]
+    x, y, is_open = x[order], y[order], is_open[order]
     before = np.arange(-1, len(x) - 1)
     apart = (x - x[before]) ** 2 + (y - y[before]) ** 2 > (SAME_END * radius) ** 2
     count = np.count_nonzero(apart)
     if count < 3:
         raise ValueError(f"ends: expected three or more apart from each other, got {count}")
-    return Domain(np.array([x[apart], y[apart]]).T, is_brink[apart] if is_brink.any() else None)
+    return Domain(np.array([x[apart], y[apart]]).T, is_open[apart] if is_open.any() else None)
 
 
 def hull_domain(points: ArrayLike, radius: float) -> Domain:
@@ -243,6 +246,6 @@ def hull_domain(points: ArrayLike, radius: float) -> Domain:
     rays = np.array([np.cos(turns), np.sin(turns)])
     ahead = hull[:, :2] @ rays
     if hull[:, 2].max() > -INSIDE_HULL * radius:
-        raise ValueError("points: expected the origin among them, got it beside them or at their rim")
+        raise ValueError("points: expected the origin among them, got it outside them or at their rim")
     reach = np.where(ahead > 0.0, -hull[:, 2:] / np.maximum(ahead, 1e-300), np.inf).min(axis=0)
     return closed_spline_domain((reach * rays).T, radius)

@@ -46,7 +46,7 @@ def to_dict(r: Reconstruction) -> dict[str, Any]:
             "frame": {"origin": r.frame.origin.tolist(), "axes": r.frame.axes.tolist()},
             "radius": r.radius,
             "domain": r.domain.ends.tolist(),
-            "brinks": None if r.domain.brinks is None else r.domain.brinks.tolist(),
+            "open_ends": None if r.domain.open_ends is None else r.domain.open_ends.tolist(),
         },
         "patch": polynomial_dict(r.patch),
         "contours": [plain(vars(contour)) for contour in r.contours],
@@ -112,15 +112,15 @@ def _geometry(d: Any, surface: SurfacePosterior | MongePatch) -> Geometry:
     axes = finite_array("axes", _of(frame, "axes"), (3, 3))
     if np.abs(axes.T @ axes - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(axes) < 0.0:
         raise ValueError("axes: expected a right-handed frame of unit vectors, got another matrix")
-    brinks = _of(d, "brinks")
+    open_ends = _of(d, "open_ends")
     ends = finite_array("domain", _of(d, "domain"), (None, 2))
-    if brinks is not None:
-        brinks = finite_array("brinks", brinks, (len(ends),)) != 0.0
+    if open_ends is not None:
+        open_ends = finite_array("open_ends", open_ends, (len(ends),)) != 0.0
     return Geometry(
         Frame(finite_array("origin", _of(frame, "origin"), (3,), LARGEST), axes),
         radius,
         surface.scaled(1.0 / radius) if isinstance(surface, MongePatch) else surface,
-        closed_spline_domain(ends, radius, brinks),
+        closed_spline_domain(ends, radius, open_ends),
     )
 
 

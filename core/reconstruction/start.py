@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import BRINKS, Contour
+from ..contours.contour import OPEN_STOPS, Contour
 from ..contours.curves import LEAST_CONTACTS, Curves, curves_through, misses, stacked
 from ..contours.local_geometry import (
     DegenerateCurvesError,
@@ -20,7 +20,7 @@ from ..contours.local_geometry import (
     surface_normals,
 )
 from ..contours.thinning import thinned
-from ..patch.domain import BRINK, Domain, closed_spline_domain
+from ..patch.domain import AT_POINT, Domain, closed_spline_domain
 from .strokes import STRIPS, FirstFrame, first_frame, means, toward_farthest
 
 AWAY = 0.1  # Beyond this share of a curve's size, the point is not on it.
@@ -236,17 +236,17 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     last = np.maximum(np.count_nonzero(curves.present, axis=1) - 1, 0)
     rows, ahead = np.arange(len(last)), curves.tangents[:, :2]
     there = curves.present[:, 0]
-    felt = np.array([there & (curves.along[:, 0] < 0.0), there & (curves.along[rows, last] > 0.0)])
+    sides = np.array([there & (curves.along[:, 0] < 0.0), there & (curves.along[rows, last] > 0.0)])
     ends = np.array([curves.points[rows, 0, :2], curves.points[rows, last, :2]])
-    brinks = np.zeros_like(felt)
+    open_ends = np.zeros_like(sides)
     for i, contour in enumerate(contours):
-        brinks[:, i] = [stop in BRINKS for stop in contour.stops or ("", "")]
-    counted = felt
-    if brinks.any():
-        at_point = brinks & (np.linalg.norm(ends, axis=2) * felt < BRINK)
-        ends[at_point] = (np.array([-BRINK, BRINK])[:, None, None] * ahead)[at_point]
-        counted = felt | at_point
-    return closed_spline_domain(ends[counted], 1.0, brinks[counted])
+        open_ends[:, i] = [stop in OPEN_STOPS for stop in contour.stops or ("", "")]
+    counted = sides
+    if open_ends.any():
+        at_point = open_ends & (np.linalg.norm(ends, axis=2) * sides < AT_POINT)
+        ends[at_point] = (np.array([-AT_POINT, AT_POINT])[:, None, None] * ahead)[at_point]
+        counted = sides | at_point
+    return closed_spline_domain(ends[counted], 1.0, open_ends[counted])
 
 
 def too_coarse(gap: float, size: float) -> DegenerateCurvesError:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a touch of a mesh has felt so few facets that its curvature is theirs, not the shape's."""
+"""Whether the contacts of a touch lie on so few facets that its curvature is theirs, not the shape's."""
 
 import math
 from collections.abc import Callable
@@ -15,13 +15,13 @@ from ..arguments import Array
 from ..reconstruction.result import Reconstruction
 
 # benchmarks.facets chose these.
-FEW = 12  # If fewer facets are felt, a curvature is off by some .8 to 1.2 of the larger one; if more, by .3.
-MANY = 40  # If so many faces are, the mesh is fine, even where it is flat.
+FEW = 12  # On fewer facets a curvature is off by some .8 to 1.2 of the larger one; on more, by .3.
+MANY = 40  # If contacts lie on this number of faces, the mesh is fine, even where it is flat.
 # Edges between these angles stand for a smooth bend,
 SAME, SMOOTH = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
-# if both facets are so many times as wide as the wider one and as the radius; else one is a fillet.
+# if both facets have this share of the wider one's width, and of the radius; else one is a fillet.
 LIKE = 0.25
-BEYOND = 0.05  # The facet behind an edge is looked for so many widths beyond it.
+BEYOND = 0.05  # The facet behind an edge is looked for this share of the width beyond it.
 
 
 class Facet(NamedTuple):
@@ -43,19 +43,19 @@ def has_few_facets(
     Facets that bend into others at sharp edges alone, as those of a cube, are the shape itself.
     """
     shape = cache(lambda face: _facet(corners_of(face)))
-    felt: dict[int, Facet] = {}
+    touched: dict[int, Facet] = {}
     distinct: list[Array] = []
     points = np.vstack([contour.points for contour in r.contours])
     for point in points[np.argsort(np.linalg.norm(points - r.frame.origin, axis=1), kind="stable")]:
         face = face_near(point)
-        if face in felt or not (facet := shape(face)).width:
+        if face in touched or not (facet := shape(face)).width:
             continue
-        felt[face] = facet
+        touched[face] = facet
         if all(facet.normal @ normal < SAME for normal in distinct):
             distinct.append(facet.normal)
-        if len(distinct) == FEW or len(felt) == MANY:
+        if len(distinct) == FEW or len(touched) == MANY:
             return False
-    nearest = islice(felt.values(), FEW)
+    nearest = islice(touched.values(), FEW)
     return any(_is_smooth(facet, r.radius, lambda at: shape(face_near(at))) for facet in nearest)
 
 

@@ -20,18 +20,19 @@ from ..reconstruction.result import Reconstruction
 from .sampling import spaced
 from .scanned_mesh import Mesh, corners_of, mesh_distances, mesh_of
 
-# `felt` is an array (2, n, 3): contacts, and the patch's unit normals there, in the frame. Lengths are in
-# units of the patch's radius. benchmarks.registration judges these numbers and those of scanned_mesh.py.
-SPACING = 0.1  # Points to which a polynomial is fitted are so far apart.
+# Oriented points are an array (2, n, 3): contacts, and the patch's unit normals there, in the frame. Lengths
+# are in units of the patch's radius. benchmarks.registration judges these numbers and those of
+# scanned_mesh.py.
+SPACING = 0.1  # The distance between points to which a polynomial is fitted.
 MOST_POINTS = 400
-PLACE_SPACING = 0.2  # Places that are tried are so far apart.
+PLACE_SPACING = 0.2  # The distance between places that are tried.
 TRIED_TURNS = 36
 POLYNOMIAL_RIDGE = 1e-3  # It keeps a polynomial with few points flat.
-COARSE_CONTACTS = 60  # The coarse search takes at most so many contacts.
-COARSE_PLACES, COARSE_STEPS = 400, 8  # So many places move, in so many steps, to planes of nearest triangles.
-FINE, FINE_STEPS = 24, 20  # So many of them then move to the triangles themselves.
+COARSE_CONTACTS = 60  # The largest number of contacts in the coarse search.
+COARSE_PLACES, COARSE_STEPS = 400, 8  # Numbers of places and of their steps to planes of nearest triangles,
+FINE, FINE_STEPS = 24, 20  # and of those that then move to the triangles themselves.
 SETTLED_GAIN = 1e-5  # A place has settled when a step lowers the sum of squares by a smaller share.
-NEAREST_TRIANGLES = 16  # Distances to so many triangles are measured.
+NEAREST_TRIANGLES = 16  # The number of triangles to which distances are measured.
 SAME_PLACE, SAME_TURN = 0.05, math.radians(2.0)  # Poses that differ by less count as one.
 AMBIGUOUS = 1.5  # A residual that is larger by less than this factor is about as good.
 SIGNIFICANT_SHIFT = 3.0  # A shift by fewer standard deviations is noise.
@@ -71,10 +72,12 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
         raise ValueError(f"best: expected a whole number of 1 or more, got {shown(best)}")
     co = finite_array("vertices", vertices, (None, 3), LARGEST)
     corners = corners_of(faces, len(co))
-    felt = np.array([r.contacts / r.radius, r.geometry.normal(*r.contacts[:, :2].T)])
+    oriented = np.array([r.contacts / r.radius, r.geometry.normal(*r.contacts[:, :2].T)])
     center = 0.5 * (co[corners].min(axis=(0, 1)) + co[corners].max(axis=(0, 1)))
-    mesh = mesh_of((co - center) / r.radius, corners, math.dist(felt[0].min(axis=0), felt[0].max(axis=0)))
-    places, residuals, slides = _descended(_coarse(felt, mesh), felt, mesh, NEAREST_TRIANGLES, FINE_STEPS)
+    size = math.dist(oriented[0].min(axis=0), oriented[0].max(axis=0))
+    mesh = mesh_of((co - center) / r.radius, corners, size)
+    starts = _coarse(oriented, mesh)
+    places, residuals, slides = _descended(starts, oriented, mesh, NEAREST_TRIANGLES, FINE_STEPS)
     distinct = _distinct(places, residuals)
     poses = []
     for i in distinct[:best]:
@@ -88,23 +91,23 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     return poses
 
 
-def _coarse(felt: Array, mesh: Mesh) -> Array:
+def _coarse(oriented: Array, mesh: Mesh) -> Array:
     """The most promising places (m, 3, 4), moved to where contacts are nearest to the planes of triangles."""
     from scipy.spatial.transform import Rotation
 
-    felt = felt[:, :: math.ceil(felt.shape[1] / COARSE_CONTACTS)]
-    places, fields = _fields(mesh, 1.05 * np.linalg.norm(felt[0], axis=1).max())
+    oriented = oriented[:, :: math.ceil(oriented.shape[1] / COARSE_CONTACTS)]
+    places, fields = _fields(mesh, 1.05 * np.linalg.norm(oriented[0], axis=1).max())
     turns = Rotation.from_rotvec(
         2.0 * np.pi / TRIED_TURNS * np.arange(TRIED_TURNS)[:, None] * [0.0, 0.0, 1.0]
     ).as_matrix()
-    scores = np.column_stack([_scores(felt @ turn.T, fields) for turn in turns])
+    scores = np.column_stack([_scores(oriented @ turn.T, fields) for turn in turns])
     least = (scores <= np.roll(scores, 1, axis=1)) & (scores <= np.roll(scores, -1, axis=1))
     order = np.argsort(np.where(least, scores, np.inf), axis=None)[
         : min(COARSE_PLACES, np.count_nonzero(least))
     ]
     places = places[order // TRIED_TURNS]
     places[..., :3] = places[..., :3] @ turns[order % TRIED_TURNS]
-    places, residuals, _ = _descended(places, felt, mesh, 1, COARSE_STEPS)
+    places, residuals, _ = _descended(places, oriented, mesh, 1, COARSE_STEPS)
     return places[_distinct(places, residuals)[:FINE]]
 
 
@@ -131,14 +134,14 @@ def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
     return places, np.concatenate(fields).T
 
 
-def _scores(felt: Array, fields: Array) -> Array:
+def _scores(oriented: Array, fields: Array) -> Array:
     """The sums (m,) of squared distances of the contacts to polynomials (k, m).
 
     What a small tilt and a shift along the normal can remove does not count. On a quadric, neither does what
     a small shift along the surface can remove.
     """
-    x, y, z = felt[0].T
-    weights = felt[1, :, 2:]  # On a slope a height is more than the distance.
+    x, y, z = oriented[0].T
+    weights = oriented[1, :, 2:]  # On a slope a height is more than the distance.
     off = weights * (z[:, None] - monomials(x, y, QUARTIC) @ fields)
     free = np.linalg.qr(weights * monomials(x, y, exponents(0, 1)))[0]
     return np.sum(off**2, axis=0) - np.sum((free.T @ off) ** 2, axis=0)
@@ -152,13 +155,13 @@ def _axes(normals: Array) -> Array:
 
 
 def _descended(
-    places: Array, felt: Array, mesh: Mesh, neighbors: int, steps: int
+    places: Array, oriented: Array, mesh: Mesh, neighbors: int, steps: int
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Places where the contacts are nearest to the mesh (Levenberg-Marquardt), their residuals, and whether
     noise alone may shift them to another."""
     from scipy.spatial.transform import Rotation
 
-    places, (distances, slopes) = places.copy(), mesh_distances(places, felt, mesh, neighbors)
+    places, (distances, slopes) = places.copy(), mesh_distances(places, oriented, mesh, neighbors)
     damping, going = np.full((len(places), 1, 1), 1e-3), np.arange(len(places))
     for _ in range(steps):
         some, off = slopes[going], distances[going]
@@ -168,7 +171,7 @@ def _descended(
         moved = places[going]
         moved[..., :3] = Rotation.from_rotvec(step[:, :3]).as_matrix() @ moved[..., :3]
         moved[..., 3] += step[:, 3:]
-        found, slope = mesh_distances(moved, felt, mesh, neighbors)
+        found, slope = mesh_distances(moved, oriented, mesh, neighbors)
         before = np.sum(off**2, axis=(1, 2))
         gain = before - np.sum(found**2, axis=(1, 2))
         better = gain > 0.0

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scanned mesh as triangles of similar size, and how far contacts are from it.
 
-Lengths are in units of the patch's radius; places and `felt` are those of pose_search.py.
+Lengths are in units of the patch's radius; places and oriented points are those of pose_search.py.
 """
 
 from typing import Any, NamedTuple
@@ -82,14 +82,14 @@ def _halved(pieces: Array) -> Array:
     return np.concatenate(done)
 
 
-def mesh_distances(places: Array, felt: Array, mesh: Mesh, neighbors: int) -> tuple[Array, Array]:
+def mesh_distances(places: Array, oriented: Array, mesh: Mesh, neighbors: int) -> tuple[Array, Array]:
     """Distances (m, n, 1) of the contacts to the mesh, and their derivatives (m, n, 6) by the motion.
 
     With one neighbor it is the distance to the plane of the nearest triangle; with more, to the nearest point
     of several triangles.
     """
     turned = places[..., :3].swapaxes(1, 2)
-    arms, normals = felt[0] @ turned, (felt[1] @ turned).reshape(-1, 3)
+    arms, normals = oriented[0] @ turned, (oriented[1] @ turned).reshape(-1, 3)
     points = (arms + places[:, None, :, 3]).reshape(-1, 3)
     near = mesh.tree.query(np.hstack([points, FACING_WEIGHT * normals]), range(1, neighbors + 1))[1]
     nearest = near[:, 0]

@@ -18,11 +18,11 @@ from ..patch.domain import GRID, Domain
 from ..patch.geometry import Geometry, distances, fit_error, overlapped
 from ..reconstruction.result import Reconstruction
 
-EXTRA = 9  # So many more contours are tracked, as in the paper's Fig. 3.
+EXTRA = 9  # The number of contours that are tracked besides, as in the paper's Fig. 3.
 # benchmarks.scans prints what is found with these.
-STEPS_A_RADIUS = 12  # Such a contour has so many steps in a radius.
+STEPS_A_RADIUS = 12  # The number of steps of such a contour in a radius.
 FOOT_REACH = (0.01, 0.1, 1.0)  # At the point, the mesh is looked for within these shares of the radius.
-MISSES_AT_ONCE = 5000  # A step finds the distances of so many vertices, in some hundredths of a second.
+VERTICES_AT_ONCE = 5000  # Their distances take some hundredths of a second.
 OWN_LAYER = 1e-3  # A layer within this share of the reach is the vertex's own.
 
 
@@ -36,8 +36,8 @@ def reachable(
     points = np.asarray(vertices, dtype=float)
     over = overlapped(geometry, points, normals)
     up = _vector(geometry.frame.axes[:, 2])
-    seen = [not is_hidden(surface, _vector(point), up, 2.0 * geometry.radius) for point in points[over]]
-    over = over[np.array(seen, dtype=bool)]
+    visible = [not is_hidden(surface, _vector(point), up, 2.0 * geometry.radius) for point in points[over]]
+    over = over[np.array(visible, dtype=bool)]
     x, y, z = geometry.frame.to_local(points[over]).T
     heights = geometry.height(x, y)
     feet, offs = geometry.frame.to_world(np.column_stack([x, y, heights])).tolist(), np.abs(z - heights)
@@ -75,19 +75,19 @@ def verify(
 def verifying(
     r: Reconstruction, surface: Surface, vertices: ArrayLike, *, extra: int = EXTRA
 ) -> Iterator[dict[str, float]]:
-    """`verify` in short steps: each yields what is known so far, and the last one everything."""
+    """`verify` in short steps: each yields the measures so far, and the last one all."""
     local = r.frame.to_local(finite_array("vertices", vertices, (None, 3)))
     found: dict[str, float] = {"contacts": len(r.contacts), "vertices": len(local)}
     found |= _spread("contact", distances(r.geometry, r.contacts))
-    misses = np.empty(len(local))
-    for start in range(0, len(local), MISSES_AT_ONCE):
-        some = slice(start, start + MISSES_AT_ONCE)
-        misses[some] = distances(r.geometry, local[some])
+    offsets = np.empty(len(local))
+    for start in range(0, len(local), VERTICES_AT_ONCE):
+        some = slice(start, start + VERTICES_AT_ONCE)
+        offsets[some] = distances(r.geometry, local[some])
         yield found
     contours = _extra_contours(r, surface, extra)
     points = np.concatenate([np.empty((0, 3)), *contours])
     found |= {
-        **_spread("vertex", misses),
+        **_spread("vertex", offsets),
         "fit_error": r.fit_error,
         "extra_contours": sum(len(contour) > 0 for contour in contours),
         "extra_points": len(points),
@@ -100,12 +100,12 @@ def verifying(
     yield found
 
 
-def _spread(name: str, misses: Array) -> dict[str, float]:
+def _spread(name: str, offsets: Array) -> dict[str, float]:
     """Mean, median, maximum and root mean square of distances by name; empty if there are none."""
-    if not len(misses):
+    if not len(offsets):
         return {}
-    rms = math.sqrt(np.mean(misses**2))
-    values = {"mean": misses.mean(), "median": np.median(misses), "max": misses.max(), "rms": rms}
+    rms = math.sqrt(np.mean(offsets**2))
+    values = {"mean": offsets.mean(), "median": np.median(offsets), "max": offsets.max(), "rms": rms}
     return {f"{name}_distance_{key}": float(value) for key, value in values.items()}
 
 
@@ -125,7 +125,7 @@ def _extra_contours(r: Reconstruction, surface: Surface, count: int) -> list[Arr
 
 
 def _azimuths_between(domain: Domain, count: int) -> list[float]:
-    """`count` azimuths between those of the curves' ends on the boundary, each where there is most room."""
+    """`count` azimuths between those of the curves' ends on the boundary, each in the widest gap."""
     x, y = domain.ends.T
     lines = np.sort(np.arctan2(y, x) % math.pi)
     widths = np.diff(lines, append=lines[0] + math.pi)

@@ -16,7 +16,7 @@ from .operators import report_error, target_object
 
 # These are seconds.
 FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
-TIMER_SLICE = 0.03  # Work between two events takes so long.
+TIMER_SLICE, LONGEST_SLICE = 0.03, 0.25  # Work between two events takes so long, or as long as a slow redraw.
 NEXT = 0.01  # The next slice begins after this time.
 SAY = 1.0  # Without a window, a line of progress is printed each time.
 
@@ -41,6 +41,7 @@ class InSlices(OperatorMixin):
     _done: Callable[[], tuple[str, float | None]]
     _finish: Callable[[bpy.types.Context], set[Any]]
     _timer: bpy.types.Timer | None = None  # There is one while it runs in a window.
+    _worked = 0.0  # When the last slice ended.
     _in_window = False  # Whether a dialog was confirmed, after which it goes on in slices.
     stop = "Stop"  # What Esc does.
     meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
@@ -93,7 +94,7 @@ class InSlices(OperatorMixin):
         if event.type != "TIMER":
             return self.meanwhile
         try:
-            if not self._advance(context, TIMER_SLICE):
+            if not self._advance(context, self._slice()):
                 context.workspace.status_text_set(_status(self.stop, *self._done()))
                 return self.meanwhile
             self._leave(context)
@@ -102,11 +103,16 @@ class InSlices(OperatorMixin):
             self._leave(context)
             return report_error(self, error)
 
+    def _slice(self):
+        """How long to work: where redraws are slow, as without a graphics card, half of the time."""
+        return min(max(perf_counter() - self._worked, TIMER_SLICE), LONGEST_SLICE)
+
     def _advance(self, context, seconds):
         """Works for some seconds, and returns whether all is done then."""
         self._check(context)
         end = perf_counter() + seconds
         if any(perf_counter() > end for _ in self._steps):
+            self._worked = perf_counter()
             return False
         # `_finish` has a slice of its own, because the last step and the new object may take long together.
         return self._timer is None or perf_counter() < end - 0.5 * seconds

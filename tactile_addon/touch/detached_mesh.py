@@ -83,6 +83,14 @@ class DetachedMesh(PlacedMesh):
         self._compared_until = 0.0
         return self.require_source(context)
 
+    def has_rims(self):
+        """Whether edges have one face only, as around holes. Vertices in one place count as one."""
+        _, same = np.unique(self.points, axis=0, return_inverse=True)
+        ends = np.sort(same.ravel()[self.triangles[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2), axis=1)
+        ends = ends[ends[:, 0] < ends[:, 1]]
+        _, faces = np.unique(ends, axis=0, return_counts=True)
+        return bool((faces == 1).any())
+
     @property
     def origin(self) -> Array:
         """The origin of the points, in the world."""

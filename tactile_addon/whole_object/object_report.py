@@ -37,7 +37,7 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("verdict", verdict_of(record)),
         ("surface", _surface(record)),
         ("message", record["message"]),
-        ("patches", f"{record['patches']}, {record['in_doubt']} of them in doubt"),
+        ("patches", f"{record['patches']}, of which {record['in_doubt']} alone would be in doubt"),
         ("edges of their graph", record["edges"]),
         ("tolerance", _tolerance(record)),
         ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
@@ -81,7 +81,6 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
         ("Off the Mesh", _off(record, "mean")),
         ("Patches", record["patches"]),
-        ("… in Doubt", record["in_doubt"]),
         ("Vertices", record["vertices"]),
         ("… without K", record.get("unknown_curvatures") or None),
     )

@@ -17,6 +17,7 @@ from ..touch.types import Array, Object
 from ..touch.units import length
 from ..touch.wording import many
 from .both_ways import BothWays
+from .object_report import unit_of
 from .whole_surface import WholeSurface
 
 # These lengths are shares of the object's size.
@@ -73,7 +74,7 @@ class ObjectTouches:
         self.rims: list[Array] = []
         self.done, self.uncovered = 0, 0
         self.words, self.share = "Looking for a place to begin", 0.0
-        self.is_stopped = False
+        self.is_stopped = self._is_cut_short = False
         self._left = self._spread()
         self._rounds, self._is_joining = 0, False
         self._start = None
@@ -205,7 +206,7 @@ class ObjectTouches:
 
     def stop(self) -> None:
         """Makes the steps touch no more, and join the patches so far."""
-        self.is_stopped = True
+        self.is_stopped = self._is_cut_short = True
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
@@ -223,21 +224,30 @@ class ObjectTouches:
             "seed": self.seed,
             "most": self.most,
         }
-        if found["status"] == "ok":
+        if found["uncovered"] and self._is_cut_short:
+            places = many(found["uncovered"], "place", "places")
+            found["message"] = f"Touching was stopped, and the object goes on at {places}: touch it again."
+        elif found["status"] == "ok":
             found["status"], found["message"] = self._verdict(found)
         return found
 
     def _verdict(self, found: Mapping[str, Any]) -> tuple[str, str]:
         """The status and the message of a surface that its atlas says is ok."""
+        unit = unit_of(found)
         if self.compared.largest > OFF_TOLERANCES * self.tolerance:
+            advice = "use a smaller tolerance"
+            if self.edge:
+                advice = "use a shorter edge length"
+            elif self.surface.has_rims():
+                advice += ", or close the holes of its mesh"
             return "uncertain", (
-                f"The surface is up to {length(self.compared.largest)} off the object, which the tolerance "
-                "does not explain: use a smaller tolerance, or close the holes of its mesh."
+                f"The surface is up to {length(self.compared.largest, unit)} off the object, which the "
+                f"tolerance does not explain: {advice}."
             )
         if found["height_std"] > self.tolerance:
             return "uncertain", (
-                f"Heights are accurate to {length(found['height_std'])} on average, and the tolerance is "
-                f"{length(self.tolerance)}: use a larger tolerance."
+                f"Heights are accurate to {length(found['height_std'], unit)} on average, and the tolerance "
+                f"is {length(self.tolerance, unit)}: use a larger tolerance."
             )
         return found["status"], found["message"]
 

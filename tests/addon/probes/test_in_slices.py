@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Work in slices between a window's events, without a window."""
 
+from time import perf_counter
+
 import pytest
 
 pytest.importorskip("bpy", reason="needs Blender as a Python module: run make test")
@@ -16,3 +18,13 @@ def test_a_slice_ends_when_its_time_is_over_and_the_next_one_goes_on(extension):
     assert not operator._advance(None, -1.0)
     assert operator._advance(None, 60.0)
     assert done == [0, 1, 2]
+
+
+def test_a_slice_is_as_long_as_the_redraw_before_it(extension):
+    in_slices = extension.tactile_addon.probes.in_slices
+    operator = in_slices.InSlices()
+    assert operator._slice() == in_slices.LONGEST_SLICE  # There was none before.
+    operator._worked = perf_counter() - 0.5 * in_slices.LONGEST_SLICE
+    assert 0.5 * in_slices.LONGEST_SLICE <= operator._slice() <= in_slices.LONGEST_SLICE
+    operator._worked = perf_counter() + 60.0
+    assert operator._slice() == in_slices.TIMER_SLICE

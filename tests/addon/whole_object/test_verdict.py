@@ -88,8 +88,16 @@ def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
     assert report["deviation_max"] == pytest.approx(0.5, abs=0.1)
     assert report["deviation_place"][2] > 1.4
     assert report["status"] == "uncertain"
-    told = "which the tolerance does not explain: use a smaller tolerance, or close the holes of its mesh."
-    assert report["message"].endswith(f"off the object, {told}")
+    told = "off the object, which the tolerance does not explain: use a smaller tolerance"
+    assert report["message"].endswith(f"{told}.")
+    corners = [tuple(polygon.vertices) for polygon in ball.data.polygons[1:]]
+    points = [tuple(vertex.co) for vertex in ball.data.vertices]
+    ball.data.clear_geometry()
+    ball.data.from_pydata(points, [], corners)
+    touches.surface = touches_of(ball).surface
+    assert touches.report()["message"].endswith(f"{told}, or close the holes of its mesh.")
+    touches.edge = 0.5
+    assert touches.report()["message"].endswith("does not explain: use a shorter edge length.")
 
 
 def test_without_an_edge_length_the_mesh_is_that_of_the_distances(ball, touches_of):
@@ -177,6 +185,16 @@ def test_once_stopped_it_touches_no_more(balls, touches_of, word):
     assert done is not None
     assert touches.done == done
     assert len(touches.found) == len(touches.whole.atlas.patches)
+
+
+def test_who_stops_it_is_not_told_to_allow_more_touches(ball, touches_of):
+    touches = touches_of(ball, tolerance=0.02)
+    for _ in touches.steps():
+        if touches.done >= 3:
+            touches.stop()
+    report = touches.report()
+    places = f"{report['uncovered']} places"
+    assert report["message"] == f"Touching was stopped, and the object goes on at {places}: touch it again."
 
 
 def test_there_is_no_tick_where_heights_are_worse_than_the_tolerance(extension, ball, touches_of):

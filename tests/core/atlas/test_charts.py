@@ -9,8 +9,8 @@ import pytest
 
 import core
 from core.atlas.charts import MARGIN
+from core.atlas.cubic_spline import SIDE
 from core.atlas.join import charts_of
-from core.patch.cubic_spline import SIDE
 from tests import solids
 
 BALL = solids.ball()

@@ -8,11 +8,11 @@ import pytest
 import core
 from core.atlas import touching
 from core.atlas.charts import AZIMUTHS
+from core.atlas.finger import Finger
 from core.atlas.frontier import Frontier, _between
 from core.atlas.meshing import Mesh
 from core.atlas.reference_mesh import ReferenceMesh
-from core.contours.finger import Finger
-from core.exploration.side_by_side import result_of
+from core.steps import result_of
 from tests import solids
 
 BALL, NEAR = solids.ball(), 0.03

@@ -9,7 +9,7 @@ import core
 from core.atlas import indicator
 from core.atlas.join import charts_of
 from core.atlas.samples import indicated, samples_of
-from core.exploration.side_by_side import result_of
+from core.steps import result_of
 from tests import solids
 
 BALL = solids.ball()

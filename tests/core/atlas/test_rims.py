@@ -9,8 +9,8 @@ import pytest
 
 import core
 from core.atlas.charts import AZIMUTHS
+from core.atlas.finger import Finger
 from core.atlas.rims import felt_rim
-from core.contours.finger import Finger
 from tests import solids
 
 NEAR, TURNS = 0.02, 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS

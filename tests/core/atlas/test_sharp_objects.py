@@ -11,7 +11,7 @@ import core
 from core.atlas.creases import creased
 from core.atlas.reference_mesh import ReferenceMesh, closest
 from core.atlas.touching import CHECKS, SHARPEST, rays_at
-from core.exploration.side_by_side import result_of
+from core.steps import result_of
 from tests import solids
 
 BLOCK = solids.block()

@@ -12,7 +12,7 @@ import pytest
 import core
 from core.atlas.boundaries import gaussian_curvature_of
 from core.atlas.object_atlas import Check
-from core.exploration.side_by_side import result_of
+from core.steps import result_of
 from tests import solids
 
 RING = solids.ring(small=0.5)

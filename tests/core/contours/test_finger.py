@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from core.contours.finger import Finger
+from core.atlas.finger import Finger
 from tests import solids
 
 BLOCK = solids.block(1.0, 1.0, 0.5)

@@ -8,9 +8,10 @@ import surfaces
 
 import core
 from core.exploration import growth, one_touch, side_by_side
-from core.exploration.enough import NOTICEABLE, is_enough
+from core.exploration.sampling_density import NOTICEABLE, suffices
 from core.reconstruction.from_contours import fitted
 from core.reconstruction.status import DOUBTFUL_STD
+from core.steps import result_of
 
 PLANES = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
 UP = (0.0, 0.0, 1.0)
@@ -151,7 +152,7 @@ def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
         return (yield from tried(felt, counts))
 
     monkeypatch.setattr(growth, "tried", of_more_than_the_least)
-    monkeypatch.setattr(growth.Felt, "roughness", lambda *_: 2.0)
+    monkeypatch.setattr(growth.TrackedContours, "roughness", lambda *_: 2.0)
     assert explore(surfaces.plane()).result.status == "ok"
 
 
@@ -160,9 +161,9 @@ def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, mon
     """Where no deviation is asked for, a longer seed is as good as a short one in less doubt."""
     spreads, sure = {24: 1.7, 12: 1.4, 6: 1.3, 3: 1.1}, {24: False, 12: True, 6: True, 3: False}
 
-    class Trial(growth.Grown):
+    class Trial(growth.GrowthTrial):
         @property
-        def sure(self):
+        def is_sure(self):
             return sure[int(self.counts.max())]
 
     def tried(felt, counts):
@@ -176,7 +177,7 @@ def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, mon
     monkeypatch.setattr(growth, "tried", tried)
     felt = Felt()
     felt.largest_std = largest_std
-    found = side_by_side.result_of(growth._seed(lambda length: felt, 1.0, []))
+    found = result_of(growth._seed(lambda length: felt, 1.0, []))
     assert found.counts.max() == (12 if largest_std is None else 3)
 
 
@@ -390,9 +391,9 @@ def test_whether_contacts_are_enough_is_no_matter_of_the_unit(noise):
     surface, found = surfaces.pear(), []
     for step in (0.25, 0.5, 1.0, 3.0):
         r = surface.fit(surface.track(surfaces.planes((0, 60, 120)), step=step, noise=noise, rng=1))
-        found.append(is_enough(r))
+        found.append(suffices(r))
         for scale in (1e-3, 1.0 / r.radius, 30.0):
-            assert is_enough(r.moved(np.diag([scale, scale, scale, 1.0]))) == found[-1]
+            assert suffices(r.moved(np.diag([scale, scale, scale, 1.0]))) == found[-1]
     assert found[-1] == (noise == 0.0)
 
 
@@ -405,7 +406,7 @@ def test_contacts_are_enough_where_twice_as_many_take_a_sixth_off_at_most():
         twice = surface.fit(surface.track(planes, step=step / 2.0, noise=noise, rng=1))
         share = twice.mean_height_std / once.mean_height_std
         if abs(share - (1.0 - NOTICEABLE)) > 0.1:
-            assert is_enough(once) == (share > 1.0 - NOTICEABLE)
+            assert suffices(once) == (share > 1.0 - NOTICEABLE)
 
 
 def test_how_far_to_feel_is_found_where_curves_end_by_themselves():

@@ -148,9 +148,9 @@ def cut(angles, distance):
 @pytest.mark.parametrize("distance", [0.02, 0.1, 0.3, 0.45])
 @pytest.mark.parametrize("turn", [0, 10, 30])
 def test_the_domain_ends_where_the_surface_does(distance, turn):
-    ends, brinks = cut(SIXTH + turn, distance)
-    domain = closed_spline_domain(ends, 1.0, brinks)
-    assert brinks.any()
+    ends, open_ends = cut(SIXTH + turn, distance)
+    domain = closed_spline_domain(ends, 1.0, open_ends)
+    assert open_ends.any()
     assert domain.boundary(3600)[:, 0].max() <= distance + 2e-4
     points, weights = domain.nodes
     assert points[:, 0].max() < distance
@@ -164,15 +164,15 @@ def test_the_domain_ends_where_the_surface_does(distance, turn):
 
 
 def test_beside_no_brink_the_boundary_is_round():
-    ends, brinks = cut(SIXTH, 0.3)
-    domain, round_one = closed_spline_domain(ends, 1.0, brinks), closed_spline_domain(ends, 1.0)
+    ends, open_ends = cut(SIXTH, 0.3)
+    domain, round_one = closed_spline_domain(ends, 1.0, open_ends), closed_spline_domain(ends, 1.0)
     turns = np.radians(np.arange(120, 241))  # where no end is a brink
     places = np.column_stack([np.cos(turns), np.sin(turns)])
     radii = np.linalg.norm(domain.points_at(places), axis=1)
     assert radii == pytest.approx(1.0, abs=0.01)
     assert radii[::60] == pytest.approx(1.0, abs=1e-5)
     everywhere = closed_spline_domain(ends, 1.0, np.zeros(6, dtype=bool))
-    assert everywhere.brinks is None
+    assert everywhere.open_ends is None
     assert (everywhere.boundary(99) == round_one.boundary(99)).all()
 
 

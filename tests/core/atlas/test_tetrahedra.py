@@ -5,8 +5,8 @@
 import numpy as np
 import pytest
 
-from core.exploration.side_by_side import result_of
-from core.patch.tetrahedra import cut, evened, halved, sides_of, split_sides, tetrahedra_of
+from core.atlas.tetrahedra import cut, evened, halved, sides_of, split_sides, tetrahedra_of
+from core.steps import result_of
 from tests import solids
 
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from ..arguments import Array
 from ..lapack import on_one_thread
+from ..patch.monge import exponents, monomials
 from .cubic_spline import CUBIC, SIDE, bases, between
-from .monge import exponents, monomials
 
 # python -m benchmarks.atlas chose these.
 # The orders of derivatives, each with the grid of their size.
@@ -29,10 +29,10 @@ NOISE_FACTORS = (1.0, 2.0, 4.0, 8.0)  # The grid of the noise, in units of the l
 SLOPE_STDS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # The grid of the normals' deviation, which facets have.
 SMOOTHEST, ROUGHEST = 3, 2  # The search begins at the smoothest order.
 START, MIDDLE = 3, 2  # It begins at these places of the grids of roughness and of the normals' deviation.
-PASSES = 2  # If contacts are outlying, sizes are sought this often.
+PASSES = 2  # If contacts are outlying, hyperparameters are searched this often.
 CURVATURE_STD = 1.0  # The prior deviation of curvatures, twice that of coefficients of a quadric.
 FAR_OFF, STUDENT = 3.0, 4.0  # Outliers are off by more deviations, and weigh as under t of this freedom.
-LEAST_COSINE = 0.2  # A normal tells nothing if the cosine of its angle to the axis is less.
+LEAST_COSINE = 0.2  # A normal does not count if the cosine of its angle to the axis is less.
 WIDTH = CUBIC * SIDE + CUBIC  # The width of the band.
 SPLINE_ROUNDING = 1e-9  # This share of its largest element keeps the matrix invertible.
 
@@ -70,7 +70,7 @@ class _Columns(NamedTuple):
     columns: int
 
 
-class _Sizes(NamedTuple):
+class _Hyperparameters(NamedTuple):
     """The order of the random derivatives, their size, and the deviations of contacts and normals."""
 
     order: int
@@ -80,16 +80,21 @@ class _Sizes(NamedTuple):
 
 
 class _Solution(NamedTuple):
-    """-2 log likelihood of the sizes, the band of a Cholesky factor L, the right side (SIDE^2,) over L."""
+    """A solution and its evidence.
 
-    surprise: float
-    sizes: _Sizes
+    neg2_log_evidence : -2 log marginal likelihood of the hyperparameters
+    factor : the band of the Cholesky factor L of the normal equations' matrix
+    whitened : (SIDE^2,), L^-1 times their right side
+    """
+
+    neg2_log_evidence: float
+    hyperparameters: _Hyperparameters
     factor: Array
-    halfway: Array
+    whitened: Array
 
     def coefficients(self) -> Array:
         """The coefficients (SIDE^2,)."""
-        return _divided(self.factor, self.halfway, "T")
+        return _triangular(self.factor, self.whitened, "T")
 
 
 @on_one_thread
@@ -102,27 +107,27 @@ def smoothing_spline(contacts: Array, normals: Array, weights: Array, half: floa
     """
     knots, basis = bases(contacts[:, 0], contacts[:, 1], half)
     up = np.maximum(normals[:, 2], LEAST_COSINE)
-    asked = np.column_stack([contacts[:, 2], -normals[:, :2] / up[:, None]]).T
-    heights, slopes = _columns(knots, basis[:1], asked[:1]), _columns(knots, basis[1:], asked[1:])
+    values = np.column_stack([contacts[:, 2], -normals[:, :2] / up[:, None]]).T
+    heights, slopes = _columns(knots, basis[:1], values[:1]), _columns(knots, basis[1:], values[1:])
     # A slope s has 1 + s^2 times the deviation.
     certainty = np.where(normals[:, 2] > LEAST_COSINE, up**4, 0.0)
-    sizes = _Sizes(SMOOTHEST, ROUGHNESS[SMOOTHEST][START], noise, SLOPE_STDS[MIDDLE])
+    hyperparameters = _Hyperparameters(SMOOTHEST, ROUGHNESS[SMOOTHEST][START], noise, SLOPE_STDS[MIDDLE])
     grids = {"slope_std": SLOPE_STDS, "roughness": ROUGHNESS[SMOOTHEST]}
     grids["noise"] = tuple(noise * factor for factor in NOISE_FACTORS)
-    data = _equations([heights, slopes], [weights, weights * certainty])
+    equations = _equations([heights, slopes], [weights, weights * certainty])
     for _ in range(PASSES):
-        found = _solved(data, sizes, half)
+        found = _solved(equations, hyperparameters, half)
         for name, grid in grids.items():
-            found = _climbed(data, found, name, grid, half)
-        misses = np.abs(np.einsum("nk,nk->n", basis[0], found.coefficients()[knots]) - asked[0])
-        weights, sizes = _student(misses, found.sizes.noise), found.sizes
-        data = _equations([heights, slopes], [weights, weights * certainty])
-        if sizes.noise == noise:
-            break  # Outlying contacts had no say in these sizes: they make the noise look larger.
+            found = _ascended(equations, found, name, grid, half)
+        residuals = np.abs(np.einsum("nk,nk->n", basis[0], found.coefficients()[knots]) - values[0])
+        weights, hyperparameters = _student(residuals, found.hyperparameters.noise), found.hyperparameters
+        equations = _equations([heights, slopes], [weights, weights * certainty])
+        if hyperparameters.noise == noise:
+            break  # Outlying contacts, which make the noise look larger, did not count.
     # The other order keeps these deviations: intervals hold better than with smaller ones.
-    other = sizes._replace(order=ROUGHEST, roughness=ROUGHNESS[ROUGHEST][START])
-    rough = _climbed(data, _solved(data, other, half), "roughness", ROUGHNESS[ROUGHEST], half)
-    found = min(_solved(data, sizes, half), rough, key=lambda each: each.surprise)
+    other = hyperparameters._replace(order=ROUGHEST, roughness=ROUGHNESS[ROUGHEST][START])
+    rough = _ascended(equations, _solved(equations, other, half), "roughness", ROUGHNESS[ROUGHEST], half)
+    found = min(_solved(equations, hyperparameters, half), rough, key=lambda each: each.neg2_log_evidence)
     return Spline(found.coefficients().reshape(SIDE, SIDE), _stds(found.factor))
 
 
@@ -136,15 +141,17 @@ def _equations(columns: Sequence[_Columns], weights: Sequence[Array]) -> _Equati
     return _Equations(np.vstack([*(_penalty(order)[0] for order in ROUGHNESS), bands]), *others)
 
 
-def _climbed(data: _Equations, best: _Solution, name: str, grid: tuple[float, ...], half: float) -> _Solution:
-    """The likeliest solution that is found by steps of one size up or down its grid."""
-    start = grid.index(getattr(best.sizes, name))
+def _ascended(
+    equations: _Equations, best: _Solution, name: str, grid: tuple[float, ...], half: float
+) -> _Solution:
+    """The likeliest solution that is found by steps of one hyperparameter up or down its grid."""
+    start = grid.index(getattr(best.hyperparameters, name))
     for way in (grid[start + 1 :], grid[:start][::-1]):
         before = best
-        for size in way:
-            change: dict[str, Any] = {name: size}
-            tried = _solved(data, best.sizes._replace(**change), half)
-            if tried.surprise >= best.surprise:
+        for value in way:
+            change: dict[str, Any] = {name: value}
+            tried = _solved(equations, best.hyperparameters._replace(**change), half)
+            if tried.neg2_log_evidence >= best.neg2_log_evidence:
                 break
             best = tried
         if best is not before:
@@ -152,29 +159,29 @@ def _climbed(data: _Equations, best: _Solution, name: str, grid: tuple[float, ..
     return best
 
 
-def _solved(data: _Equations, sizes: _Sizes, half: float) -> _Solution:
+def _solved(equations: _Equations, hyperparameters: _Hyperparameters, half: float) -> _Solution:
     from scipy.linalg import cholesky_banded
 
-    _, log_determinant, log_free = _penalty(sizes.order)
-    pitch, free = 2.0 * half / (SIDE - 1), sizes.order * (sizes.order + 1) // 2
-    precision = pitch ** (2 - 2 * sizes.order) / sizes.roughness**2
-    surprise = -log_determinant - (SIDE**2 - free) * np.log(precision)
+    _, log_determinant, log_free = _penalty(hyperparameters.order)
+    pitch, free = 2.0 * half / (SIDE - 1), hyperparameters.order * (hyperparameters.order + 1) // 2
+    precision = pitch ** (2 - 2 * hyperparameters.order) / hyperparameters.roughness**2
+    neg2_log_evidence = -log_determinant - (SIDE**2 - free) * np.log(precision)
     # What an order leaves free has a flat prior: for quadrics it is as high as the Gaussian of their
     # coefficients is at 0, so that both orders compare.
-    surprise += 2.0 * (log_free + (free - 3) * np.log(0.5 * CURVATURE_STD * half**2))
-    stds = np.array([sizes.noise, sizes.slope_std])
-    surprise += data.squares @ stds**-2.0 + 2.0 * data.counts @ np.log(stds)
-    priors = [precision if order == sizes.order else 0.0 for order in ROUGHNESS]
-    matrix = (np.array([*priors, *stds**-2.0]) @ data.bands).reshape(SIDE**2, WIDTH + 1).T
+    neg2_log_evidence += 2.0 * (log_free + (free - 3) * np.log(0.5 * CURVATURE_STD * half**2))
+    stds = np.array([hyperparameters.noise, hyperparameters.slope_std])
+    neg2_log_evidence += equations.squares @ stds**-2.0 + 2.0 * equations.counts @ np.log(stds)
+    priors = [precision if order == hyperparameters.order else 0.0 for order in ROUGHNESS]
+    matrix = (np.array([*priors, *stds**-2.0]) @ equations.bands).reshape(SIDE**2, WIDTH + 1).T
     matrix[0] += SPLINE_ROUNDING * matrix[0].max()
     factor = cholesky_banded(matrix, overwrite_ab=True, lower=True, check_finite=False)
-    halfway = _divided(factor, stds**-2.0 @ data.rights, "N")
-    surprise += 2.0 * np.log(factor[0]).sum() - halfway @ halfway
-    return _Solution(float(surprise), sizes, factor, halfway)
+    whitened = _triangular(factor, stds**-2.0 @ equations.rights, "N")
+    neg2_log_evidence += 2.0 * np.log(factor[0]).sum() - whitened @ whitened
+    return _Solution(float(neg2_log_evidence), hyperparameters, factor, whitened)
 
 
-def _divided(factor: Array, right: Array, trans: str) -> Array:
-    """The right side (SIDE^2,) or (SIDE^2, k) divided by a Cholesky factor, or by its transpose with "T"."""
+def _triangular(factor: Array, right: Array, trans: str) -> Array:
+    """L^-1, or L^-T with "T", times right sides (SIDE^2,) or (SIDE^2, k), for a Cholesky factor L."""
     from scipy.linalg.lapack import dtbtrs
 
     found: Array = dtbtrs(factor, right, uplo="L", trans=trans)[0]
@@ -198,16 +205,16 @@ def _columns(knots: Any, basis: Array, values: Array) -> _Columns:
     return _Columns(parts[0], parts[1], (values**2).sum(axis=0), len(basis))
 
 
-def _student(misses: Array, std: float) -> Array:
-    """The weights (n,) of contacts that are off by `misses` (n,)."""
-    ratios = misses / max(std, 1.4826 * float(np.median(misses)))
+def _student(residuals: Array, std: float) -> Array:
+    """The weights (n,) of contacts that are off by `residuals` (n,)."""
+    ratios = residuals / max(std, 1.4826 * float(np.median(residuals)))
     return np.where(ratios > FAR_OFF, (STUDENT + 1.0) / (STUDENT + ratios**2), 1.0)
 
 
 def _stds(factor: Array) -> Array:
     """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and take the longest."""
     coarse = _heights_at_coarse_knots()
-    some = np.sqrt((_divided(factor, coarse, "N") ** 2).sum(axis=0))
+    some = np.sqrt((_triangular(factor, coarse, "N") ** 2).sum(axis=0))
     return between(some.reshape((SIDE + 1) // 2, -1))
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from core.patch import smoothing_spline as splines
-from core.patch.cubic_spline import SIDE, bases, between
-from core.patch.smoothing_spline import smoothing_spline
+from core.atlas import smoothing_spline as splines
+from core.atlas.cubic_spline import SIDE, bases, between
+from core.atlas.smoothing_spline import smoothing_spline
 
 HALF = 1.3
 
@@ -97,7 +97,7 @@ def test_normals_help_as_far_as_they_are_true():
     assert exact < worse < none
 
 
-def dense_surprise(contacts, order, roughness, noise):
+def dense_neg2_log_evidence(contacts, order, roughness, noise):
     """-2 log marginal likelihood of heights, less a constant, by dense matrices; planes are nearly free.
 
     Sums over all knots go without numpy's BLAS: OpenBLAS 0.3.34 overflows its stack there where a kernel
@@ -130,8 +130,11 @@ def test_likelihoods_of_both_orders_are_those_of_dense_matrices():
     columns = splines._columns(knots, basis[:1], contacts[None, :, 2])
     data = splines._equations([columns, columns], [np.ones(60), np.zeros(60)])
     given = [(2, 0.1, 1e-3), (2, 0.3, 1e-3), (2, 0.1, 2e-3), (3, 0.3, 1e-3), (3, 1.0, 2e-3)]
-    ours = [splines._solved(data, splines._Sizes(*sizes, 0.1), HALF).surprise for sizes in given]
-    dense = [dense_surprise(contacts, *sizes) for sizes in given]
+    ours = [
+        splines._solved(data, splines._Hyperparameters(*sizes, 0.1), HALF).neg2_log_evidence
+        for sizes in given
+    ]
+    dense = [dense_neg2_log_evidence(contacts, *sizes) for sizes in given]
     assert np.subtract(ours, ours[0]) == pytest.approx(np.subtract(dense, dense[0]), abs=0.05)
 
 
@@ -152,7 +155,7 @@ def test_a_folded_surface_has_random_second_derivatives_and_a_smooth_one_third(h
     orders, coefficients = [], splines._Solution.coefficients
 
     def asked(found):
-        orders.append(found.sizes.order)
+        orders.append(found.hyperparameters.order)
         return coefficients(found)
 
     monkeypatch.setattr(splines._Solution, "coefficients", asked)

@@ -49,7 +49,7 @@ def test_near_an_edge_no_patch_reaches_beyond_it(flank, distance, count):
         contours = core.track(Face(flank), point, (0.0, 0.0, 1.0), planes, extent=1.0, step=1.0 / 24.0)
         r = core.reconstruct(point, contours, outward=(0.0, 0.0, 1.0))
         if any(stop != core.EXTENT for contour in contours for stop in contour.stops):
-            assert r.domain.brinks.any()
+            assert r.domain.open_ends.any()
             assert beyond(r) < 5e-3
         again = core.from_dict(json.loads(json.dumps(core.to_dict(r))))
         assert_allclose(again.domain.boundary(90), r.domain.boundary(90), 1e-6, 1e-12)
@@ -73,5 +73,5 @@ def test_a_surface_that_goes_on_has_no_brinks(surface):
     """Long curves end where the surface turns away, which is no brink."""
     for extent in (8.0, 60.0):
         r = surface.fit(surface.track(surfaces.TILTED, extent=extent))
-        assert r.domain.brinks is None
-        assert core.to_dict(r)["geometry"]["brinks"] is None
+        assert r.domain.open_ends is None
+        assert core.to_dict(r)["geometry"]["open_ends"] is None

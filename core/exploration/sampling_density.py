@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How many contacts a touch begins with, and whether a shorter step would help."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import Array
+from ..bayes.joint_fit import MISFIT
+from ..bayes.process_fit import MOST_PLACES
+from ..lapack import cholesky, solved
+from ..reconstruction.result import Reconstruction
+
+# benchmarks.amount chose these.
+CONTACT_COUNTS = (12, 24, 48)  # The longest half curve has the first of these numbers that suffices.
+SHORTEST = 4  # The shortest half curve has at least so many contacts.
+# More contacts help if twice as many would lower the mean deviation of the height by the share NOTICEABLE.
+# They cannot, if noise is below QUIET times that deviation.
+NOTICEABLE = 0.15
+QUIET = 1.0
+
+
+def suffices(r: Reconstruction) -> bool:
+    """Whether twice as many contacts would take less than NOTICEABLE off the mean deviation of the height.
+
+    They would not if this deviation is less than any polynomial is off a surface, nor if it is larger than
+    the noise: then it comes from directions in which these curves have no contacts.
+    """
+    if r.mean_height_std <= MISFIT * r.radius or r.posterior.noise * r.radius <= QUIET * r.mean_height_std:
+        return True
+    (points, weights), contacts = r.domain.nodes, r.contacts[:, :2]
+    places = r.posterior.places
+    if not len(places):
+        which = np.linspace(0, len(contacts) - 1, min(len(contacts), MOST_PLACES)).astype(np.intp)
+        places = contacts[which] / r.radius
+    nodes, m = points / r.radius, len(places)
+    shared, covariance = r.posterior.covariances_with(nodes)(places)
+    # A patch by another method departs from the posterior's mean, and more contacts do not lower that.
+    own = r.node_stds / r.radius if r.method == "bayes" else r.posterior.height_std(*nodes.T)
+    variance = own**2
+    covariance.flat[:: m + 1] += r.posterior.noise**2 * m / len(contacts)
+    whitened = solved(cholesky(covariance), shared)  # Rasmussen and Williams 2006, algorithm 2.1
+    lost = r.widening(r.domain.node_places) ** 2 * np.einsum("in,in->n", whitened, whitened)
+    mean_std = weights @ np.sqrt(np.maximum(variance - lost, 0.0))
+    return bool(mean_std >= (1.0 - NOTICEABLE) * (weights @ np.sqrt(variance)))
+
+
+def stride_of(counts: NDArray[np.intp]) -> int:
+    """The number of steps from one fitted contact to the next, of half curves of so many (c, 2)."""
+    return max(1, int(spacing(counts, CONTACT_COUNTS[0])))
+
+
+def spacing(half_lengths: Array | NDArray[np.intp], count: int) -> float:
+    """The step at which the longest half curve (c, 2) has `count` contacts, the shortest SHORTEST or more."""
+    longest = float(half_lengths.max())
+    shortest = float(np.where(half_lengths > 0, half_lengths, longest).min())
+    return min(longest / count, max(shortest / SHORTEST, longest / CONTACT_COUNTS[-1]))

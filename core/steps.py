@@ -1,0 +1,25 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Generators that do long work in short steps and return its result."""
+
+from collections.abc import Generator
+from typing import Any
+
+
+def result_of(steps: Generator[Any, Any, Any]) -> Any:
+    """What steps return once they are done."""
+    try:
+        while True:
+            next(steps)
+    except StopIteration as end:
+        return end.value
+
+
+def part_of(steps: Generator[float, None, Any], start: float, end: float) -> Generator[float, None, Any]:
+    """Runs steps that yield the share that is done, and yields that of longer work, from `start` to `end`."""
+    while True:
+        try:
+            share = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield start + (end - start) * share
