@@ -14,12 +14,12 @@ from mathutils import Matrix
 
 from ... import core
 from ..probes import probe
-from ..probes.in_slices import InSlices
+from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import patch_record
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import Registration
-from ..touch.types import Object
+from ..touch.types import Object, Outcome
 from ..touch.wording import registration_summary
 from .verify_operator import chosen_mesh
 
@@ -132,28 +132,28 @@ class TACTILE_OT_register(InSlices, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return (
             has_patch(cls, context, "Select a mesh and then the patch to put onto it")
             and is_in_object_mode(cls, context, "Patches are registered")
             and is_unlocked(cls, context)
         )
 
-    def _begin(self, context):
+    def _begin(self, context: bpy.types.Context) -> None:
         patch = probe.patch_near(context.view_layer.objects.active)
         target = target_object(context, self.target or chosen_mesh(context, patch))
         self._search = Search(patch, target, context.evaluated_depsgraph_get())
         self._steps = self._search.steps()
 
-    def _done(self):
+    def _done(self) -> Progress:
         return f'Looking for the patch on "{self._search.target}": {self._search.seconds:.0f} s', None
 
-    def _finish(self, context):
+    def _finish(self, context: bpy.types.Context) -> Outcome:
         found = self._search.put(self.pose)
         self.report({"WARNING"} if found["is_ambiguous"] else {"INFO"}, registration_summary(found))
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop_search(self, "target", context.scene, "objects")

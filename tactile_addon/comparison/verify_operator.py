@@ -12,12 +12,12 @@ from bpy.props import StringProperty
 from ... import core
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
-from ..probes.in_slices import InSlices
+from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import TouchReport, judgment
-from ..touch.types import Array, Object
+from ..touch.types import Array, Object, Outcome
 from .verification_wording import verification_summary
 
 VERTICES_AT_ONCE = 2000  # A step looks at so many vertices.
@@ -136,14 +136,14 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return (
             has_patch(cls, context, "Select a patch; to compare it with another mesh, select that first")
             and is_in_object_mode(cls, context, "Patches are verified")
             and is_unlocked(cls, context)
         )
 
-    def _begin(self, context):
+    def _begin(self, context: bpy.types.Context) -> None:
         obj = context.view_layer.objects.active
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         if found is not None and is_pending(found):  # Completing it later would undo the verification.
@@ -152,22 +152,22 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
         self._verification = Verification(patch, target)
         self._steps = self._verification.steps()
 
-    def _check(self, context):
+    def _check(self, context: bpy.types.Context) -> None:
         self._verification.look(context.evaluated_depsgraph_get())
 
-    def _done(self):
+    def _done(self) -> Progress:
         done, count = self._verification.done, self._verification.count
         share = done / count if count else None
         return f'Comparing with "{self._verification.target}": {done} of {count} vertices', share
 
-    def _finish(self, context):
+    def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._verification.write()
         probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
         self.report({"WARNING"} if doubt else {"INFO"}, summary)
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop_search(self, "target", context.scene, "objects")

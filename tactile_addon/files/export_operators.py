@@ -14,7 +14,7 @@ from ... import core
 from ..probes import probe
 from ..probes.operators import report_error
 from ..scene import patch_record
-from ..touch.types import Object, OperatorMixin
+from ..touch.types import Object, OperatorMixin, Outcome
 from . import contact_file, patch_table
 
 
@@ -27,23 +27,23 @@ class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `in
     hint = "Select a patch, its probe or its contours first"
 
     @staticmethod
-    def written(context):
+    def written(context: bpy.types.Context) -> Object | None:
         """The object to write, or None."""
         return probe.patch_near(context.view_layer.objects.active)
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if cls.written(context) is None:
             cls.poll_message_set(cls.hint)
             return False
         return True
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if not self.filepath:
             self.filepath = bpy.path.clean_name(self.written(context).name) + self.filename_ext
         return super().invoke(context, event)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         try:
             self.write(self.written(context))
         except (OSError, ValueError) as error:
@@ -60,7 +60,7 @@ class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
-    def write(self, patch):
+    def write(self, patch: Object) -> None:
         contacts = contact_file.contacts_of(patch_record.reconstruction_of(patch))
         settings = bpy.context.scene.unit_settings
         named = core.UNIT_METERS.items() if settings.system != "NONE" else ()
@@ -79,7 +79,7 @@ class TACTILE_OT_export_patch(ObjectExport, bpy.types.Operator):
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    def write(self, patch):
+    def write(self, patch: Object) -> None:
         contact_file.write_patch(self.filepath, patch_record.reconstruction_of(patch))
 
 
@@ -96,13 +96,13 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if not patch_table.patches_of(context.view_layer.objects):
             cls.poll_message_set("There is no patch to export: pick a reference point first")
             return False
         return True
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         objects = context.view_layer.objects
         try:
             patches = patch_table.patches_of(objects.selected if self.use_selection else objects)

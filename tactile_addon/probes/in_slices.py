@@ -5,13 +5,13 @@
 import sys
 from collections.abc import Callable, Iterator
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeAlias
 
 import bpy
 from bpy.props import BoolProperty
 
 from ..touch.settings import UNSAVED
-from ..touch.types import OperatorMixin
+from ..touch.types import OperatorMixin, Outcome
 from .operators import report_error, target_object
 
 # These are seconds.
@@ -19,6 +19,7 @@ FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
 TIMER_SLICE, LONGEST_SLICE = 0.03, 0.25  # Work between two events takes so long, or as long as a slow redraw.
 NEXT = 0.01  # The next slice begins after this time.
 SAY = 1.0  # Without a window, a line of progress is printed each time.
+Progress: TypeAlias = tuple[str, float | None]  # Words, and the share that is done, if it is known.
 
 
 class InSlices(OperatorMixin):
@@ -38,15 +39,15 @@ class InSlices(OperatorMixin):
     target: Any  # The property of operators that have one.
     _steps: Iterator[Any]
     _begin: Callable[[bpy.types.Context], None]
-    _done: Callable[[], tuple[str, float | None]]
-    _finish: Callable[[bpy.types.Context], set[Any]]
+    _done: Callable[[], Progress]
+    _finish: Callable[[bpy.types.Context], Outcome]
     _timer: bpy.types.Timer | None = None  # There is one while it runs in a window.
     _worked = 0.0  # When the last slice ended.
     _in_window = False  # Whether a dialog was confirmed, after which it goes on in slices.
     stop = "Stop"  # What Esc does.
     meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
             self._begin(context)
             if self._advance(context, FIRST_SLICE):
@@ -55,7 +56,7 @@ class InSlices(OperatorMixin):
             return report_error(self, error)
         return self._go_on(context)
 
-    def _ask(self, context):
+    def _ask(self, context: bpy.types.Context) -> Outcome:
         """Asks in a dialog that names the mesh to touch before it begins."""
         if bpy.app.background:
             return self.execute(context)
@@ -66,7 +67,7 @@ class InSlices(OperatorMixin):
             return report_error(self, error)
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         try:
             self._begin(context)
             if self._in_window:
@@ -81,14 +82,14 @@ class InSlices(OperatorMixin):
         except ValueError as error:
             return report_error(self, error)
 
-    def _go_on(self, context):
+    def _go_on(self, context: bpy.types.Context) -> Outcome:
         """Makes the window do the steps."""
         self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
         context.workspace.status_text_set(_status(self.stop, *self._done()))
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if event.type == "ESC" and event.value == "PRESS":
             return self._stopped(context)
         if event.type != "TIMER":
@@ -103,11 +104,11 @@ class InSlices(OperatorMixin):
             self._leave(context)
             return report_error(self, error)
 
-    def _slice(self):
+    def _slice(self) -> float:
         """How long to work: where redraws are slow, as without a graphics card, half of the time."""
         return min(max(perf_counter() - self._worked, TIMER_SLICE), LONGEST_SLICE)
 
-    def _advance(self, context, seconds):
+    def _advance(self, context: bpy.types.Context, seconds: float) -> bool:
         """Works for some seconds, and returns whether all is done then."""
         self._check(context)
         end = perf_counter() + seconds
@@ -117,22 +118,22 @@ class InSlices(OperatorMixin):
         # `_finish` has a slice of its own, because the last step and the new object may take long together.
         return self._timer is None or perf_counter() < end - 0.5 * seconds
 
-    def _check(self, context):
+    def _check(self, context: bpy.types.Context) -> None:
         """Accepts whatever happens meanwhile, unless an operator overrides it."""
 
-    def _stopped(self, context):
+    def _stopped(self, context: bpy.types.Context) -> Outcome:
         self._leave(context)
         self.report({"INFO"}, "Stopped: the patch stays as it was")
         return {"CANCELLED"}
 
-    def _leave(self, context):
+    def _leave(self, context: bpy.types.Context) -> None:
         """Removes everything that shows that it is going on."""
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             context.workspace.status_text_set(None)
             self._timer = None
 
-    def cancel(self, context):
+    def cancel(self, context: bpy.types.Context) -> None:
         """Blender calls it when it ends the operator itself: by a dialog, a new file or a closed window."""
         if self._timer is not None:
             self._leave(context)

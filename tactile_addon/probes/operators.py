@@ -20,7 +20,7 @@ from ..touch.settings import (
     touch_arguments,
 )
 from ..touch.touch_object import completed, touch
-from ..touch.types import Object
+from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
 from .number_fields import fields
 from .probe import is_result, lock_of, patch_near, probe_of, record_of
@@ -45,12 +45,12 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if context.area is not None and not is_in_object_mode(cls, context, "Patches are fitted"):
             return False  # Scripts, which have no area, need not leave a mode.
         return has_target(cls, context)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         given = self.properties.is_property_set
         depsgraph = context.evaluated_depsgraph_get()
         try:
@@ -58,7 +58,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
                 touched = touch(
                     target_object(context, self.target),
                     depsgraph,
-                    list(self.location) if given("location") else list(context.scene.cursor.location),
+                    list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
                     outward=list(self.outward) if given("outward") else None,
                     tolerance=self.tolerance if given("tolerance") else None,
                     **touch_arguments(self),
@@ -72,7 +72,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, fit_summary(report))
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "target")
@@ -84,7 +84,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
 
 
-def report_error(operator: bpy.types.Operator, error: Exception) -> set[Any]:
+def report_error(operator: bpy.types.Operator, error: Exception) -> Outcome:
     """Lets an operator report what is wrong, and returns what ends it."""
     operator.report({"ERROR"}, sentence(error))
     return {"CANCELLED"}

@@ -13,7 +13,7 @@ from ..scene import patch_record
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
 from ..touch import units
-from ..touch.types import Object
+from ..touch.types import Array, Object
 from ..touch.units import Unit
 from ..touch.wording import readable_rows
 from . import drawing, page, parts
@@ -28,8 +28,8 @@ SHOWN = (
 class Deviations(NamedTuple):
     """Signed lengths (n,), their weights (n,), and words for what was measured."""
 
-    lengths: np.ndarray
-    weights: np.ndarray
+    lengths: Array
+    weights: Array
     words: str
 
 

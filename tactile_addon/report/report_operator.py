@@ -41,12 +41,12 @@ class TACTILE_OT_export_report(ObjectExport, bpy.types.Operator):
     hint = "Select a patch, its probe or its contours, a stability map or a touched object first"
 
     @staticmethod
-    def written(context):
-        obj = context.view_layer.objects.active
+    def written(context: bpy.types.Context) -> Object | None:
+        obj: Object = context.view_layer.objects.active
         alone = (patch_record.MAP_RECORD, patch_record.ATLAS_RECORD)
         return obj if obj is not None and any(key in obj for key in alone) else probe.patch_near(obj)
 
-    def write(self, obj):
+    def write(self, obj: Object) -> None:
         write(self.filepath, obj)
 
 

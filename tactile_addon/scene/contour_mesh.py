@@ -28,11 +28,11 @@ class _Form(NamedTuple):
     before, after : for each point of all paths, the indices of the points between which its tube runs
     """
 
-    before: np.ndarray
-    after: np.ndarray
-    triangles: np.ndarray
-    contour: np.ndarray
-    contact: np.ndarray
+    before: Array
+    after: Array
+    triangles: Array
+    contour: Array
+    contact: Array
 
 
 def fill_contours(mesh: bpy.types.Mesh, touched: Touched) -> None:

@@ -53,7 +53,7 @@ class _Sidebar(PanelMixin):
     bl_category = TAB
     draw_active: Callable[[bpy.types.Context, bpy.types.UILayout, Object], None]
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split, self.layout.use_property_decorate = True, False
         self.draw_active(context, self.layout, context.view_layer.objects.active)
 
@@ -62,7 +62,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_probe"
     bl_label = "Tactile Probe"
 
-    def draw_active(self, context, layout, obj):
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         if context.mode != "OBJECT":
             draw_sentence(context, layout, OTHER_MODE, "INFO")
             leave = layout.operator("object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE")
@@ -131,11 +131,11 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
     bl_label = "Patch"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         obj = context.view_layer.objects.active
         return probe.probe_of(obj) is not None or probe.patch_near(obj) is not None
 
-    def draw_active(self, context, layout, obj):
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         failed = "" if found is None else found.tactile_probe.message
         if failed:
@@ -180,7 +180,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_object"
     bl_label = "Whole Object"
 
-    def draw_active(self, context, layout, obj):
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
@@ -203,7 +203,7 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_map"
     bl_label = "Stability Map"
 
-    def draw_active(self, context, layout, obj):
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
         if obj is None or patch_record.MAP_RECORD not in obj:
             return

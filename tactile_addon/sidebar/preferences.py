@@ -26,7 +26,7 @@ class VIEW3D_MT_tactile(bpy.types.Menu):
     bl_idname = "VIEW3D_MT_tactile"
     bl_label = "Tactile Patch"
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         operator: type[Any]
         for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
             self.layout.operator(operator.bl_idname)
@@ -93,7 +93,7 @@ class TactilePreferences(bpy.types.AddonPreferences):
         update=_move_tab,
     )
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
         self.layout.prop(self, "tab")
         self.layout.operator(

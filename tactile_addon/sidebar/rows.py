@@ -11,6 +11,7 @@ import blf
 import bpy
 from bpy.props import StringProperty
 
+from ..touch.types import Outcome
 from ..viewport.overlay import FONT
 
 TEXT = 11.0  # The font's size in panels.
@@ -72,11 +73,11 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
     value: StringProperty(name="Value", description="Value to copy", options={"SKIP_SAVE"})
 
     @classmethod
-    def description(cls, context, properties):
+    def description(cls, context: bpy.types.Context, properties: Any) -> str:
         """The tooltip that Blender shows for the number."""
         return ". ".join(filter(None, (tip_of(properties.label), "Click to copy it")))
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         context.window_manager.clipboard = self.value
         return {"FINISHED"}
 

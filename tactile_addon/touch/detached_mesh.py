@@ -30,13 +30,16 @@ class DetachedMesh(PlacedMesh):
     spacing : the largest distance of neighboring float32 numbers in the mesh
     """
 
+    points: Array
+    normals: Array
+
     def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
         co = coordinates(obj.name, evaluated)
         # It keeps no reference to the object, which somebody may delete.
         self.name, self._uid = obj.name, obj.session_uid
-        self._checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
+        self._checksum, self.matrix = zlib.crc32(co.data), obj.matrix_world.copy()
         self._compared_until = 0.0
         farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
         self.spacing = farthest * np.finfo(np.float32).eps
@@ -73,7 +76,7 @@ class DetachedMesh(PlacedMesh):
         begin = perf_counter()
         if begin >= self._compared_until:
             evaluated, _, _ = evaluated_object(found, context.evaluated_depsgraph_get())
-            if zlib.crc32(coordinates(found.name, evaluated)) != self._checksum:
+            if zlib.crc32(coordinates(found.name, evaluated).data) != self._checksum:
                 raise ValueError(f'"{self.name}" was changed while it was touched: start again')
             self._compared_until = perf_counter() + PAUSE * (perf_counter() - begin)
         return found
@@ -83,7 +86,7 @@ class DetachedMesh(PlacedMesh):
         self._compared_until = 0.0
         return self.require_source(context)
 
-    def has_rims(self):
+    def has_rims(self) -> bool:
         """Whether edges have one face only, as around holes. Vertices in one place count as one."""
         _, same = np.unique(self.points, axis=0, return_inverse=True)
         ends = np.sort(same.ravel()[self.triangles[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2), axis=1)

@@ -27,7 +27,7 @@ def checksum_of(obj: Object, depsgraph: bpy.types.Depsgraph) -> int:
         evaluated.ray_cast((1e18, 0.0, 0.0), (1.0, 0.0, 0.0), distance=1e-30, depsgraph=depsgraph)
     except RuntimeError as error:
         raise disabled(obj) from error
-    return zlib.crc32(co)
+    return zlib.crc32(co.data)
 
 
 def is_disabled(obj: Object) -> bool:

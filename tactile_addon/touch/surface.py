@@ -107,7 +107,7 @@ class MeshSurface(PlacedMesh):
             return normal
         vertex = self._mesh.polygons[number].vertices[corner]
         mean = np.array(self._mesh.vertex_normals[vertex].vector) @ self._inverse
-        mean /= max(np.linalg.norm(mean), 1e-30)
+        mean /= max(float(np.linalg.norm(mean)), 1e-30)
         return mean.tolist() if np.dot(mean, normal) > SMOOTH else normal
 
     def _walk(self, start: Point, location: Point) -> tuple[Triple, Triple, float]:

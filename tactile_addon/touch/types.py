@@ -12,6 +12,7 @@ Point: TypeAlias = (
     Any  # A place, direction or normal: three numbers in a list, an array or a mathutils.Vector.
 )
 Triple: TypeAlias = tuple[float, float, float]
+Outcome: TypeAlias = set[Any]  # What an operator returns, such as {"FINISHED"}.
 # A bpy.types.Object. The stubs know neither the custom properties of objects nor those that add-ons register,
 # and they let no object's data be taken for a mesh.
 Object: TypeAlias = Any
