@@ -230,9 +230,9 @@ def cad_block():
 HOLLOW = "hollow ball"
 
 
-def made(tolerance):
-    """Functions that make objects with walls of ten tolerances or more, by name."""
-    every = {  # The thickness of the thinnest wall, as a share of the size, and the function.
+def objects(tolerance):
+    """The thickness of the thinnest wall or gap of each object, as a share of the size, and what makes it."""
+    return {
         "box": (0.6, lambda: box(1, 0.8, 0.6)),
         "fillet .05": (0.6, lambda: filleted(1, 0.8, 0.6, 0.05)),
         "fillet .01": (0.6, lambda: filleted(1, 0.8, 0.6, 0.01)),
@@ -251,8 +251,12 @@ def made(tolerance):
         HOLLOW: (0.2, lambda: hollow_ball(0.6)),
         "cad_block": (0.02, cad_block),
     }
+
+
+def made(tolerance):
+    """Functions that make objects with walls of ten tolerances or more, by name."""
     least = 0.999 * THINNEST * tolerance
-    return {name: make for name, (wall, make) in every.items() if wall >= least}
+    return {name: make for name, (wall, make) in objects(tolerance).items() if wall >= least}
 
 
 # Runs ------------------------------------------------------------------------------------------------

@@ -57,6 +57,7 @@ class Place:
 
     tried : where touches that went on from it were, (3,) each
     felt : what no patch covers on the disk at a share of REACHES, (k, 2, 3); none once its middle is covered
+    area : what is missing around it, at most a disk of that radius, if that is known
     """
 
     point: Vector
@@ -65,6 +66,7 @@ class Place:
     radius: float
     tried: tuple[Vector, ...] = ()
     felt: dict[float, Array] = field(default_factory=dict)
+    area: float | None = None
 
 
 class Next(NamedTuple):

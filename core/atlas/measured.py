@@ -3,10 +3,11 @@
 """An atlas of contacts that were measured before, such as a robot's rasters, where no more can be felt."""
 
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import SMALLEST, Array, list_of, number, unit_vector, unit_vectors
 from ..contours.contour import Contour
@@ -14,17 +15,26 @@ from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import result_of
+from .charts import AZIMUTHS, Charts
 from .finger import FACING
-from .join import charts_of
+from .join import stacked, table_of
+from .meshing import BETWEEN, Contacts
 from .object_atlas import Atlas, surfaced
+from .orientation import doubt_of, middle, oriented, planes_of
+from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.
 FEWEST = 40  # The smallest patch has so many contacts.
 SOME_PLACES = 24  # At so many places it is tried how large a patch has to be.
 WIDENING, WIDENINGS = 1.4, 10  # Patches grow by this factor, at most so often.
 MISSED = 3.0  # Contacts are off a patch, in the median, by at most so many times what is expected.
-PATCHES_APART = 0.6  # Patches are so many radii from each other.
-NEIGHBORS = 16  # The plane of so many neighbors gives the normal of a contact where none was measured.
+# Patches are so many of their radii from each other, and so many of the smallest one, but for contacts that
+# are farther out than a share of the radius up to which a patch reaches.
+PATCHES_APART, MISSING, COVERED = 0.6, 0.6, 1.0
+RAY_PLACES = 24  # Where a patch ends is looked for at so many places on each ray.
+CHECKED = 1000  # So many contacts check the surface:
+OFF_STDS, OFF_CELLS = 5.0, 0.5  # they are off it if they are by so many deviations and cells,
+OFF = 0.03  # and not more than this share may be off or face the other way.
 ABREAST = 8  # So many neighbors of each contact are to face the same way.
 ALIKE = 2.0  # Neighbors share a place if they are apart by up to so many times the median of all.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
@@ -40,12 +50,14 @@ def atlas_of(
 ) -> Atlas:
     """The atlas (paper, VI) of measured contacts: contours, with normals or without, and strokes (n, 3).
 
-    outward : (3,), a direction to the outer side of all contacts without normals; required if there are such
+    outward : (3,), a hint, a direction to the outer side on average; required where contacts without normals
+        do not close around the object, because these do not show their outer side
     tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
     noise : standard deviation of a contact; None for the contours' own
 
-    Patches lie where contacts are, as large as these allow. Raises ValueError for bad arguments, for normals
-    that contradict each other, and if no contacts carry a patch.
+    Patches lie where contacts are, as large as these allow. It is "uncertain" where the object may go on
+    unfelt, and where normals or contacts contradict each other. Raises ValueError for bad arguments, for
+    measured normals many of which face opposite ways in one place, and if no contacts carry a patch.
     """
     steps = cover_contacts(contours_or_strokes, outward=outward, tolerance=tolerance, noise=noise)
     atlas: Atlas = result_of(steps)
@@ -65,94 +77,145 @@ def cover_contacts(
     """
     from scipy.spatial import cKDTree
 
-    points, normals, own = _contacts(contours_or_strokes, outward)
     largest = None if tolerance is None else number("tolerance", tolerance, above=0.0)
-    noise = own if noise is None else number("noise", noise, least=0.0)
-    size = float(np.ptp(points, axis=0).max())
-    if noise > size:
-        raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
-    cloud = _Cloud(points, normals, cKDTree(points), noise, largest)
-    if outward is None:
-        cloud.require_one_side()
+    noise = None if noise is None else number("noise", noise, least=0.0)
+    contacts, noise, doubt = _contacts(contours_or_strokes, outward, noise)
     yield 0.0
-    found = yield from _patches(cloud)
-    charts = charts_of(found)
-    steps = surfaced(found, charts, largest)
+    cloud = _Cloud(contacts, cKDTree(contacts.points), _linked(contacts.links), noise, largest)
+    found, charts = yield from _patches(cloud)
+    steps = surfaced(found, charts, largest, contacts)
     while True:
         try:
             next(steps)
         except StopIteration as end:
-            return Atlas(tuple(found), charts, end.value, largest)
+            places = uncovered_places(end.value, charts)
+            atlas = Atlas(tuple(found), charts, end.value, largest, places, contacts=contacts)
+            return replace(atlas, doubt=doubt or _off_contacts(atlas, contacts, noise))
         yield 1.0
 
 
-def _contacts(given: Sequence[ArrayLike | Contour], outward: ArrayLike | None) -> tuple[Array, Array, float]:
-    """Contacts and outward normals, (n, 3) each, and the largest noise that any contour states."""
+def _contacts(
+    given: Sequence[ArrayLike | Contour], outward: ArrayLike | None, noise: float | None
+) -> tuple[Contacts, float, str]:
+    """Contacts with outward normals, the noise, and why the normals are in doubt, or ""."""
     strokes = [
         stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
         for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
     ]
     up = None if outward is None else unit_vector("outward", outward)
-    if up is None and any(stroke.normals is None for stroke in strokes):
-        raise ValueError("outward: expected a direction where contacts have no normals, got none")
     points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
     if len(points) < FEWEST:
         raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
+    size = float(np.ptp(points, axis=0).max())
+    if 0.0 < size < SMALLEST:
+        raise _too_near()
+    if noise is None:
+        noise = max(stroke.noise or 0.0 for stroke in strokes)
+    if noise > size:
+        raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
     own = [np.zeros(stroke.points.shape) if stroke.normals is None else stroke.normals for stroke in strokes]
-    missing = np.repeat([stroke.normals is None for stroke in strokes], [len(normals) for normals in own])
-    normals = np.vstack(own)
-    if up is not None and missing.any():
-        normals[missing] = _normals(points, up)[missing]
-    normals = unit_vectors("normals", normals)
-    return points, normals, max(stroke.noise or 0.0 for stroke in strokes)
+    known = np.repeat([stroke.normals is not None for stroke in strokes], [len(some) for some in own])
+    normals, planes = np.vstack(own), planes_of(points, noise)
+    normals[known] = unit_vectors("normals", normals[known])
+    if not known.all():
+        found = oriented([stroke.points for stroke in strokes], planes, normals, up)
+        normals[~known] = found[~known]
+    else:
+        _require_one_side(points, normals)
+    return Contacts(points, normals, planes.reach, planes.links), noise, doubt_of(points, normals, planes)
 
 
-def _normals(points: Array, up: Array) -> Array:
-    """Normals (n, 3) of the planes through the neighbors of each contact, on the side of `up`."""
+def _require_one_side(points: Array, normals: Array) -> None:
+    """Raises ValueError if many measured normals (n, 3) of neighbors face opposite ways in one place.
+
+    The normals of two places on a sphere have a sum across the chord between them, and so have nearly those
+    of neighbors on any smooth surface; with the second normal reversed if one of them is wrong. On the two
+    sides of a wall this leaves its thickness.
+    """
     from scipy.spatial import cKDTree
 
-    near = cKDTree(points).query(points, min(NEIGHBORS, len(points)))[1]
-    off = points[near] - points[near].mean(axis=1, keepdims=True)
-    normals: Array = np.linalg.eigh(np.swapaxes(off, 1, 2) @ off)[1][..., 0]
-    return np.where((normals @ up < 0.0)[:, None], -normals, normals)
+    near = cKDTree(points).query(points, min(ABREAST + 1, len(points)))[1][:, 1:]
+    chords, others = points[near] - points[:, None], normals[near]
+    facing = np.einsum("nki,ni->nk", others, normals)
+    sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
+    apart = np.abs(np.einsum("nki,nki->nk", chords, sums))
+    alike = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
+    wrong = (facing < -FACING) & (apart <= ALIKE * alike)
+    if wrong.mean() > OPPOSITE:
+        raise ValueError(
+            "normals: expected those of neighboring contacts on one side, got opposite ones at "
+            f"{np.count_nonzero(wrong.any(axis=1))} of {len(wrong)} contacts: turn all outward"
+        )
+
+
+def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> str:
+    """Why the surface is in doubt, by contacts that are off it or face the other way, or "" if few are."""
+    some = np.unique(np.linspace(0, len(contacts.points) - 1, CHECKED).astype(np.intp))
+    points, normals = contacts.points[some], contacts.normals[some]
+    distance, std = atlas.distance(points)
+    _, triangle, *_ = atlas.reference.feet(points)
+    explained = OFF_STDS * np.hypot(np.where(np.isfinite(std), std, 0.0), noise)
+    off = np.abs(distance) > np.maximum(explained, OFF_CELLS * atlas.reference.indicator.cell)
+    off |= np.einsum("ni,ni->n", atlas.reference.normals[triangle], normals) < 0.0
+    if off.mean() <= OFF:
+        return ""
+    return (
+        f"{100.0 * off.mean():.0f} % of the contacts are off the surface or face the other way, as around "
+        f"{middle(points[off])}: their normals contradict each other, or they are too far apart there."
+    )
+
+
+def _linked(links: NDArray[np.intp]) -> Any:
+    """The sparse matrix (n, n) of links (n, k)."""
+    from scipy.sparse import csr_array
+
+    n, k = links.shape
+    return csr_array((np.ones(n * k), links.ravel(), np.arange(n + 1) * k), (n, n))
 
 
 class _Cloud(NamedTuple):
-    """Contacts and normals (n, 3), a KD-tree, the noise, and the deviation up to which patches grow."""
+    """Contacts, a KD-tree, a matrix of links, the noise, and the deviation up to which patches grow."""
 
-    points: Array
-    normals: Array
+    contacts: Contacts
     tree: Any
+    links: Any
     noise: float
     largest: float | None
 
-    def require_one_side(self) -> None:
-        """Raises ValueError if many neighbors face opposite ways in one place.
+    def alike(self, i: int, radius: float) -> NDArray[np.intp]:
+        """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
+        from scipy.sparse.csgraph import connected_components
 
-        The normals of two places on a sphere have a sum across the chord between them, and so have nearly
-        those of neighbors on any smooth surface; with the second normal reversed if one of them is wrong.
-        On the two sides of a wall this leaves its thickness.
-        """
-        near = self.tree.query(self.points, min(ABREAST + 1, len(self.points)))[1][:, 1:]
-        chords, others = self.points[near] - self.points[:, None], self.normals[near]
-        facing = np.einsum("nki,ni->nk", others, self.normals)
-        sums = self.normals[:, None] + np.copysign(1.0, facing)[..., None] * others
-        apart = np.abs(np.einsum("nki,nki->nk", chords, sums))
-        alike = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
-        wrong = (facing < -FACING) & (apart <= ALIKE * alike)
-        if wrong.mean() > OPPOSITE:
-            raise ValueError(
-                "normals: expected those of neighboring contacts on one side, got opposite ones at "
-                f"{np.count_nonzero(wrong.any(axis=1))} of {len(wrong)} contacts: turn all outward"
-            )
+        near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
+        near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
+        wall = connected_components(self.links[near][:, near], directed=False)[1]
+        found: NDArray[np.intp] = near[wall == wall[np.flatnonzero(near == i)]]
+        return found
 
     def patch(self, i: int, radius: float) -> Reconstruction | None:
         """The patch of those contacts around contact i that face the same way, or None if they carry none."""
-        near = np.array(self.tree.query_ball_point(self.points[i], radius))
-        near = near[self.normals[near] @ self.normals[i] > FACING]
-        strokes, place, outward = [[self.points[near]]], self.points[i][None], self.normals[i][None]
+        points, normals = self.contacts.points, self.contacts.normals
+        strokes, place, outward = [[points[self.alike(i, radius)]]], points[i][None], normals[i][None]
         (r,) = reconstruct_many(place, [()], outward=outward, strokes_list=strokes, noise=self.noise)
         return r if isinstance(r, Reconstruction) else None
+
+    def rim(self, i: int, r: Reconstruction) -> Array:
+        """The radii (AZIMUTHS,) of a patch, in unit radius, as far as it has contacts beside it.
+
+        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole.
+        """
+        from scipy.spatial import cKDTree
+
+        domain = r.domain.radii(AZIMUTHS) / r.radius
+        near = self.alike(i, 2.0 * r.radius)
+        local = (self.contacts.points[near] - r.frame.origin) @ r.frame.axes[:, :2] / r.radius
+        shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
+        turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+        ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        away, beside = cKDTree(local).query((shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2))
+        empty = (away * r.radius > BETWEEN * self.contacts.reach[near[beside]]).reshape(RAY_PLACES, AZIMUTHS)
+        ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
+        return domain * np.maximum(ended, 1) / RAY_PLACES
 
     def largest_patch(self, i: int, radius: float) -> Reconstruction | None:
         """The largest patch around contact i that is certain enough, or the smallest, or None."""
@@ -173,8 +236,9 @@ class _Cloud(NamedTuple):
 
         Raises ValueError if there is none, or numbers do not hold such patches. Yields 0 after each trial.
         """
-        some = np.linspace(0, len(self.points) - 1, SOME_PLACES).astype(np.intp)
-        radius = float(np.median(self.tree.query(self.points[some], FEWEST)[0][:, -1]))
+        points = self.contacts.points
+        some = np.linspace(0, len(points) - 1, SOME_PLACES).astype(np.intp)
+        radius = float(np.median(self.tree.query(points[some], FEWEST)[0][:, -1]))
         self._require_fine(radius)
         for _ in range(WIDENINGS):
             if sum(self.patch(i, radius) is not None for i in some.tolist()) * 2 >= SOME_PLACES:
@@ -183,34 +247,45 @@ class _Cloud(NamedTuple):
             yield 0.0
         raise ValueError(
             "contours_or_strokes: expected contacts all around at least one of them, got "
-            f"{len(self.points)} without"
+            f"{len(points)} without"
         )
 
     def _require_fine(self, radius: float) -> None:
         """Raises ValueError if patches of this radius are too small for double precision."""
-        size = float(np.ptp(self.points, axis=0).max())
-        if any(0.0 < length < SMALLEST for length in (size, radius)):
-            raise ValueError(
-                f"contours_or_strokes: expected contacts at least {SMALLEST:g} apart, got nearer ones: use "
-                "another unit of length"
-            )
-        gap = float(np.spacing(np.abs(self.points).max()))
+        if 0.0 < radius < SMALLEST:
+            raise _too_near()
+        gap = float(np.spacing(np.abs(self.contacts.points).max()))
         if gap > TOUCH_ROUNDING * radius > 0.0:
             raise too_coarse(gap, radius)
 
 
-def _patches(cloud: _Cloud) -> Generator[float, None, list[Reconstruction]]:
-    """Patches, as large as they may be, at contacts that no earlier one covers; yields the share covered."""
+def _too_near() -> ValueError:
+    return ValueError(
+        f"contours_or_strokes: expected contacts at least {SMALLEST:g} apart, got nearer ones: use another "
+        "unit of length"
+    )
+
+
+def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction], Charts]]:
+    """Patches and their tables, as large as they may be, at contacts that no earlier one covers.
+
+    Yields the share that is covered.
+    """
     radius = yield from cloud.least_radius()
-    left, found = np.ones(len(cloud.points), dtype=bool), []
+    points = cloud.contacts.points
+    left, found, tables = np.ones(len(points), dtype=bool), [], []
     for i in range(len(left)):
         if not left[i]:
             continue
         r = cloud.largest_patch(i, radius)
-        room = PATCHES_APART * (radius if r is None else r.radius)
-        near = cloud.tree.query_ball_point(cloud.points[i], room)
-        left[near] &= cloud.normals[near] @ cloud.normals[i] < FACING
+        some = cloud.alike(i, MISSING * radius)
+        left[some] = False
         if r is not None:
             found.append(r)
+            tables.append(table_of(r, cloud.rim(i, r), deviations=True))
+            chart, some = stacked([r], tables[-1:]), cloud.alike(i, PATCHES_APART * r.radius)
+            x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
+            left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
+        left[i] = False
         yield 1.0 - float(left.mean())
-    return found
+    return found, stacked(found, tables)

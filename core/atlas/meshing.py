@@ -16,6 +16,7 @@ from ..arguments import Array
 from .charts import MARGIN, Charts
 from .creases import creased
 from .field import INSIDE, Surface, surface_at
+from .finger import FACING
 from .indicator import Indicator
 from .tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
 
@@ -23,6 +24,9 @@ from .tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
 CELL = 2.1  # A cube of the lattice is as long as so many edges of the mesh.
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
 SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
+BESIDE = 8  # A place is felt if it is beside one of so many contacts that are nearest:
+BETWEEN = 1.5  # up to so many times as far from it as its neighbors are,
+ONE_SIDED = 0.75  # if the mean of the directions to these is shorter; it is 2 / pi on a straight border.
 BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator are bridged.
 # Vertices that were off by more cells, or are of folded triangles, are moved again, so often.
 FAR, STEPS = 0.05, 4
@@ -105,6 +109,32 @@ class Mesh(NamedTuple):
         return len(self.triangles) > 0 and self._sides[3]
 
 
+class Contacts(NamedTuple):
+    """Contacts that were measured: there the surface was felt, though patches may leave gaps between them.
+
+    points, normals : (n, 3)
+    reach : (n,), how far neighbors reach around each
+    links : (n, k), some of these
+    """
+
+    points: Array
+    normals: Array
+    reach: Array
+    links: Indices
+
+    def near(self, points: Array, normals: Array) -> NDArray[np.bool_]:
+        """Which places (k, 3) with normals (k, 3) are between contacts, of which one beside faces alike."""
+        from scipy.spatial import cKDTree
+
+        away, at = cKDTree(self.points).query(points, BESIDE)
+        alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > FACING
+        ways = self.points[self.links[at]] - points[:, None, None]
+        ways /= np.maximum(np.linalg.norm(ways, axis=3, keepdims=True), LEAST_DIVISOR)
+        between = np.linalg.norm(ways.mean(axis=2), axis=2) < ONE_SIDED
+        found: NDArray[np.bool_] = (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
+        return found
+
+
 def memory_of(vertices: Array, triangles: Indices, edge: float, lattice: float = np.inf) -> float:
     """About how many bytes it takes to mesh the surface of triangles (m, 3) with edges of a length.
 
@@ -133,11 +163,15 @@ def meshed(
     indicator: Indicator,
     edge: float,
     ended: Callable[[Array], NDArray[np.bool_]] | None = None,
-) -> Generator[float, None, Mesh]:
-    """The mesh of the surface; yields the share that is done.
+    contacts: Contacts | None = None,
+) -> Generator[float, None, tuple[Mesh, Mesh]]:
+    """The mesh of the surface, and that of what the indicator has where nothing was felt.
 
     edge : about the length of its edges, which are shorter than a quarter of the thinnest wall
     ended : which of places (n, 3) are beyond the ends of a mesh of the surface that was made before
+    contacts : the surface was felt there, too
+
+    Yields the share that is done.
     """
     edge = min(edge, WALL * indicator.resolved)
     size, halvings = lattice_of(indicator, edge)
@@ -154,7 +188,7 @@ def meshed(
     yield 0.9
     surface = surface.chosen(np.append(np.arange(len(vertices)), found.parents))
     surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * found.unfelt))
-    return (yield from _felt(found.vertices, found.triangles, surface, indicator.cell, ended))
+    return (yield from _felt(found.vertices, found.triangles, surface, indicator, ended, contacts))
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -279,10 +313,11 @@ def _felt(
     vertices: Array,
     triangles: Indices,
     surface: Surface,
-    cell: float,
+    indicator: Indicator,
     ended: Callable[[Array], NDArray[np.bool_]] | None,
-) -> Generator[float, None, Mesh]:
-    """The mesh without triangles where nothing was felt; yields the share that is done.
+    contacts: Contacts | None,
+) -> Generator[float, None, tuple[Mesh, Mesh]]:
+    """The mesh without triangles where nothing was felt, and these; yields the share that is done.
 
     Between patches it goes on as far as these may be continued, but not from a rim into the void. What is
     as small as some cells of the indicator is bridged. A later mesh ends where the first one did,
@@ -304,7 +339,7 @@ def _felt(
         a, b, c = vertices[beyond].transpose(1, 0, 2)
         # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
         far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
-        gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * cell**2)[piece]
+        gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * indicator.cell**2)[piece]
     else:
         outer, off = np.flatnonzero(~inside & ~gone), np.zeros(count)
         for start in range(0, len(outer), PLACES_AT_ONCE):
@@ -313,5 +348,10 @@ def _felt(
             yield 0.9
         gone[outer] = off[piece[outer]] > 0.0
     yield 0.9
-    std = np.where(surface.node < 0, cell, surface.std)
-    return Mesh(vertices, triangles, std, surface.node).chosen(~gone[triangles].any(axis=1))
+    some = np.flatnonzero(gone)
+    if contacts is not None:
+        gone[some] = ~contacts.near(vertices[some], indicator.outward(vertices[some]))
+    std = np.where(surface.node < 0, indicator.cell, surface.std)
+    std[some] = np.hypot(std[some], indicator.cell)  # No patch is there.
+    mesh, unfelt = Mesh(vertices, triangles, std, surface.node), gone[triangles].any(axis=1)
+    return mesh.chosen(~unfelt), mesh.chosen(unfelt)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, Array, finite_array, number
-from ..contours.contour import Contour
+from ..contours.contour import Contour, SamplingPlane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from ..steps import result_of
@@ -21,7 +21,7 @@ from .charts import Charts
 from .curvature import Sheets, curvatures_of, sheets_of
 from .frontier import Place
 from .indicator import Indicator
-from .meshing import LEAST_DIVISOR, MOST_BYTES, WALL, Mesh, lattice_of, memory_of, meshed
+from .meshing import LEAST_DIVISOR, MOST_BYTES, WALL, Contacts, Mesh, lattice_of, memory_of, meshed
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
@@ -37,14 +37,24 @@ WITHIN_90 = 1.645  # So many deviations are a 90 % interval.
 WIDENINGS = 4  # Deviations grow so often until 90 % of the check's contacts are within.
 AT_ONCE = 3000  # Distances are found for so many places at once,
 CURVED_AT_ONCE = 1000  # and curvatures at so many.
+TURNS, STEPS = (0.0, 60.0, 120.0), 12  # The planes of the next touch, and the steps of a half curve.
 GRAPH_VERSION = 2  # The version of the graph as plain values.
 
 
 class NextTouch(NamedTuple):
-    """Where to touch next, (3,) each, and the gain: the area there that is not known well enough."""
+    """Where to touch next, and how.
+
+    point, outward : (3,), a place that may be off the object where nothing was felt, and the way outward
+    directions : (k, 3), the tangents of sampling planes through both, in the world
+    extent, step : the length of each half curve, and from contact to contact
+    gain : the area there that is not known well enough
+    """
 
     point: Array
     outward: Array
+    directions: Array
+    extent: float
+    step: float
     gain: float
 
 
@@ -76,12 +86,23 @@ def suggested_edge(patches: Sequence[Reconstruction], charts: Charts, indicator:
 
 
 def surfaced(
-    patches: Sequence[Reconstruction], charts: Charts, tolerance: float | None
+    patches: Sequence[Reconstruction],
+    charts: Charts,
+    tolerance: float | None,
+    contacts: Contacts | None = None,
 ) -> Generator[float, None, ReferenceMesh]:
     """The joined surface of patches, as a mesh with edges of the suggested length; yields the share done."""
     indicator = yield from indicated(charts, tolerance)
-    mesh = yield from meshed(charts, indicator, suggested_edge(patches, charts, indicator))
-    return ReferenceMesh(mesh, indicator)
+    edge = suggested_edge(patches, charts, indicator)
+    mesh, unfelt = yield from meshed(charts, indicator, edge, None, contacts)
+    return ReferenceMesh(mesh, indicator, unfelt)
+
+
+def _touch_at(point: Array, outward: Array, ahead: ArrayLike, extent: float, gain: float) -> NextTouch:
+    """A touch with sampling planes at 0, 60 and 120 degrees from the direction ahead."""
+    planes = (SamplingPlane(turn) for turn in np.radians(TURNS))
+    directions = np.array([plane.axes(outward, ahead)[:, 0] for plane in planes])
+    return NextTouch(point, outward, directions, extent, extent / STEPS, gain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +118,8 @@ class Atlas:
     taps : contacts between the curves of each patch, to which the joined patches are fitted, too
     border : where a finger felt the surface end; None if there was none
     is_cut_short : whether touches ended because no more were allowed, or were stopped
+    contacts : those that were measured before; None if they were felt for this atlas
+    doubt : why these contradict the surface, or ""
     """
 
     patches: tuple[Reconstruction, ...]
@@ -108,6 +131,8 @@ class Atlas:
     taps: tuple[Contour, ...] = ()
     border: Border | None = None
     is_cut_short: bool = False
+    contacts: Contacts | None = None
+    doubt: str = ""
 
     def __repr__(self) -> str:
         mesh, size = self.reference.mesh, self.reference.indicator.size
@@ -152,7 +177,12 @@ class Atlas:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
+        if self.doubt:
+            return "uncertain", self.doubt
         count = len(self.uncovered)
+        if count and self.contacts is not None:
+            places = "one place" if count == 1 else f"{count} places"
+            return "uncertain", (f"Nothing was felt beyond {places} where the object may go on: touch there.")
         if count:
             places = "one place" if count == 1 else f"{count} places"
             if self.is_cut_short:
@@ -265,19 +295,22 @@ class Atlas:
             return "uncertain", (
                 f"{wrong} of {count} rays from outside meet something else than the surface: {advice}."
             )
+        if self.contacts is not None:
+            return "ok", "The surface is closed, and all contacts agree with it."
         return "ok", "The object was felt everywhere a finger could reach."
 
     def next_touch(self) -> NextTouch | None:
         """Where the next touch would bring most, or None if all is covered to the tolerance."""
         if self.uncovered:
-            place = max(self.uncovered, key=lambda place: place.radius)
-            area = np.pi * place.radius**2
-            return NextTouch(np.array(place.point), np.array(place.normal), area)
+            place = max(self.uncovered, key=lambda place: place.area or place.radius)
+            area = place.area or np.pi * place.radius**2
+            return _touch_at(np.array(place.point), np.array(place.normal), place.ahead, place.radius, area)
         if not self.is_rough:
             return None
         vertex, mesh = self._rough[1], self.reference.mesh
         patch = self.patches[mesh.patch[vertex]]
-        return NextTouch(mesh.vertices[vertex], mesh.normals[vertex], patch.domain.area)
+        d1 = patch.frame.axes[:, 0]
+        return _touch_at(mesh.vertices[vertex], mesh.normals[vertex], d1, patch.radius, patch.domain.area)
 
     def distance(self, points: ArrayLike) -> tuple[Array, Array]:
         """Signed distances (n,) of points (n, 3), negative inside, and their standard deviations (n,).
@@ -347,7 +380,8 @@ class Atlas:
                 f"edge: expected triangles that take {1e-9 * MOST_BYTES:g} GB of memory or less, got "
                 f"{edge:.3g}, which takes {1e-9 * memory:.3g} GB: use a longer one"
             )
-        mesh = yield from meshed(self.charts, self.reference.indicator, edge, self.reference.ended)
+        indicator, ended = self.reference.indicator, self.reference.ended
+        mesh, _ = yield from meshed(self.charts, indicator, edge, ended, self.contacts)
         return mesh if self.border is None else bordered(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:

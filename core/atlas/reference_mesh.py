@@ -24,15 +24,25 @@ SAME = 1e-6  # Triangles that are nearer by a smaller share of the distance are 
 AHEAD = 0.95  # The normal at a foot gives the sign if the cosine of its angle to the way there is more.
 FAR = 2.0  # Places that are farther away than so many cells have the sign of the indicator.
 PREPARED = ("tree", "fans", "edge", "normals", "is_open", "angles")  # Each is found once for a mesh.
+# python -m benchmarks.measured judges these: where the surface goes on unfelt,
+SHALLOW = 1.0  # the inside is known so many cells below the surface,
+CLOSED = 0.25  # and where the indicator is above its level by more: felt area is around it;
+REACHES = 3.0  # the outside is known so many times farther than the foot is from the border,
+ABOVE = 0.12  # and up to this share of the size,
+BEYOND = 1.0  # and the surface is known so many edges beyond the border.
 ON_SIDE = 1e-6  # A foot with a smaller weight of a vertex is on the side across from it.
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceMesh:
-    """The mesh of a whole object from which distances are measured, and the indicator that it follows."""
+    """The mesh of a whole object from which distances are measured, and the indicator that it follows.
+
+    unfelt : what the indicator has where nothing was felt; None if a finger has looked for what is there
+    """
 
     mesh: Mesh
     indicator: Indicator
+    unfelt: Mesh | None = None
 
     @cached_property
     def tree(self) -> Any:
@@ -149,7 +159,48 @@ class ReferenceMesh:
         side = np.where(smooth & (surface.node >= 0), ahead, side)
         if not self.is_open.any():
             side = np.where(away > FAR * self.indicator.cell, -self.indicator.at(points), side)
-        return np.copysign(away, side), np.where(ends, np.inf, np.where(surface.node < 0, std, surface.std))
+        std = np.where(surface.node < 0, std, surface.std)
+        if self.unfelt is not None and self.is_open.any():
+            rim, behind = self._rim.query(points)[0], self.indicator.at(points)
+            return self._partly(away, side, ahead, rim, std, behind, ends)
+        return np.copysign(away, side), np.where(ends, np.inf, std)
+
+    def _partly(
+        self,
+        away: Array,
+        side: Array,
+        ahead: Array,
+        rim: Array,
+        std: Array,
+        behind: Array,
+        ends: NDArray[np.bool_],
+    ) -> tuple[Array, Array]:
+        """Signed distances (n,) where the surface goes on unfelt beyond the border, and deviations (n,).
+
+        away, side : (n,), distances and their signs; ahead : (n,), the part along the normals at the feet
+        rim : (n,), distances from the border; behind : (n,), the indicator; ends : (n,), feet on the border
+
+        What goes on beyond the border may come nearer than the foot, as far as the place is farther away than
+        the foot is from the border. Behind the surface the inside is known as far as other parts close it.
+        """
+        beside = np.sqrt(np.maximum(rim**2 - away**2, 0.0))
+        across = np.sqrt(np.maximum(away**2 - ahead**2, 0.0))
+        shallow, above = (
+            SHALLOW * self.indicator.cell,
+            np.maximum(REACHES * beside, ABOVE * self.indicator.size),
+        )
+        inside = (away < shallow) | ((behind > CLOSED) & ~ends)
+        known = np.where(side < 0.0, inside, away < above) & (~ends | (across < BEYOND * self.mesh.edge))
+        growth = np.where(ends, np.maximum(across, away - shallow), away - beside)
+        distance = np.where(ends, ahead, np.copysign(away, side))
+        return distance, np.where(known, np.hypot(std, np.maximum(growth, 0.0)), np.inf)
+
+    @cached_property
+    def _rim(self) -> Any:
+        """A KD-tree of the vertices on the border."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.mesh.vertices[self.is_open])
 
     def _settled(self, charts: Charts, places: Array, up: Array) -> tuple[Surface, Array]:
         """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""

@@ -272,7 +272,8 @@ class _Run:
         for _ in range(BORDERS):
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
             border = yield from part_of(steps, 1.0, 1.0)
-            reference = replace(reference, mesh=bordered(reference.mesh, border))
+            # The finger has looked for what goes on unfelt.
+            reference = replace(reference, mesh=bordered(reference.mesh, border), unfelt=None)
         yield from reference.prepared()
         check = yield from self.check(reference)
         yield 1.0

@@ -88,7 +88,8 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
     outward: FloatVectorProperty(
         name="Outward",
         subtype="XYZ",
-        description="A direction that points to the outer side of the surface, if no normals were measured",
+        description="A direction that points to the outer side of the surface, if no normals were measured "
+        "and contacts do not close around the object",
         options={"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"},
     )
     flip: BoolProperty(name="Flip", description="Use the other side of the surface as its outer side")

@@ -72,20 +72,14 @@ class MeasuredObject:
     ) -> None:
         """Prepares core.Contacts.
 
-        outward : direction to the outer side of all contacts; None for the measured normals, or for that of
-            the files; `flip` takes the other side
+        outward : a hint, a direction to the outer side where contacts have no normals; None for that of the
+            files; `flip` takes the other side
         tolerance, noise : in the contours' unit; 0 has core.atlas_of choose, or the files
 
         Raises ValueError with a sentence for the user.
         """
         felt = [*contacts.contours, *contacts.strokes]
-        if outward is None and any(contour.normals is None for contour in felt):
-            outward = contacts.outward
-            if outward is None:
-                raise ValueError(
-                    "Some contacts have no normals, and nothing tells their outer side: set outward, a "
-                    "direction on the outer side of all contacts"
-                )
+        outward = contacts.outward if outward is None else outward
         points = np.vstack([c.points for c in felt])
         sign, self._origin = -1.0 if flip else 1.0, np.mean(points, axis=0)
         reach = 0.5 * float(np.ptp(points, axis=0).max())
@@ -122,8 +116,6 @@ class MeasuredObject:
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
         found = {"contacts": sum(len(contour.points) for contour in self._felt), **self.whole.report()}
-        if found["status"] == "ok":  # Nobody has looked for places where the object goes on.
-            found |= {"message": "The patches reach the tolerance wherever there are contacts."}
         return found | {"tolerance": self._tolerance, "noise": self._noise}
 
 

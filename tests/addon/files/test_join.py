@@ -77,7 +77,7 @@ def test_contacts_of_three_files_become_one_closed_surface(empty, three_files):
     assert (record["source"], record["contacts"]) == ("part0.csv and 2 more", 3000)
     assert empty.context.view_layer.objects.active == surface
     assert record["is_closed"]
-    assert record["message"] == "The patches reach the tolerance wherever there are contacts."
+    assert record["message"] == "The surface is closed, and all contacts agree with it."
     assert "deviation_mean" not in record
     place = np.array(surface.matrix_world)[:3, 3]
     off = np.linalg.norm(positions(surface.data) + place - CENTER, axis=1) - RADIUS
@@ -99,13 +99,16 @@ def test_one_patch_of_files_with_points_of_their_own_is_still_refused(empty, thr
 
 def test_where_no_normals_were_measured_the_outer_side_is_asked_for(empty, two_halves):
     before = datablocks(empty)
-    with pytest.raises(RuntimeError, match="Some contacts have no normals, and nothing tells their outer"):
+    with pytest.raises(
+        RuntimeError, match="Outward: expected a direction where contacts have no normals and do not close"
+    ):
         joined(empty, two_halves)
     assert datablocks(empty) == before
     for outward, flip in (((0, 0, 1), False), ((0, 0, -1), True)):
         surface, record = joined(empty, two_halves, outward=outward, flip=flip, tolerance=4e-3)
         assert not record["is_closed"]
-        assert record["message"].endswith("wherever there are contacts.") is (record["status"] == "ok")
+        assert record["status"] == "uncertain"
+        assert record["message"].startswith("Nothing was felt beyond")
         normals = np.empty(3 * len(surface.data.vertices), dtype=np.float32)
         surface.data.vertices.foreach_get("normal", normals)
         assert (normals.reshape(-1, 3)[:, 2] > 0.2).all()
@@ -115,7 +118,7 @@ def test_files_may_tell_the_outer_side_unless_they_contradict_each_other(empty, 
     up = write("up.csv", [Contour(row) for row in raster(ROWS)], outward=[0.0, 0.0, 1.0])
     assert joined(empty, [up])[1]["patches"] > 1
     down = write("down.csv", [Contour(row) for row in raster(ROWS)], outward=[0.0, 0.0, -1.0])
-    with pytest.raises(RuntimeError, match="nothing tells their outer side"):
+    with pytest.raises(RuntimeError, match="Outward: expected a direction"):
         joined(empty, [up, down])
 
 
@@ -155,7 +158,7 @@ def test_the_shell_joins_them_too(command, two_halves, tmp_path):
     assert "Deviations" not in paths[2].read_text()
     code, _, err = command("join", *two_halves)
     assert code == 1
-    assert "set outward" in err
+    assert "outward: expected a direction" in err.lower()
 
 
 @pytest.mark.parametrize(

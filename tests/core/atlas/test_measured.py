@@ -141,6 +141,100 @@ def test_the_unit_of_contacts_and_the_length_of_normals_change_nothing(scale, le
     assert np.linalg.norm(other.vertices / scale, axis=1) == pytest.approx(1.0, abs=0.01)
 
 
+def cap_rows():
+    """Rows of contacts without noise on the cap of a unit ball."""
+    x = np.linspace(-0.5, 0.5, 41)
+    return [
+        np.column_stack([x, np.full(41, y), np.sqrt(1.0 - x**2 - y**2)]) for y in np.linspace(-0.5, 0.5, 11)
+    ]
+
+
+def test_a_cap_is_uncertain_and_nothing_is_certain_where_nothing_was_felt():
+    atlas = core.atlas_of(cap_rows(), outward=(0, 0, 1), tolerance=0.01)
+    assert atlas.status == "uncertain"
+    assert "Nothing was felt beyond" in atlas.message
+    assert atlas.uncovered
+    touch = atlas.next_touch()
+    assert np.linalg.norm(touch.point) == pytest.approx(1.0, abs=0.15)
+    assert touch.point[2] < 0.87 and touch.gain > 0.0
+    places = np.random.default_rng(0).uniform((-3, -3, -3), (3, 3, 0.5), (1000, 3))
+    places = places[np.linalg.norm(places, axis=1) > 1.0]
+    _, std = atlas.distance([*places, (-3.0, 0.5, -1.0)])
+    assert np.isinf(std).all()
+
+
+def test_deviations_grow_beyond_a_rim_and_are_then_infinite():
+    atlas = core.atlas_of(cap_rows(), outward=(0, 0, 1), tolerance=0.01)
+    rim = atlas.reference.mesh.vertices[atlas.reference.is_open]
+    at = rim[np.argmax(rim[:, 0])]
+    _, std = atlas.distance(
+        at + np.outer([0.0, 0.3, 0.8, 3.0, 10.0], atlas.reference.mesh.edge * np.eye(3)[0])
+    )
+    assert std[0] < std[1] < std[2] < np.inf
+    assert np.isinf(std[3:]).all()
+
+
+def test_above_what_was_felt_distances_are_finite_and_right():
+    atlas = core.atlas_of(cap_rows(), outward=(0, 0, 1), tolerance=0.01)
+    points = np.vstack(cap_rows())
+    heights = np.random.default_rng(0).uniform(0.0, 0.1, len(points))
+    distance, std = atlas.distance((1.0 + heights)[:, None] * points)
+    felt = np.isfinite(std)
+    assert felt.mean() > 0.9
+    assert (np.abs(distance - heights)[felt] <= 1.645 * std[felt]).mean() > 0.8
+
+
+def rings_of_ball(normals=None, gap=0.15):
+    """Circles of contacts on a unit ball, around z and around x."""
+    strokes = []
+    for z in np.arange(-1.0 + 0.3 * gap, 1.0, gap):
+        r = np.sqrt(1.0 - z**2)
+        t = np.linspace(0.0, 2.0 * np.pi, max(4, int(12.0 * r / gap)), endpoint=False)
+        ring = np.column_stack([r * np.cos(t), r * np.sin(t), np.full(len(t), z)])
+        strokes += [ring, ring[:, [2, 0, 1]]]
+    return strokes
+
+
+def test_strokes_all_over_a_ball_need_no_normals_and_no_hint():
+    strokes = rings_of_ball()
+    for hint in (None, (0.0, 0.0, 1.0)):
+        atlas = core.atlas_of(strokes, outward=hint)
+        assert atlas.status == "ok"
+        assert atlas.reference.mesh.is_closed
+        assert np.einsum("ni,ni->n", atlas.contacts.normals, np.vstack(strokes)) == pytest.approx(
+            1.0, abs=0.02
+        )
+    distance, std = atlas.distance([(0, 0, 0.5), (0, 0, -0.5), (0, 0, -1.5)])
+    assert distance == pytest.approx([-0.5, -0.5, 0.5], abs=0.02)
+    assert np.isfinite(std).all()
+
+
+@pytest.mark.parametrize("kind", ["flipped", "random"])
+def test_normals_that_contradict_each_other_are_never_ok(kind):
+    points = np.vstack(rings_of_ball())
+    rng = np.random.default_rng(0)
+    normals = points * np.where(np.arange(len(points)) % 2, 1.0, -1.0)[:, None]
+    if kind == "random":
+        normals = rng.normal(size=points.shape)
+    for outward in (None, (0, 0, 1)):
+        with pytest.raises(ValueError, match="normals: expected those of neighboring contacts on one side"):
+            core.atlas_of([core.Contour(points, normals=normals)], outward=outward)
+    # Where a few of them do so in one place, the surface is in doubt there.
+    normals = np.where((points[:, 2] > 0.8)[:, None], normals, points)
+    atlas = core.atlas_of([core.Contour(points, normals=normals)])
+    assert atlas.status == "uncertain"
+    assert "around (" in atlas.message and "contradict each other" in atlas.message
+
+
+def test_three_curves_of_one_patch_are_uncertain():
+    solid = solids.ball()
+    planes = [core.SamplingPlane(a) for a in np.radians([0, 60, 120])]
+    contours = core.track(solid, solid.start, solid.outward, planes, extent=0.3, step=0.02)
+    atlas = core.atlas_of(contours)
+    assert atlas.status == "uncertain"
+    assert atlas.uncovered
+
+
 def test_an_empty_mesh_is_not_closed_and_has_edges_of_no_length():
     none = np.empty((0, 3))
     mesh = core.Mesh(none, none.astype(np.intp), np.empty(0), np.empty(0, dtype=np.intp))
@@ -149,13 +243,13 @@ def test_an_empty_mesh_is_not_closed_and_has_edges_of_no_length():
     assert core.shortest_edge(mesh.vertices, mesh.triangles) == 0.0
 
 
-def test_normals_that_contacts_have_count_and_outward_is_for_the_others():
+def test_normals_that_contacts_have_count_and_the_others_follow_them():
     points = ball()
     half = [core.Contour(points[:400], normals=points[:400]), points[400:][points[400:, 2] > 0.5]]
     atlas = core.atlas_of([core.Contour(points, normals=points)], outward=(0, 0, 1), tolerance=0.05)
     distance, std = atlas.distance([(0.0, 0.0, -0.8), (0.0, 0.0, -1.2), (0.0, 0.0, 0.8)])
     assert np.isfinite(std).all()
     assert np.sign(distance).tolist() == [-1.0, 1.0, -1.0]
-    with pytest.raises(ValueError, match="outward: expected a direction where contacts have no normals"):
-        core.atlas_of(half, tolerance=0.05)
-    assert core.atlas_of(half, outward=(0, 0, 1), tolerance=0.05).patches
+    for outward in (None, (0, 0, -1)):
+        contacts = core.atlas_of(half, outward=outward, tolerance=0.05).contacts
+        assert np.einsum("ni,ni->n", contacts.points, contacts.normals) == pytest.approx(1.0, abs=0.05)

@@ -1,0 +1,292 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured objects: whether `core.atlas_of` is honest beyond what was felt, and orients strokes by itself.
+
+`python -m benchmarks.measured [--partial N] [--full N] [--first SEED] [--only NAME]`, from the root of a
+checkout, scans closed objects of size 1 with strokes that have a noise of .0005: curves in two families of
+parallel planes, seeded. It prints Markdown tables:
+
+(a) N partial scans, of which a half space, all but a cap, or all but three curves are missing, and N full
+    ones: how many are "ok"; of places at most one size away from contacts, how many have a finite
+    deviation, and how often the sign of these is wrong, at all of them and where the object is farther than
+    five deviations; how many of those up to a tenth of the size above felt area are finite; and how often
+    distances are within the 90 % interval. Every second scan has normals, the others have to be oriented;
+(b) with `--orientation`, every object of benchmarks.atlas_shapes, with gaps between strokes below half its
+    thinnest wall: the share of contacts whose normals face outward.
+"""
+
+import argparse
+import sys
+from time import process_time
+
+import numpy as np
+
+import core
+from core.atlas.orientation import doubt_of, oriented, planes_of
+from tools import blender
+
+from . import machine, table
+from .atlas_shapes import (
+    Made,
+    angle,
+    arc,
+    away,
+    box,
+    hollow_ball,
+    objects,
+    overlapping_balls,
+    revolved,
+    square_ring,
+    tee,
+)
+
+NOISE = 0.0005
+PLACES = 1000  # So many places are judged around each scan, and as many above felt area.
+ABOVE = 0.1  # These are at most so far above it.
+SURE = 5.0
+GAP = 0.01  # Two balls are ten times as far from each other.
+GAPS = (0.03, 0.06)  # The strokes of a scan are so far apart, at least and at most.
+FINE = 0.5  # Contacts along a stroke are this share of the gap apart.
+OBJECTS = {
+    "ball": lambda: revolved(arc(1.0, 0.0, 0.0, np.pi)),
+    "egg": lambda: revolved(arc(1.0, 0.0, 0.0, np.pi) * (0.6, 1.0)),
+    "ring": lambda: revolved(
+        [(1.0 + 0.4 * np.cos(t), 0.4 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 64)[:-1]], True
+    ),
+    "overlapping balls": lambda: overlapping_balls(0.2),
+    "box": lambda: box(1, 0.8, 0.6),
+    "cylinder": lambda: revolved([(0, 0), (0.4, 0), (0.4, 1), (0, 1)]),
+    "square ring": lambda: square_ring(0.25, 0.5, 0.3),
+    "L": lambda: angle(1, 0.35, 0.4),
+    "T": lambda: tee(0.3, 0.7, 1, 0.3, 0.4),
+    "hollow ball": lambda: hollow_ball(0.6),
+}
+
+
+def rotation(rng):
+    """Three random unit vectors across each other, as rows."""
+    return np.linalg.qr(rng.normal(size=(3, 3)))[0]
+
+
+def strokes_of(thing, gap, rng, step=None):
+    """(points, normals) of curves all over an object, in two families of planes, at most `gap` apart."""
+    found, pitch = [], gap / np.sqrt(2.0)
+    for way in rotation(rng)[:2]:
+        heights = thing.vertices @ way
+        low, high = heights.min(), heights.max()
+        for at in np.arange(low + rng.uniform(0.2, 0.8) * pitch, high, pitch):
+            found += cut(thing, heights - at, step or FINE * gap)
+    return found
+
+
+def cut(thing, heights, step):
+    """Curves of a mesh where heights (n,) of its vertices are 0, as (points, normals), in steps."""
+    above = heights[thing.triangles] > 0.0
+    ends = {}
+    for face in np.flatnonzero(above.any(axis=1) & ~above.all(axis=1)).tolist():
+        corners = thing.triangles[face]
+        keys = []
+        for a, b in zip(corners, np.roll(corners, -1), strict=True):
+            if (heights[a] > 0.0) != (heights[b] > 0.0):
+                keys.append((min(a, b), max(a, b)))
+        for one, other in (keys, keys[::-1]):
+            ends.setdefault(one, []).append((other, face))
+    curves, left = [], dict(ends)
+    while left:
+        key, faces, keys = next(iter(left)), [], []
+        while key is not None:
+            keys.append(key)
+            following = [(k, f) for k, f in left.pop(key) if k in left]
+            key = following[0][0] if following else None
+            faces += [following[0][1]] if following else []
+        closing = [f for k, f in ends[keys[-1]] if k == keys[0]]
+        if len(keys) > 2 and closing:
+            keys, faces = [*keys, keys[0]], [*faces, closing[0]]
+        if faces:
+            curves.append((keys, faces))
+    return [_stepped(thing, heights, *curve, step) for curve in curves]
+
+
+def _stepped(thing, heights, keys, faces, step):
+    a, b = thing.vertices[np.array(keys)].transpose(1, 0, 2)
+    ha, hb = heights[np.array(keys)].T
+    corners = a + (ha / (ha - hb))[:, None] * (b - a)
+    lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1)))
+    at = (np.arange(max(1, int(lengths[-1] / step))) + 0.5) * step
+    at = at[at < lengths[-1]]
+    which = np.clip(np.searchsorted(lengths, at) - 1, 0, len(faces) - 1)
+    share = (at - lengths[which]) / np.maximum(lengths[which + 1] - lengths[which], 1e-12)
+    points = corners[which] + share[:, None] * (corners[which + 1] - corners[which])
+    one, two, three = thing.vertices[thing.triangles[np.array(faces)[which]]].transpose(1, 0, 2)
+    normals = np.cross(two - one, three - one)
+    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def kept(strokes, inside):
+    """Parts of strokes where inside(points) holds."""
+    found = []
+    for points, normals in strokes:
+        which = inside(points)
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]).astype(int)))
+        found += [(points[i:j], normals[i:j]) for i, j in zip(ends[::2], ends[1::2], strict=True)]
+    return [stroke for stroke in found if len(stroke[0])]
+
+
+def partial(thing, strokes, rng):
+    """Part of a scan: a half space, a cap, or three curves of one patch; the last have their own noise."""
+    kind = rng.choice(["half space", "cap", "curves"], p=[0.5, 0.3, 0.2])
+    points = np.vstack([p for p, _ in strokes])
+    if kind == "half space":
+        way = rotation(rng)[0]
+        level = np.quantile(points @ way, rng.uniform(0.3, 0.9))
+        return kind, kept(strokes, lambda p: p @ way < level)
+    if kind == "cap":
+        middle, radius = points[rng.integers(len(points))], rng.uniform(0.2, 0.35)
+        return kind, kept(strokes, lambda p: np.linalg.norm(p - middle, axis=1) < radius)
+    for number in rng.integers(1000, size=50).tolist():
+        try:
+            place, normal = thing.start(number)
+            planes = [core.SamplingPlane(a) for a in np.radians([0.0, 60.0, 120.0])]
+            contours = core.track(thing, place, normal, planes, extent=0.15, step=0.01)
+        except ValueError:
+            continue
+        if all(len(c.points) > 25 for c in contours):
+            return kind, [(c.points, c.normals) for c in contours]
+    raise ValueError("no place for three curves")
+
+
+def scan(thing, seed, is_full):
+    """(kind, strokes, contours for atlas_of) of a seed."""
+    rng = np.random.default_rng(seed)
+    strokes, kind = strokes_of(thing, rng.uniform(*GAPS), rng), "full"
+    if not is_full:
+        kind, strokes = partial(thing, strokes, rng)
+    with_normals = seed % 2 == 0
+    given = [
+        core.Contour(p + rng.normal(0.0, NOISE, p.shape), normals=n if with_normals else None)
+        for p, n in strokes
+    ]
+    return kind, strokes, given
+
+
+def judged(thing, seed, is_full):
+    """A dict of what came of one scan."""
+    kind, strokes, given = scan(thing, seed, is_full)
+    start = process_time()
+    # Open strokes do not show their outer side.
+    hint = None if kind in ("full", "half space") else np.vstack([n for _, n in strokes]).mean(axis=0)
+    atlas = core.atlas_of(given, noise=NOISE, outward=hint)
+    seconds = process_time() - start
+    rng = np.random.default_rng(seed + 1)
+    points, normals = (np.vstack(values) for values in zip(*strokes, strict=True))
+    low, high = points.min(axis=0) - 1.0, points.max(axis=0) + 1.0
+    near = points[rng.integers(len(points), size=PLACES)] + rng.normal(0.0, 0.2, (PLACES, 3))
+    around = np.vstack([rng.uniform(low, high, (PLACES, 3)), near])
+    some = rng.integers(len(points), size=PLACES)
+    above = points[some] + rng.uniform(0.0, ABOVE, PLACES)[:, None] * normals[some]
+    above = above[~thing.is_inside(above)]
+    places = np.vstack([around, above])
+    truth = away(thing.tree, places) * np.where(thing.is_inside(places), -1.0, 1.0)
+    distance, std = atlas.distance(places)
+    finite = np.isfinite(std)
+    wrong = finite & (np.signbit(distance) != np.signbit(truth))
+    mesh = atlas.reference.mesh
+    return {
+        "seed": seed,
+        "kind": kind,
+        "ok": atlas.status == "ok",
+        "closed": mesh.is_closed,
+        "finite": int(finite.sum()),
+        "wrong": int(wrong.sum()),
+        "sure wrong": int((wrong & (np.abs(truth) > SURE * np.where(finite, std, 0.0))).sum()),
+        "felt above": float(finite[len(around) :].mean()),
+        "within": float(np.mean(np.abs(distance - truth)[finite] <= 1.645 * std[finite])),
+        "contacts": len(points),
+        "patches": len(atlas.patches),
+        "seconds": seconds,
+        "message": atlas.message,
+    }
+
+
+def print_scans(only, seeds, is_full):
+    names = [name for name in OBJECTS if only in name]
+    with blender.quiet():
+        things = {name: Made(name, *OBJECTS[name]()) for name in names}
+    every = {name: [] for name in names}
+    for seed in seeds:
+        name = names[seed % len(names)]
+        try:
+            one = judged(things[name], 1000 * (1 + is_full) + seed // len(names) * 7 + seed, is_full)
+        except ValueError as error:
+            print(f"{name} {seed}: {error}", file=sys.stderr, flush=True)
+            continue
+        every[name].append(one)
+        print(name, one, file=sys.stderr, flush=True)
+    rows = []
+    for name, found in [*every.items(), ("all", [one for some in every.values() for one in some])]:
+        if not found:
+            continue
+        finite = sum(one["finite"] for one in found)
+        rows.append(
+            [
+                name,
+                str(len(found)),
+                str(sum(one["ok"] for one in found)),
+                str(sum(one["closed"] for one in found)),
+                f"{finite / len(found):.0f}",
+                f"{1e3 * sum(one['wrong'] for one in found) / max(finite, 1):.2f}",
+                f"{1e3 * sum(one['sure wrong'] for one in found) / max(finite, 1):.2f}",
+                f"{100 * np.mean([one['felt above'] for one in found]):.1f}",
+                f"{np.mean([one['within'] for one in found]):.3f}",
+                f"{np.mean([one['seconds'] for one in found]):.1f}",
+            ]
+        )
+    head = [
+        *("full scans of" if is_full else "partial scans of", "scans", "ok", "closed", "finite places"),
+        *("wrong signs, permille", "sure ones", "% finite above", "within 90 %", "s"),
+    ]
+    table(head, rows)
+
+
+def print_orientation(only):
+    rows = []
+    for name, (wall, make) in objects(GAP).items():
+        if only not in name:
+            continue
+        with blender.quiet():
+            thing = Made(name, *make())
+        rng = np.random.default_rng(0)
+        strokes = strokes_of(thing, 0.95 * 0.5 * wall, rng)
+        points, normals = (np.vstack(values) for values in zip(*strokes, strict=True))
+        felt = [p + rng.normal(0.0, NOISE, p.shape) for p, _ in strokes]
+        start = process_time()
+        planes = planes_of(np.vstack(felt), NOISE)
+        found = oriented(felt, planes)
+        doubt = doubt_of(np.vstack(felt), found, planes)
+        seconds = process_time() - start
+        right = np.einsum("ni,ni->n", found, normals) > 0.0
+        rows.append(
+            [name, f"{wall:g}", str(len(points)), f"{100 * right.mean():.2f}", doubt, f"{seconds:.1f}"]
+        )
+        print(rows[-1], file=sys.stderr, flush=True)
+    table(["object", "wall", "contacts", "% outward", "doubt", "s"], rows)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--partial", type=int, default=0)
+    parser.add_argument("--full", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--orientation", action="store_true")
+    options = parser.parse_args()
+    for count, is_full in ((options.partial, False), (options.full, True)):
+        if count:
+            print_scans(options.only, range(options.first, options.first + count), is_full)
+    if options.orientation:
+        print_orientation(options.only)
+    print(f"{machine('bpy', 'numpy', 'scipy')}.")
+
+
+if __name__ == "__main__":
+    main()

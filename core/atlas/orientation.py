@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Outward normals of contacts without normals: planes of neighbors, whose sides follow from each other.
+
+Hoppe et al. 1992: a minimal spanning tree of neighbors carries the outer side from one contact to the next.
+Of two contacts on an arc one normal is the mirror image of the other in the plane between them (Koenig and
+Gumhold 2009), also across a sharp edge, a wall or a gap. Links along strokes come first.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arguments import Array
+from .tetrahedra import Indices
+
+# python -m benchmarks.measured --orientation judges these.
+FEWEST, MOST, MORE = 8, 600, 1.5  # A plane has so many neighbors, by this factor more until it is certain:
+ACROSS = 0.15  # they do not lie in a line if this share of the larger variance is across,
+FLAT = 0.05  # and lie in a plane if at most this share of the smaller one is off it,
+NOISES = 8.0  # and they reach so many deviations of a contact far.
+LINKS = 12  # A contact is linked with so many of its neighbors.
+AT_ONCE = 20_000  # So many contacts are taken at once.
+BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps,
+STROKE = 0.5  # and those along strokes before others.
+STEP = (
+    2.0  # Successive contacts are linked if they are at most so many times as far apart as neighbors reach.
+)
+LEAST_VOTE = 1e-6  # No vote counts less.
+BRIDGES = 8  # Pieces are linked by so many of their nearest contacts.
+OPPOSED = -0.3  # A link contradicts the sides of its contacts if its cosine is less.
+DOUBTED = 0.02  # Not more contacts than this share may contradict their neighbors,
+CONFUSED = 0.05  # and not more than this share may have the other side of a wall among their neighbors.
+FACING = 0.8  # Contacts face each other across a wall if they and the way between them do by this cosine.
+CLOSED = 0.15  # Contacts show their outer side if the mean of their winding numbers is more.
+DECISIVE = 0.3  # A hint decides if the mean cosine between it and the normals is more.
+CERTAIN = 0.02  # Links of less weight are certain,
+SMALL = 0.1  # and a region has at least this share of all contacts.
+ROUNDS = 3  # Regions are tried so often.
+PROBES = 30  # Winding numbers are computed at so many contacts of a region.
+
+
+class Planes(NamedTuple):
+    """Planes through the neighbors of n contacts.
+
+    normals : (n, 3), unit vectors to either side
+    reach : (n,), how far these neighbors reach
+    areas : (n,), the area of each contact
+    links : (n, LINKS), some of them
+    """
+
+    normals: Array
+    reach: Array
+    areas: Array
+    links: Indices
+
+
+def planes_of(points: Array, noise: float) -> Planes:
+    """The planes of the fewest neighbors of contacts (n, 3) that show one, not a line or several walls."""
+    from scipy.spatial import cKDTree
+
+    tree, n = cKDTree(points), len(points)
+    normals, (reach, areas), best = np.zeros((n, 3)), np.zeros((2, n)), np.full(n, np.inf)
+    links = np.zeros((n, LINKS), dtype=np.intp)
+    left, count = np.arange(n), FEWEST
+    while len(left):
+        count = min(count, n)
+        for some in np.array_split(left, len(left) * count // (AT_ONCE * FEWEST) + 1):
+            away, near = tree.query(points[some], count)
+            off = points[near] - points[near].mean(axis=1, keepdims=True)
+            values, vectors = np.linalg.eigh(np.swapaxes(off, 1, 2) @ off)
+            bulk = np.maximum(values[:, 1], np.finfo(float).tiny)
+            # Where nothing shows a plane it is the flattest one, or at least across a line.
+            off_plane = np.where(bulk > ACROSS * values[:, 2], values[:, 0] / bulk, 1e3 - count)
+            better = off_plane < best[some]
+            which = some[better]
+            best[which], normals[which] = off_plane[better], vectors[better][..., 0]
+            reach[which] = away[better, -1]
+            areas[which] = np.pi * reach[which] ** 2 / count
+            links[which] = near[better][:, np.linspace(1, count - 1, LINKS).astype(np.intp)]
+        left = (
+            left[(best[left] > FLAT) | (reach[left] < NOISES * noise)] if count < min(n, MOST) else left[:0]
+        )
+        count = int(MORE * count)
+    return Planes(normals, reach, areas, links)
+
+
+def mirrored(points: Array, normals: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
+    """Cosines (m,) between normals j and normals i mirrored in the plane between both contacts.
+
+    Also the larger cosine between a normal and the way from one contact to the other, (m,).
+    """
+    way = points[j] - points[i]
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
+    a, b = (np.einsum("mi,mi->m", normals[k], way) for k in (i, j))
+    return np.einsum("mi,mi->m", normals[i], normals[j]) - 2.0 * a * b, np.maximum(np.abs(a), np.abs(b))
+
+
+def oriented(
+    strokes: Sequence[Array], planes: Planes, known: Array | None = None, up: Array | None = None
+) -> Array:
+    """Outward unit normals (n, 3) of the contacts of strokes (k, 3) with planes.
+
+    known : (n, 3), measured unit normals; 0 where there are none
+    up : (3,), a hint, a direction to the outer side
+
+    Raises ValueError if nothing tells the outer side.
+    """
+    points = np.vstack(list(strokes))
+    links = _links(points, planes, [len(stroke) for stroke in strokes])
+    links = _bridged(points, planes.normals, *links)
+    sides, region = _sides(points, planes.normals, *links)
+    normals = sides[:, None] * planes.normals
+    flips, number = _flips(points, normals, planes.areas, region)
+    normals *= flips[region, None]
+    return normals * _side(normals, known, up, number)
+
+
+def _links(points: Array, planes: Planes, lengths: Sequence[int]) -> tuple[Indices, Indices, Array]:
+    """Pairs of neighbors and of successive contacts, (m,) each, and their weights (m,)."""
+    n = len(points)
+    i, j = np.repeat(np.arange(n), LINKS), planes.links.ravel()
+    ends = np.cumsum(lengths) - 1
+    before = np.setdiff1d(np.arange(n - 1), ends)
+    step = np.linalg.norm(points[before + 1] - points[before], axis=1)
+    before = before[step < STEP * planes.reach[before]]
+    along = np.zeros(len(i) + len(before), dtype=bool)
+    along[len(i) :] = True
+    i, j = np.append(i, before), np.append(j, before + 1)
+    return i, j, np.where(along, STROKE, 1.0) * _weights(points, planes.normals, i, j)
+
+
+def _weights(points: Array, normals: Array, i: Indices, j: Indices) -> Array:
+    """How uncertain it is which side of one contact follows from another, (m,)."""
+    cosine, bend = mirrored(points, normals, i, j)
+    return 1e-6 + 1.0 - np.abs(cosine) + BEND * bend**2
+
+
+def _bridged(
+    points: Array, normals: Array, i: Indices, j: Indices, weights: Array
+) -> tuple[Indices, Indices, Array]:
+    """The links and those between pieces that they do not connect, from the nearest contacts of these."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    while True:
+        count, piece = connected_components(coo_matrix((np.ones(len(i)), (i, j)), (len(points),) * 2))
+        if count == 1:
+            return i, j, weights
+        largest = np.bincount(piece).argmax()
+        for one in (k for k in range(count) if k != largest):
+            mine, others = np.flatnonzero(piece == one), np.flatnonzero(piece != one)
+            away, near = cKDTree(points[others]).query(points[mine])
+            some = np.argsort(away, kind="stable")[:BRIDGES]
+            a, b = mine[some], others[near[some]]
+            i, j = np.append(i, a), np.append(j, b)
+            # They come after all links of neighbors, the shortest first.
+            far = 2.0 + away[some] / np.ptp(points, axis=0).max()
+            weights = np.append(weights, far + _weights(points, normals, a, b))
+
+
+def _sides(points: Array, normals: Array, i: Indices, j: Indices, weights: Array) -> tuple[Array, Indices]:
+    """The sides (n,), 1 or -1, of normals (n, 3) that follow from the first along the minimal tree of links.
+
+    Also the regions (n,) that uncertain links of the tree separate from each other.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+
+    n, (cosine, _) = len(points), mirrored(points, normals, i, j)
+    # Neighbors that have each other as a neighbor count twice, so they are more likely of one wall.
+    votes = coo_matrix((cosine / weights, (np.minimum(i, j), np.maximum(i, j))), (n, n)).tocsr()
+    votes.sum_duplicates()
+    votes.data = 1.0 / np.maximum(np.abs(votes.data), LEAST_VOTE)
+    tree = minimum_spanning_tree(votes)
+    order, before = breadth_first_order(tree, 0, directed=False)
+    cosine, _ = mirrored(points, normals, before[order[1:]], order[1:])
+    sides = [1.0] * n
+    for at, past, same in zip(order[1:].tolist(), before[order[1:]].tolist(), cosine.tolist(), strict=True):
+        sides[at] = sides[past] if same > 0.0 else -sides[past]
+    return np.array(sides), _regions(tree.tocoo(), n)
+
+
+def _regions(tree: Any, n: int) -> Indices:
+    """The regions (n,) of a tree that its uncertain links separate; small ones are a part of those beside."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    certain = tree.data < CERTAIN
+    links = np.ones(certain.sum()), (tree.row[certain], tree.col[certain])
+    count, region = connected_components(coo_matrix(links, (n, n)))
+    sizes, first = np.bincount(region).tolist(), list(range(count))
+
+    def of(one: int) -> int:
+        """The region that another is a part of by now."""
+        while first[one] != one:
+            one = first[one]
+        return one
+
+    rest = np.flatnonzero(~certain)
+    for k in rest[np.argsort(tree.data[rest], kind="stable")].tolist():
+        a, b = of(int(region[tree.row[k]])), of(int(region[tree.col[k]]))
+        if a != b and min(sizes[a], sizes[b]) < SMALL * n:
+            first[max(a, b)] = min(a, b)
+            sizes[min(a, b)] = sizes[a] + sizes[b]
+    found: Indices = np.unique([of(one) for one in range(count)], return_inverse=True)[1][region]
+    return found
+
+
+def _flips(points: Array, normals: Array, areas: Array, region: Indices) -> tuple[Array, float]:
+    """The sides (k,), 1 or -1, of regions with which winding numbers at contacts come nearest to a half.
+
+    Also their mean then.
+
+    On a closed surface these are 0 outside and 1 inside (Barill et al. 2018), and a half on it. A region that
+    faces the wrong way, also around a cavity, has others.
+    """
+    count = int(region.max()) + 1
+    rng = np.random.default_rng(0)
+    numbers, sizes = np.zeros((count, count)), np.bincount(region)
+    for one in range(count):
+        some = np.flatnonzero(region == one)
+        some = rng.permutation(some)[:PROBES]
+        for at in some:
+            off = points - points[at]
+            away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))
+            angle = areas * np.einsum("ni,ni->n", off, normals) / away**3
+            numbers[one] += np.bincount(region, angle, count) / (4.0 * np.pi * len(some))
+    sides = np.ones(count)
+
+    def off_half(sides: Array) -> float:
+        """The mean square by which winding numbers are off a half."""
+        return float(sizes @ (numbers @ sides - 0.5) ** 2)
+
+    best = off_half(sides)
+    for flipped in [*np.eye(count, dtype=bool), np.ones(count, dtype=bool)] * ROUNDS:
+        tried = np.where(flipped, -sides, sides)
+        if (off := off_half(tried)) < best * (1.0 - 1e-9):
+            sides, best = tried, off
+    return sides, float(sizes @ (numbers @ sides)) / len(points)
+
+
+def _side(normals: Array, known: Array | None, up: Array | None, number: float) -> float:
+    """1, or -1 if normals (n, 3) face inward, as measured normals, a hint or the winding number have it.
+
+    Raises ValueError if nothing of these is decisive.
+    """
+    if known is not None and known.any():
+        return float(np.copysign(1.0, np.einsum("ni,ni->n", known, normals).sum()))
+    mean = 0.0 if up is None else float((normals @ up).mean())
+    if number > CLOSED and abs(mean) < DECISIVE:
+        return 1.0
+    if up is None:
+        raise ValueError(
+            "outward: expected a direction where contacts have no normals and do not close around an object, "
+            "got none"
+        )
+    return float(np.copysign(1.0, mean))
+
+
+def doubt_of(points: Array, normals: Array, planes: Planes) -> str:
+    """Why outward normals (n, 3) of contacts are in doubt, in a sentence that names a place, or ""."""
+    i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
+    cosine, bend = mirrored(points, normals, i, j)
+    against = np.bincount(i, cosine < OPPOSED) * 2 > LINKS
+    if against.mean() > DOUBTED:
+        return (
+            f"Normals contradict each other around {middle(points[against])}: strokes are too far apart "
+            "there, or normals are wrong."
+        )
+    facing = np.einsum("mi,mi->m", normals[i], normals[j]) < -FACING
+    walls = np.bincount(i, facing & (bend > FACING)) > 0
+    if walls.mean() > CONFUSED:
+        return (
+            f"Strokes around {middle(points[walls])} are farther apart than half the thickness of the wall "
+            "or gap there, so its sides may be confused: strokes that are nearer to each other, or measured "
+            "normals, tell."
+        )
+    return ""
+
+
+def middle(points: Array) -> str:
+    """The point (3,) of points (n, 3) that is nearest to their middle, in words."""
+    best = points[np.argmin(((points - np.median(points, axis=0)) ** 2).sum(axis=1))]
+    return "(" + ", ".join(f"{x:.3g}" for x in best) + ")"

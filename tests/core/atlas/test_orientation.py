@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Outward normals of strokes that were measured without normals."""
+
+import numpy as np
+import pytest
+
+from core.atlas.orientation import doubt_of, oriented, planes_of
+
+
+def sphere(radius, gap, middle=(0.0, 0.0, 0.0)):
+    """Circles of contacts on a sphere, around z and around x."""
+    strokes = []
+    for z in np.arange(-radius + 0.3 * gap, radius, gap):
+        r = np.sqrt(radius**2 - z**2)
+        t = np.linspace(0.0, 2.0 * np.pi, max(4, int(12.0 * r / gap)), endpoint=False)
+        ring = np.column_stack([r * np.cos(t), r * np.sin(t), np.full(len(t), z)])
+        strokes += [ring + middle, ring[:, [2, 0, 1]] + middle]
+    return strokes
+
+
+def box(sizes, gap):
+    """Rows on the six faces of a box, and the outward normals."""
+    strokes, normals = [], []
+    for axis in range(3):
+        u, v = (k for k in range(3) if k != axis)
+        for side in (-1.0, 1.0):
+            for at in np.arange(-sizes[u] + 0.4 * gap, sizes[u], gap):
+                along = np.arange(-sizes[v] + 0.1 * gap, sizes[v], 0.3 * gap)
+                row = np.zeros((len(along), 3))
+                row[:, u], row[:, v], row[:, axis] = at, along, side * sizes[axis]
+                strokes.append(row)
+                normals.append(np.tile(side * np.eye(3)[axis], (len(row), 1)))
+    return strokes, np.vstack(normals)
+
+
+def outward(strokes, **told):
+    points = np.vstack(strokes)
+    planes = planes_of(points, 0.0)
+    normals = oriented(strokes, planes, **told)
+    return normals, doubt_of(points, normals, planes)
+
+
+def test_normals_follow_from_each_other_around_the_edges_of_a_box():
+    strokes, truth = box((0.5, 0.4, 0.3), 0.1)
+    normals, doubt = outward(strokes)
+    assert (np.einsum("ni,ni->n", normals, truth) > 0.0).mean() > 0.98
+    assert doubt == ""
+
+
+def test_a_thin_plate_has_two_sides():
+    strokes, truth = box((0.5, 0.4, 0.03), 0.028)
+    normals, doubt = outward(strokes)
+    assert (np.einsum("ni,ni->n", normals, truth) > 0.0).mean() > 0.98
+    assert doubt == ""
+
+
+def test_a_shell_inside_another_faces_its_cavity():
+    outer, inner = sphere(1.0, 0.15), sphere(0.6, 0.15)
+    normals, doubt = outward([*outer, *inner])
+    out = np.einsum("ni,ni->n", normals, np.vstack([*outer, *inner])) > 0.0
+    count = sum(map(len, outer))
+    assert out[:count].all()
+    assert not out[count:].any()
+    assert doubt == ""
+
+
+def test_each_of_two_balls_faces_outward_and_a_hint_along_their_surface_changes_nothing():
+    one, two = sphere(1.0, 0.15), sphere(1.0, 0.15, (2.5, 0.0, 0.0))
+    middles = np.repeat([[0.0, 0.0, 0.0], [2.5, 0.0, 0.0]], sum(map(len, one)), axis=0)
+    for up in (None, np.array([0.0, 0.0, 1.0])):
+        normals, _ = outward([*one, *two], up=up)
+        assert (np.einsum("ni,ni->n", normals, np.vstack([*one, *two]) - middles) > 0.0).all()
+
+
+def test_a_hint_decides_for_what_is_open():
+    flat = [row for row in box((0.5, 0.4, 0.3), 0.1)[0] if (row[:, 2] == 0.3).all()]
+    for side in (1.0, -1.0):
+        normals, _ = outward(flat, up=np.array([0.0, 0.0, side]))
+        assert (side * normals[:, 2] > 0.9).all()
+    with pytest.raises(ValueError, match="outward: expected a direction where contacts have no normals and"):
+        outward(flat)
+
+
+def test_measured_normals_decide_before_a_hint():
+    strokes = sphere(1.0, 0.15)
+    known = np.zeros((sum(map(len, strokes)), 3))
+    known[: len(strokes[0])] = -strokes[0]
+    normals, _ = outward(strokes, known=known)
+    assert (np.einsum("ni,ni->n", normals, np.vstack(strokes)) < 0.0).all()
+
+
+def test_strokes_that_are_too_far_apart_for_a_wall_are_a_doubt_that_names_a_place():
+    _, doubt = outward([*sphere(1.0, 0.5), *sphere(0.8, 0.5)])
+    assert "around (" in doubt
