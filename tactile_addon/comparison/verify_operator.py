@@ -14,7 +14,7 @@ from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
-from ..scene import mesh_data, patch_record, shown
+from ..scene import attributes, mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
 from ..touch.touch_report import TouchReport, judgment
 from ..touch.types import Array, Object, Outcome
@@ -77,7 +77,7 @@ class Verification:
         points, normals = _vertices(patch.data, r, r.radius / record["radius"])
         deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
         mesh_data.own_mesh(patch)
-        mesh_data.write(patch.data, "deviation", "FLOAT", deviations)
+        mesh_data.write(patch.data, attributes.DEVIATION, deviations)
         shown.recolor(patch)
         shown.share_range(patch)
         record["verification"] = {"target": self.target, **self._found}
@@ -116,8 +116,7 @@ def _inputs(patch: Object, target: Object) -> tuple[Any, ...]:
 def _vertices(mesh: bpy.types.Mesh, r: core.Reconstruction, scale: float) -> tuple[Array, Array]:
     """Points and unit normals of the patch's vertices, in its frame and scaled by `scale`."""
     points: Array = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    position: Any = mesh.attributes["position"]
-    position.data.foreach_get("vector", points.ravel())
+    attributes.attribute_of(mesh, attributes.POSITION).data.foreach_get("vector", points.ravel())
     points = scale * points.astype(float)
     return points, r.geometry.normal(points[:, 0], points[:, 1])
 

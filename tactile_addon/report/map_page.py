@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..scene import patch_record
+from ..scene.attributes import HEIGHT_STD, MAP_COLOR, REASON
 from ..scene.mesh_data import values
 from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
@@ -40,7 +41,7 @@ def _legend(painted: Object, record: Mapping[str, Any], unit: Unit) -> str:
     """The legend of the colors."""
     shown = painted.tactile_map_colors
     swatches = "".join(page.swatch(color, words) for words, color in map_object.swatches(painted))
-    if shown == "reason":
+    if shown == REASON:
         return swatches
     title = next(words for key, words, *_ in map_object.MAP_QUANTITIES if key == shown)
     low = "1" if shown in map_object.LOGARITHMIC else "0"
@@ -53,7 +54,7 @@ def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list
     known = errors != NOTHING
     if not known.any():
         return []
-    weights, std = np.ones(known.sum()), float(np.median(values(mesh, "height_std")[known]))
+    weights, std = np.ones(known.sum()), float(np.median(values(mesh, HEIGHT_STD)[known]))
     size = (record["extent"], "extent") if record["extent"] else (record["reach_median"], "median reach")
     words = (
         "Shares of the vertices by the error of the touch nearest to them. The last bar counts all "
@@ -70,7 +71,7 @@ def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list
 
 def _screen_colors(mesh: bpy.types.Mesh) -> Array:
     """The colors of the vertices in sRGB, (n, 4)."""
-    attribute: Any = mesh.attributes[map_object.MAP_COLOR]
+    attribute: Any = mesh.attributes[MAP_COLOR]
     rgba = np.empty((len(attribute.data), 4), dtype=np.float32)
     attribute.data.foreach_get("color_srgb", rgba.ravel())
     return rgba

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ..scene import patch_record
+from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
 from ..touch.types import Object
@@ -45,8 +46,8 @@ def _pictures(mesh: bpy.types.Mesh, unit: Unit, shown: str) -> str:
 
 
 def _deviations(mesh: bpy.types.Mesh, record: Mapping[str, Any]) -> list[str]:
-    unit, off = unit_of(record), values(mesh, "deviation").astype(float)
-    areas = parts.vertex_areas(values(mesh, "position").astype(float), parts.corners(mesh))
+    unit, off = unit_of(record), values(mesh, DEVIATION).astype(float)
+    areas = parts.vertex_areas(values(mesh, POSITION).astype(float), parts.corners(mesh))
     reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
     words = "Shares of the area by its distance from the mesh. The outermost bars count all larger distances."
     return [

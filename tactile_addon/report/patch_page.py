@@ -10,6 +10,7 @@ import numpy as np
 
 from ... import core
 from ..scene import patch_record
+from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
 from ..touch import units
@@ -51,7 +52,7 @@ def patch_page(patch: Object, r: core.Reconstruction) -> str:
 
 
 def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], unit: Unit) -> Iterator[str]:
-    points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
+    points, corners = values(patch.data, POSITION).astype(float), parts.corners(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
         shown = values(patch.data, attribute)
@@ -68,12 +69,12 @@ def _has_mesh(record: Mapping[str, Any]) -> bool:
 
 def _deviations(patch: Object, r: core.Reconstruction, record: Mapping[str, Any]) -> Deviations:
     if _has_mesh(record):
-        points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
+        points, corners = values(patch.data, POSITION).astype(float), parts.corners(patch.data)
         words = (
             "Shares of the patch's area by its distance from the mesh. The outermost bars count all "
             "larger distances."
         )
-        off = values(patch.data, "deviation").astype(float)
+        off = values(patch.data, DEVIATION).astype(float)
         return Deviations(off, parts.vertex_areas(points, corners), words)
     x, y, z = r.contacts.T
     words = (

@@ -4,7 +4,7 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -12,11 +12,12 @@ import numpy as np
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array
+from .attributes import CONTACT, CONTOUR, POSITION, attribute_of
 from .mesh_data import fill, write
 
 RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # The rim has so many points and this share of a contour's thickness.
-CONTACT = 3.6  # The tips of a contact are so many times a contour's thickness away from it,
-LEAST_CONTACT, GAP = 1.6, 0.4  # or this share of the way to the next one, if they would run together.
+TIP = 3.6  # The tips of a contact are so many times a contour's thickness away from it,
+LEAST_TIP, GAP = 1.6, 0.4  # or this share of the way to the next one, if they would run together.
 CONTACT_TIPS = np.vstack([np.eye(3), -np.eye(3)])
 FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
 SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # The corners of a square tube.
@@ -56,19 +57,16 @@ def fill_contours(mesh: bpy.types.Mesh, touched: Touched) -> None:
     tubes = _tubes(np.vstack(paths), np.repeat([*across, (0.0, 0.0, 1.0)], lengths, axis=0), sizes, form)
     points = np.vstack([tubes, _octahedra(contours, frame.to_local(strokes), thickness)])
     if _has_form(mesh, form):
-        write(mesh, "position", "FLOAT_VECTOR", points)
+        write(mesh, POSITION, points)
         mesh.update()
     else:
-        attributes = [("contour", "INT", form.contour), ("contact", "INT", form.contact)]
-        fill(mesh, points, form.triangles, attributes)
+        fill(mesh, points, form.triangles, [(CONTOUR, form.contour), (CONTACT, form.contact)])
 
 
 def _has_form(mesh: bpy.types.Mesh, form: _Form) -> bool:
     """Whether the mesh shows contours with as many contacts, so that only its points have to change."""
-    contact: Any = mesh.attributes.get("contact")
-    if contact is None or (contact.data_type, contact.domain) != ("INT", "POINT"):
-        return False
-    if (len(contact.data), len(mesh.loops)) != (len(form.contact), form.triangles.size):
+    contact = attribute_of(mesh, CONTACT)
+    if contact is None or (len(contact.data), len(mesh.loops)) != (len(form.contact), form.triangles.size):
         return False
     found = np.empty(len(form.contact), dtype=np.int32)
     contact.data.foreach_get("value", found)
@@ -77,7 +75,7 @@ def _has_form(mesh: bpy.types.Mesh, form: _Form) -> bool:
 
 def _octahedra(contours: Sequence[Array], strokes: Array, thickness: float) -> Array:
     """The tips (6n, 3) of the octahedra at the contacts of contours and at those of strokes (m, 3)."""
-    reaches = [_reach(path, thickness) for path in contours] + [CONTACT * thickness]
+    reaches = [_reach(path, thickness) for path in contours] + [TIP * thickness]
     reach = np.repeat(reaches, [*map(len, contours), len(strokes)])
     contacts = np.vstack([*contours, strokes])
     return (contacts[:, None] + reach[:, None, None] * CONTACT_TIPS).reshape(-1, 3)
@@ -86,9 +84,9 @@ def _octahedra(contours: Sequence[Array], strokes: Array, thickness: float) -> A
 def _reach(path: Array, thickness: float) -> float:
     """How far the tips of the contacts of a path (n, 3) are from it: less where many are close together."""
     if len(path) < 2:
-        return CONTACT * thickness
+        return TIP * thickness
     apart = float(np.median(np.linalg.norm(np.diff(path, axis=0), axis=1)))
-    return min(max(GAP * apart, LEAST_CONTACT * thickness), CONTACT * thickness)
+    return min(max(GAP * apart, LEAST_TIP * thickness), TIP * thickness)
 
 
 def _rim(result: core.Reconstruction) -> Array:

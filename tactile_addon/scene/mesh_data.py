@@ -9,22 +9,16 @@ import bpy
 import numpy as np
 
 from ..touch.types import Array, Object
+from .attributes import DOMAIN, KEYS, POSITION, TYPES, attribute_of
 from .undo import note_copied
 
 ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn.
-ATTRIBUTE_KEYS = {
-    "FLOAT": "value",
-    "INT": "value",
-    "BOOLEAN": "value",
-    "FLOAT_VECTOR": "vector",
-    "FLOAT_COLOR": "color",
-}
 
 
 def fill(
-    mesh: bpy.types.Mesh, points: Array, triangles: Array, attributes: Sequence[tuple[str, str, Array]]
+    mesh: bpy.types.Mesh, points: Array, triangles: Array, attributes: Sequence[tuple[str, Array]]
 ) -> None:
-    """Gives `mesh` points (n, 3), triangles (m, 3) and point attributes (name, Blender's type, values).
+    """Gives `mesh` points (n, 3), triangles (m, 3) and attributes, names and values each.
 
     If it has these triangles already, only coordinates and values are written.
     """
@@ -36,26 +30,26 @@ def fill(
         mesh.polygons.add(len(triangles))
         mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
         mesh.update(calc_edges=True)
-    for name, kind, values in [("position", "FLOAT_VECTOR", points), *attributes]:
-        write(mesh, name, kind, values)
+    for name, values in [(POSITION, points), *attributes]:
+        write(mesh, name, values)
     mesh.update()
 
 
-def write(mesh: bpy.types.Mesh, name: str, kind: Any, values: Array) -> None:
-    """Writes a point attribute, and replaces one of this name and another kind."""
+def write(mesh: bpy.types.Mesh, name: str, values: Array) -> None:
+    """Writes an attribute, and replaces one of this name and another type or domain."""
     # References to attributes must not outlive the next `new`, which moves all of them.
-    attribute: Any = mesh.attributes.get(name)
-    if attribute is not None and (attribute.data_type, attribute.domain) != (kind, "POINT"):
-        mesh.attributes.remove(attribute)
-        attribute = None
-    attribute = attribute or mesh.attributes.new(name, kind, "POINT")
-    attribute.data.foreach_set(ATTRIBUTE_KEYS[kind], values.ravel())
+    attribute = attribute_of(mesh, name)
+    if attribute is None:
+        if name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
+        attribute = mesh.attributes.new(name, TYPES[name], DOMAIN)
+    attribute.data.foreach_set(KEYS[TYPES[name]], values.ravel())
 
 
 def values(mesh: bpy.types.Mesh, name: str) -> Array:
-    """The values of a point attribute, (n,) or (n, 3)."""
+    """The values of an attribute, (n,) or (n, 3)."""
     attribute: Any = mesh.attributes[name]
-    key = ATTRIBUTE_KEYS[attribute.data_type]
+    key = KEYS[attribute.data_type]
     values = np.empty((len(attribute.data), 3) if key == "vector" else len(attribute.data))
     attribute.data.foreach_get(key, values.ravel())
     return values

@@ -12,11 +12,11 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array, Object
+from .attributes import COLOR, DEVIATION, HEIGHT_STD, NORMAL, PLACE, POSITION
 from .contour_mesh import fill_contours
 from .family import add
 from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
 from .patch_record import (
-    COLOR,
     CONTOURS,
     QUANTITIES_OF_A_FIT,
     RECONSTRUCTION,
@@ -33,7 +33,6 @@ from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
-NORMAL, PLACE = "custom_normal", "domain_place"  # Attributes: normals for shading; places on the unit disk.
 # It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
 # most, and by so many deviations of its height until it is compared with the mesh.
 DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 5e-2, 3.0
@@ -116,7 +115,7 @@ def _above(patch: Object, touched: Touched) -> float:
     """How far above the mesh a patch and its contours are drawn where they would lie in it."""
     radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
     if touched.report["is_verified"] and touched.surface is not None:
-        deepest = max(deepest, -STEEP * float(values(patch.data, "deviation").min()))
+        deepest = max(deepest, -STEEP * float(values(patch.data, DEVIATION).min()))
     return min(max(deepest, DRAWN_ABOVE * radius), MOST_ABOVE * radius)
 
 
@@ -154,11 +153,11 @@ def _fill_patch(obj: Object, touched: Touched) -> None:
         deviation = touched.surface.deviations(*world, result.radius)
     places = np.column_stack([result.domain.places(points[:, :2]), np.zeros(len(points))])
     attributes = [
-        *((name, "FLOAT", _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
-        ("deviation", "FLOAT", deviation),
-        (NORMAL, "FLOAT_VECTOR", d.normal),
-        (PLACE, "FLOAT_VECTOR", places),
-        (COLOR, "FLOAT_COLOR", np.ones((len(points), 4))),
+        *((name, _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
+        (DEVIATION, deviation),
+        (NORMAL, d.normal),
+        (PLACE, places),
+        (COLOR, np.ones((len(points), 4))),
     ]
     fill(mesh, points, triangles, attributes)
 
@@ -172,12 +171,12 @@ def _follow(obj: Object, touched: Touched) -> None:
     plane = result.domain.points_at(values(mesh, PLACE)[:, :2])
     d = result.geometry.derivatives(*plane.T)
     points = np.column_stack([plane, d.z])
-    write(mesh, "position", "FLOAT_VECTOR", points)
-    write(mesh, NORMAL, "FLOAT_VECTOR", d.normal)
+    write(mesh, POSITION, points)
+    write(mesh, NORMAL, d.normal)
     if obj.tactile_colors in QUANTITIES_OF_A_FIT:
-        write(mesh, obj.tactile_colors, "FLOAT", _shown(obj.tactile_colors, result, points))
+        write(mesh, obj.tactile_colors, _shown(obj.tactile_colors, result, points))
 
 
 def _shown(name: str, result: core.Reconstruction, points: Array) -> Array:
     """The values (n,) of the quantity `name` at points (n, 3) of a surface; curvatures are those of (1)."""
-    return getattr(result if name == "height_std" else result.patch, name)(*points[:, :2].T)
+    return getattr(result if name == HEIGHT_STD else result.patch, name)(*points[:, :2].T)

@@ -14,13 +14,13 @@ from mathutils import Matrix
 from ... import core
 from ..touch.touch_report import TouchReport
 from ..touch.types import Array, Object
+from .attributes import COLOR, CURVATURES, DEVIATION, HEIGHT_STD, attribute_of
 from .family import children_of
 
 # Custom properties of objects.
 RECORD = "tactile"  # The report of a patch.
 RECONSTRUCTION = "tactile_reconstruction"  # Its core.to_dict as JSON, once a gesture has ended.
 VERDICT = "tactile_verdict"  # Its status and message, while the report says that it is outdated.
-COLOR = "curvature_color"
 RANGE = "tactile_color_range"  # The range of its colors, if that is given.
 COMMON_RANGE = "tactile_common_range"  # The range that suits all patches of its mesh.
 MAP_RECORD = "tactile_map"  # The report of a stability map.
@@ -38,14 +38,12 @@ QUANTITIES = [
         0,
     ),
     ("curvedness", "Curvedness", "How strongly the surface bends, whatever its shape", -1),
-    ("deviation", "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
-    ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
+    (DEVIATION, "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
+    (HEIGHT_STD, "Standard Deviation", "How well the contacts determine the height", 1),
 ]
 POWERS = {name: power for name, _, _, power in QUANTITIES}
-CURVATURES = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness")
-CURVATURE_STD = "mean_curvature_std"  # It is infinite where a whole object's curvatures are unknown.
-QUANTITIES_OF_A_FIT = (*CURVATURES, "height_std")  # These need no mesh to compare with.
-POSITIVE = ("curvedness", "height_std")  # These are never below zero, so they need half a scale.
+QUANTITIES_OF_A_FIT = (*CURVATURES, HEIGHT_STD)  # These need no mesh to compare with.
+POSITIVE = ("curvedness", HEIGHT_STD)  # These are never below zero, so they need half a scale.
 
 
 def report_of(patch: Object) -> TouchReport | None:
@@ -111,12 +109,8 @@ def touched_record(obj: Object | None) -> Any:
 
 
 def _is_whole(mesh: bpy.types.Mesh) -> bool:
-    kinds = {name: "FLOAT" for name in POWERS} | {COLOR: "FLOAT_COLOR"}
-    found: dict[str, Any] = {name: mesh.attributes.get(name) for name in kinds}
-    return len(mesh.vertices) > 0 and all(
-        attribute is not None and (attribute.data_type, attribute.domain) == (kinds[name], "POINT")
-        for name, attribute in found.items()
-    )
+    names = (*POWERS, COLOR)
+    return len(mesh.vertices) > 0 and all(attribute_of(mesh, name) is not None for name in names)
 
 
 def mark_failed(patch: Object, why: str) -> None:

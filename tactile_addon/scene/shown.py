@@ -11,13 +11,11 @@ import numpy as np
 from ..touch.touch_report import TouchReport
 from ..touch.types import Object
 from . import colors
+from .attributes import COLOR, CURVATURE_STD, CURVATURES
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
-    COLOR,
     COMMON_RANGE,
-    CURVATURE_STD,
-    CURVATURES,
     POWERS,
     RANGE,
     RECORD,

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ... import core
+from ..scene.attributes import MEASURES
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
 from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
@@ -34,7 +35,6 @@ REASONS = [
 ]
 REASON_KEYS = [key for key, _, _ in REASONS]
 STOP_CODES = {stop: code for code, (_, _, stop) in enumerate(REASONS) if stop}
-MEASURES = ("error", "height_std", "reach", "condition_number", "blind_share")
 
 
 def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, spacing: float) -> int:

@@ -14,6 +14,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
 from ..scene import colors, patch_record
+from ..scene.attributes import CURVATURES, REASON
 from ..scene.contour_mesh import RIM_CORNERS
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
@@ -160,13 +161,13 @@ def draw_legend() -> None:
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["radius"], patch_record.POWERS[shown], low)
-        unknown = record.get("unknown_curvatures") if shown in patch_record.CURVATURES else None
+        unknown = record.get("unknown_curvatures") if shown in CURVATURES else None
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if unknown else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["spacing"], map_object.MAP_POWERS[shown], 0.0)
-        if shown == "reason":
+        if shown == REASON:
             bar = title, 0.0, []
         elif shown in map_object.REVERSED:
             bar = bar[0], bar[1], [(1.0 - at, text) for at, text in reversed(bar[2])]

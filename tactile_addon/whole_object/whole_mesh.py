@@ -13,6 +13,7 @@ from mathutils import Matrix
 
 from ... import core
 from ..scene import colors, patch_object, patch_record, undo
+from ..scene.attributes import COLOR, DEVIATION, HEIGHT_STD, NODE
 from ..scene.mesh_data import ABOVE, emission, fill, own_mesh
 from ..scene.shown import recolor
 from ..scene.viewports import show_colors
@@ -39,7 +40,7 @@ class GrowingPatches:
         scene.collection.objects.link(obj)  # A collection of its own might be left empty.
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
-        obj.data.materials.append(emission("Tactile Surface", attribute=patch_record.COLOR))
+        obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
         self._patches: list[tuple[Array, Array]] = []
         self._uid, self._above = obj.session_uid, DRAWN_ABOVE * surface.size
         show_colors()
@@ -55,7 +56,7 @@ class GrowingPatches:
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         shades = colors.diverging(curvatures, colors.symmetric_range(curvatures, 1e-30))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
-        fill(obj.data, points, triangles, [(patch_record.COLOR, "FLOAT_COLOR", shades)])
+        fill(obj.data, points, triangles, [(COLOR, shades)])
 
     def remove(self) -> None:
         """Deletes the object, if it is still there."""
@@ -100,7 +101,7 @@ def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin.tolist()), True
     patch_object.collection(scene).objects.link(obj)
-    mesh.materials.append(emission("Tactile Surface", attribute=patch_record.COLOR))
+    mesh.materials.append(emission("Tactile Surface", attribute=COLOR))
     rewrite(obj, whole, report | {"source": name})
     show_colors()
     return obj
@@ -111,11 +112,11 @@ def rewrite(obj: Object, whole: WholeSurface, report: dict[str, Any]) -> None:
     own_mesh(obj)
     mesh, found = obj.data, whole.mesh
     attributes = [
-        *((key, "FLOAT", values) for key, values in whole.curvatures.items()),
-        ("height_std", "FLOAT", found.std),
-        ("deviation", "FLOAT", whole.deviation),
-        ("patch", "INT", found.patch.astype(np.int32)),
-        (patch_record.COLOR, "FLOAT_COLOR", np.ones((len(found.vertices), 4))),
+        *whole.curvatures.items(),
+        (HEIGHT_STD, found.std),
+        (DEVIATION, whole.deviation),
+        (NODE, found.patch.astype(np.int32)),
+        (COLOR, np.ones((len(found.vertices), 4))),
     ]
     fill(mesh, found.vertices, found.triangles, attributes)
     mesh.shade_smooth()
