@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import (
@@ -46,7 +47,8 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
     bl_label = "Import Contact Data"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    filepath: str
+    if TYPE_CHECKING:  # At run time this would hide the property of ImportHelper.
+        filepath: str
     filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.ply", options={"HIDDEN"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})

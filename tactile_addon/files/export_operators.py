@@ -5,6 +5,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -21,7 +22,8 @@ from . import contact_file, patch_table
 class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `invoke`, by the stubs
     """For operators that write what is active to inherit: a patch, by itself, its probe or its contours."""
 
-    filepath: str
+    if TYPE_CHECKING:  # At run time this would hide the property of ExportHelper.
+        filepath: str
     filename_ext: str
     write: Callable[[Object], None]
     hint = "Select a patch, its probe or its contours first"
@@ -89,7 +91,8 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore
     bl_idname = "tactile.export_table"
     bl_label = "Export Table of Patches"
     filename_ext = ".csv"
-    filepath: str
+    if TYPE_CHECKING:
+        filepath: str
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
     use_selection: BoolProperty(
         name="Selected Only", description="Write the selected probes and patches only", default=False

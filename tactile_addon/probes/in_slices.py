@@ -5,7 +5,7 @@
 import sys
 from collections.abc import Callable, Iterator
 from time import perf_counter
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import bpy
 from bpy.props import BoolProperty
@@ -36,7 +36,8 @@ class InSlices(OperatorMixin):
         options={"HIDDEN", *UNSAVED},
     )
 
-    target: Any  # The property of operators that have one.
+    if TYPE_CHECKING:  # At run time it is the property of operators that have one.
+        target: str
     _steps: Iterator[Any]
     _begin: Callable[[bpy.types.Context], None]
     _done: Callable[[], Progress]

@@ -4,8 +4,27 @@
 
 The patch is a child of its probe. So a copy of a probe has none and makes its own, and if a probe is
 deleted, its patch stays as an ordinary object. Each probe keeps the digest of the inputs it was last
-touched with, and so do the datablocks made from them. Undo restores each datablock by itself, and if
-digests differ afterward, change_handlers.py touches again.
+touched with, and so do the datablocks made from them. Undo restores each datablock by itself, so digests
+may differ afterward.
+
+    probe, target or frame changes           undo, redo: undo.take_out before, undo.put_back after
+                  |                                 |
+                  |                                 v
+                  |                   on_other_data: any probe may be outdated
+                  v                                 |
+    change_handlers._look_at  <---------------------+
+                  |
+    touch_again.is_outdated: do the inputs have the digest that the probe, its patch and their meshes keep?
+                  |
+                  +-- they do ----------> stand_by: the patch goes where its target goes
+                  |
+                  +-- not, not live ----> stand_by: the patch is marked "outdated", until Touch Again
+                  |
+                  +-- not, live --------> update: touch, rewrite the patch, give all of them the digest
+                                            |
+                                            v
+                     without a window it is complete; in a window `_settle` completes it after the gesture,
+                     and touches then if there was no time before
 """
 
 from collections.abc import Iterable, Mapping
