@@ -37,7 +37,7 @@ import numpy as np
 
 import core
 from core.atlas.field import surface_at
-from core.atlas.meshing import ROOM
+from core.atlas.meshing import BAND
 from core.atlas.touching import SIZE
 from tests import solids
 from tools import blender
@@ -177,7 +177,7 @@ def agreeing(thing, atlas):
     def surface(at):
         """Normals (n, 3) of the joined surface near points (n, 3): the field's, or those of the mesh."""
         up, inside = atlas.reference.normals[atlas.reference.feet(at)[1]], atlas.reference.indicator
-        found = surface_at(atlas.charts, inside, at, up, ROOM * inside.cell)
+        found = surface_at(atlas.charts, inside, at, up, BAND * inside.cell)
         return np.where(found.node[:, None] < 0, up, found.normal)
 
     some = points[np.random.default_rng(0).permutation(len(points))[:POINTS]]
@@ -410,7 +410,7 @@ def main():
     parser.add_argument("--peers", default="", help="only peers with this in their names, and not (d)")
     parser.add_argument("--memory", action="store_true", help="print only the memory that 1000 touches take")
     parser.add_argument("--shapes", action="store_true", help="print only the table of made objects")
-    parser.add_argument("--starts", type=int, default=8, help="so many starts of each of these (%(default)s)")
+    parser.add_argument("--starts", type=int, default=8, help="number of starts of each (%(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first of these starts (%(default)s)")
     parser.add_argument("--places", type=int, default=20_000, help="places around each (%(default)s)")
     parser.add_argument("--redraw", action="store_true", help="only draw docs/charts/atlas.csv again")

@@ -32,13 +32,13 @@ from .real import Scan
 from .whole import EDGE, NOISE, away, contacts_of, poisson, put_together, spread, tree_of
 
 TOLERANCES = (0.002, 0.008)
-THINNEST = 10.0  # Objects are touched with a tolerance if no wall is thinner than so many of it.
-GAP = 10.0  # Two balls are so many tolerances from each other.
-SECTIONS = 128  # Round objects have so many facets around their axis.
+THINNEST = 10.0  # Objects are touched with a tolerance if no wall is thinner than this many of it.
+GAP = 10.0  # Two balls are this many tolerances from each other.
+SECTIONS = 128  # Round objects have this many facets around their axis.
 # Balls have more: 128 facets are as far off a ball as a patch is uncertain, and finer than its knots.
 BALL_SECTIONS = 256
-FILLET = 12  # A fillet has so many facets across.
-SHELLS = 160  # The hollow ball is touched at so many places.
+FILLET = 12  # A fillet has this many facets across.
+SHELLS = 160  # The hollow ball is touched at this many places.
 SAMPLES = 10_000
 SURE = 5.0
 OFF_STDS, OFF = 8.0, 0.005  # Distances are off if they are by more deviations and by more of the size.

@@ -41,7 +41,7 @@ HOLLOW = "(hollow)"  # The label of methods that get more data than the others, 
 DISTRIBUTIONS = {"sklearn": "scikit-learn", "igl": "libigl"}
 KAPPA, NORMAL = "kappa 1/mm", "normal degrees"
 TIME_LIMITS = (0.3, 300.0)  # The limits of the axes.
-OFF_SCALE = 400.0  # Errors above so many um are not to scale: a band at the top has their values.
+OFF_SCALE = 400.0  # Errors above this many um are not to scale: a band at the top has their values.
 HEIGHT_LIMITS, KAPPA_LIMITS, NORMAL_LIMITS = (2.5, 1500.0), (5e-6, 0.3), (4e-4, 30.0)
 
 
@@ -149,7 +149,7 @@ FRAME_METHODS = [
     _curves("bayes", "this project's default", accuracy.ours),
     _curves("paper", "the paper's section III", accuracy.METHODS[accuracy.QUADRIC]),
     *(_curves(f"jet {d}", "polynomial in the paper's frame, degree", peers.jet, degree=d) for d in (3, 4)),
-    *(_mesh(f"igl {r}", "libigl, quadric over so many rings", peers.igl_curvature, "igl", rings=r)
+    *(_mesh(f"igl {r}", "libigl, quadric over this many rings", peers.igl_curvature, "igl", rings=r)
       for r in (5, 10, 15)),
     _mesh("meshlab q", f"pymeshlab, {QUADRICS}", peers.meshlab_curvature, "pymeshlab", method=QUADRICS),
     _mesh("meshlab s", f"pymeshlab, Scale Dependent {QUADRICS}", peers.meshlab_curvature, "pymeshlab",

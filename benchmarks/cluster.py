@@ -189,7 +189,7 @@ def memory(count):
             made(engine, files[start : start + step], options(10, 10, **KINDS["fixed"]))
             sizes = [(process.memory_info().rss / 2**20, process) for process in family()]
             seen.append([size for size, process in sizes if "resource_tracker" not in str(process.cmdline())])
-    print("(c) Memory in MB after so many objects, 10 touches of each.\n")
+    print("(c) Memory in MB after this many objects, 10 touches of each.\n")
     names = ["client and scheduler", "Dask's worker", "its Blender"]
     head = ["", *(f"{start + step}" for start in range(0, count, step)), "growth an object"]
     growths = [(last - first) / (count - step) for first, last in zip(seen[0], seen[-1], strict=True)]

@@ -41,7 +41,7 @@ from .atlas_shapes import (
 )
 
 NOISE = 0.0005
-PLACES = 1000  # So many places are judged around each scan, and as many above felt area.
+PLACES = 1000  # This many places are judged around each scan, and as many above felt area.
 ABOVE = 0.1  # These are at most so far above it.
 SURE = 5.0
 GAP = 0.01  # Two balls are ten times as far from each other.

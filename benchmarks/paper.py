@@ -32,7 +32,7 @@ from .scans import AZIMUTHS, SCANS
 
 NOISE = 0.05  # The noise of a contact: the paper's fits are off their contacts by as much.
 SEEDS = 9
-TURN = 60.0 / SEEDS  # Planes turn by so many degrees from seed to seed, so that no direction is favored.
+TURN = 60.0 / SEEDS  # Planes turn by this many degrees from seed to seed, so that no direction is favored.
 NINE = (15.0, 30.0, 45.0, 75.0, 90.0, 105.0, 135.0, 150.0, 165.0)  # The azimuths of the verifying curves.
 LEAN = np.array([3.0, -2.0, 4.0])  # Angles in degrees by which the three planes lean from the normal,
 LEANS = (0.0, 1.0, 2.0, 4.0)  # and the multiples of these angles that are tried.

@@ -12,7 +12,7 @@ from . import ROOT
 
 OUTPUT = ROOT / "build" / "paper"
 CUT = 1.65  # Radii around the reference point within which a mesh is shown.
-TALL = 8.19  # The neck's patches are shown so many mm above and below the point.
+TALL = 8.19  # The neck's patches are shown this many mm above and below the point.
 FINE = 0.01  # The distance of vertices in a cut patch, as a share of the radius.
 SIZE = 480  # The width and height of a picture in a sheet, in pixels.
 INKS = {

@@ -222,7 +222,7 @@ def screened_poisson(case, true_normals, neighbors=40):
 
 
 def igl_curvature(vertices, triangles, rings):
-    """libigl's quadrics over so many rings (its default is 5), with normals weighted by angle."""
+    """libigl's quadrics over this many rings (its default is 5), with normals weighted by angle."""
     import igl
 
     k1, k2 = igl.principal_curvature(vertices, triangles, rings)[2:4]

@@ -50,7 +50,7 @@ def compare(base, cases, tasks):
 
 
 def _asked(ask, case, rounds):
-    """The least seconds of each (worker, task) of `ask` over so many rounds, in which they take turns."""
+    """The least seconds of each (worker, task) of `ask` over this many rounds, in which they take turns."""
     return np.min([[answer(each, f"{task} {case}") for each, task in ask] for _ in range(rounds)], axis=0)
 
 

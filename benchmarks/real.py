@@ -44,7 +44,7 @@ from . import SCANS_FOLDER, machine, table
 from .peers import Fit, quadric_process, radial_basis
 
 PLANES, EXTENTS, STEPS = (3, 4, 5, 6), (32, 16, 8), 12
-# At most so many points of the mesh above a domain are compared, and at least so many.
+# At most this many points of the mesh above a domain are compared, and at least this many.
 HOLD_OUT, LEAST = 90, 20
 LAYERS = 4
 # Newton's method toward a surface: the number of steps, the longest step in radii, and the least slope.

@@ -30,7 +30,7 @@ METHODS = {  # The methods with their default weights, and their names in the ta
 }
 AZIMUTHS = (0.0, 60.0, 120.0)
 RUNS = 7
-LEAST_VERTICES = 20  # A mean distance counts if at least so many vertices are over the patch.
+LEAST_VERTICES = 20  # A mean distance counts if at least this many vertices are over the patch.
 
 
 class Scan(NamedTuple):

@@ -53,8 +53,8 @@ class Setting(NamedTuple):
     change: Callable | None = None  # Changes curves: (curves, point, extent, rng) -> curves.
     wrap: Callable | None = None  # Changes the surface: (surface, axes, extent) -> surface.
     scale: float = 1.0  # All coordinates are multiplied by it.
-    offset: float = 0.0  # All coordinates are moved by so many extents and rounded to single precision.
-    normals: float | None = None  # Measured normals are turned by so many degrees, but claim NORMAL_STD.
+    offset: float = 0.0  # All coordinates are moved by this many extents and rounded to single precision.
+    normals: float | None = None  # Measured normals are turned by this many degrees, but claim NORMAL_STD.
 
 
 class Sweep(NamedTuple):

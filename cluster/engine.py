@@ -33,11 +33,11 @@ CALM = {
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
 }
-AHEAD = 3  # For each thread of a worker, so many orders are out at once.
+AHEAD = 3  # For each thread of a worker, this many orders are out at once.
 LEAST_AHEAD = 16
-LOOK_EVERY = 5.0  # The threads of all workers are counted every so many seconds.
+LOOK_EVERY = 5.0  # The threads of all workers are counted every this many seconds.
 GONE = "The worker was lost with it again and again"
-CONNECT = 60.0  # A scheduler that was restarted may come back within so many seconds.
+CONNECT = 60.0  # A scheduler that was restarted may come back within this many seconds.
 
 
 class EngineError(Exception):

@@ -18,7 +18,7 @@ from .input_files import printable
 from .progress import Progress
 from .worker.process import FAILED, STOP
 
-TRIES = 2  # Blocks that are damaged once they are written are made again so often.
+TRIES = 2  # Blocks that are damaged once they are written are made again this often.
 MISNAMED = "The name of the file is not in UTF-8: rename it"
 
 

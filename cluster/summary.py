@@ -6,7 +6,7 @@ from typing import Any
 
 from .data_set.columns import COUNTS
 
-MOST_NAMED = 10  # At most so many objects with errors are named.
+MOST_NAMED = 10  # At most this many objects with errors are named.
 
 
 def summary(rows: list[dict[str, Any]], run: Any) -> str:

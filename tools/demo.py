@@ -18,7 +18,7 @@ NOISE = 1.0 / 1200.0  # A share of the object's size, as 0.05 mm is of 60 mm.
 WIDTH, HEIGHT = 1200, 900
 BAR_STEPS = 128
 BAR_REACH = 1.5  # Half the length of the color bar, in radii of the patch.
-BESIDE = 1.3  # The patch is so many radii to the left of the middle, so that the bar is beside the object.
+BESIDE = 1.3  # The patch is this many radii to the left of the middle, so that the bar is beside the object.
 BACKGROUND = (0.8, 0.82, 0.85, 1.0)
 
 

@@ -15,7 +15,7 @@ from tools import blender, demo
 
 OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "film.webp"
 WIDTH, HEIGHT, SAMPLES, QUALITY = 560, 420, 16, 88
-LARGEST = 300_000  # The film has at most so many bytes, so that the README opens at once.
+LARGEST = 300_000  # The film has at most this many bytes, so that the README opens at once.
 STROKES, TURNS = 7, 15  # The numbers of pictures of each curve, and of the turn of the planes.
 SHORT, LONG = 90, 1500  # The milliseconds that a picture is shown.
 CAPTIONS = (

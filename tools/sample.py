@@ -14,7 +14,7 @@ import numpy as np
 from tools import blender
 
 OUTPUT = Path(__file__).resolve().parents[1] / "examples" / "sample.blend"
-LARGEST = 300_000  # The file has at most so many bytes.
+LARGEST = 300_000  # The file has at most this many bytes.
 AROUND, ALONG, SUBDIVISIONS = 32, 20, 3
 HEIGHT, PLACE = 2.4, 1.45  # The height of the vase, and that of the probe on it.
 NOTE = """A probe on a vase

@@ -29,7 +29,7 @@ CHECKSUM, MARK = "checksum", b"\nsha256:"
 NO_CHECKSUM = MARK + 64 * b"0"  # It stands for the checksum while that is computed.
 NAME = re.compile(r"[0-9a-f]{16}-\d{5,}(-error)?\.parquet")  # The names of files of rows.
 ERROR = "-error"  # Names of files of error rows end with this; if they are deleted, a run tries again.
-DIGITS = 16  # Hashes have so many digits.
+DIGITS = 16  # Hashes have this many digits.
 REPEATING = [field.name for field in TOUCH_SCHEMA if field.type == REPEATED] + ["stops.list.element"]
 
 

@@ -15,12 +15,12 @@ from typing import Any
 from ..extension import ROOT
 
 DONE, FAILED, STOP = "done", "failed", "stop"  # How an order went; STOP if all others would fail, too.
-START = 120.0  # Blender may take so many seconds to start.
-GRACE = 1.0  # A process that is about to end gets so many seconds.
+START = 120.0  # Blender may take this many seconds to start.
+GRACE = 1.0  # A process that is about to end gets this many seconds.
 TIMEOUT, UNENDED = "Timeout (", "It did not end by itself"  # The watchdog writes the first.
-MOST_OPENED = 200  # A process that has opened so many objects is replaced.
+MOST_OPENED = 200  # A process that has opened this many objects is replaced.
 THREADS = ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR")
-TAIL = 20_000  # So many of the last characters that a process has written are read.
+TAIL = 20_000  # This many of the last characters that a process has written are read.
 
 
 class LostError(Exception):

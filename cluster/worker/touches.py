@@ -13,7 +13,7 @@ from ..extension import addon, core
 from .objects import Touchable
 
 touch_object = addon("touch.touch_object")
-BATCH = 50  # So many touches are felt and fitted side by side.
+BATCH = 50  # This many touches are felt and fitted side by side.
 
 
 def touched(target: Touchable, options: Options, block: int) -> tuple[list[dict[str, Any]], float]:

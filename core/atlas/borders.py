@@ -20,18 +20,18 @@ from .meshing import LEAST_DIVISOR, Mesh
 from .tetrahedra import Indices, split_sides
 
 # python -m benchmarks.atlas judges these.
-REACH, STEP = 6.0, 0.5  # A border is looked for within so many edges of the mesh's, in such steps,
-HALVINGS = 8  # and then by so many halvings.
+REACH, STEP = 6.0, 0.5  # A border is looked for within this many edges of the mesh's, in such steps,
+HALVINGS = 8  # and then by this many halvings.
 TURNED = 0.87  # A border has a corner where the cosine between its directions on both sides is less,
 STRAIGHT = 0.1  # if it is straight on both sides to this share of an edge.
 INWARD = 0.1  # Corners are felt this share of the way from there to the chord across them.
-SMOOTHINGS = 3  # So often directions of a border become the means of their neighbors'.
-EARS = 2  # So often triangles with two sides on the border are left out.
+SMOOTHINGS = 3  # This often directions of a border become the means of their neighbors'.
+EARS = 2  # This often triangles with two sides on the border are left out.
 ALONG = 0.5  # Ways agree if the cosine of the angle between them is more.
-NEAREST = 12  # The nearest segment is one of so many whose middles are nearest.
+NEAREST = 12  # The nearest segment is one of this many whose middles are nearest.
 SAME = 1e-6  # Lengths that differ by a smaller share are the same.
 
-PLACES_AT_ONCE = 1000  # A step feels so many places.
+PLACES_AT_ONCE = 1000  # A step feels this many places.
 
 # How far a surface is above points beside some places, found in steps.
 Offsets = Callable[[Array, Indices], Generator[float, None, Array]]

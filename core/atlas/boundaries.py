@@ -19,7 +19,7 @@ from .charts import MARGIN, Charts
 from .field import LAYER, least_of, node_weights
 from .finger import FACING
 
-# Boundaries are looked for on so many rays from each patch's middle, at so many places.
+# Boundaries are looked for on this many rays from each patch's middle, at this many places.
 RAYS, RAY_PLACES = 32, 16
 # Surfaces have terms beyond a sextic's, which count more and more outward: at a radius from the middle the
 # deviation of K is larger by the exponential of this (python -m benchmarks.atlas).
@@ -131,10 +131,10 @@ def _crossings(charts: Charts, node: int) -> _Crossing:
     pairs = charts.pairs(points)
     weights = node_weights(charts, pairs)
     cosine = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
-    wall = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > FACING)
+    same_sheet = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > FACING)
     own = pairs.node == node
     mine = np.bincount(pairs.place[own], weights[own], len(points))
-    others = np.where(wall & ~own, weights, 0.0)
+    others = np.where(same_sheet & ~own, weights, 0.0)
     which = least_of(pairs.place, -others, len(points))
     best = np.append(others, 0.0)[which]
     ratio = np.log(np.maximum(best, 1e-300)) - np.log(np.maximum(mine, 1e-300))

@@ -19,21 +19,21 @@ from .cubic_spline import CUBIC, SIDE, cubics, weights_at
 
 # python -m benchmarks.atlas judges these.
 MARGIN = 1.12  # A patch counts to this share of its domain's radius: beside a crease it ends a step early.
-AZIMUTHS = 96  # The radius of a domain is stored in so many directions.
+AZIMUTHS = 96  # The radius of a domain is stored in this many directions.
 REACH = 0.5  # A patch is asked about places up to this share of its radius above or below it.
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius beside the normal at its foot has no foot.
 FLAT = 0.15  # A patch is flat if it is nowhere steeper than this slope to its own plane.
 STEEPEST = 0.4  # Where a patch is steeper, this cosine to its own plane, it has no feet: heights run away.
-CHUNK = 24_000  # So many pairs of a place and a patch fit into the processor's cache at once.
+CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor's cache at once.
 
 
 class Pairs(NamedTuple):
-    """What patches say of places near them: m pairs of a place and a patch, sorted by place.
+    """Patches near places: m pairs of a place and a patch, sorted by place.
 
     place, node : (m,), indices
-    share : (m,), how far out the foot of the place is, as a share of the domain's radius there
+    rho : (m,), how far out the foot of the place is, as a share of the domain's radius there
     distance : (m,), signed distance of the place from the patch
     normal : (m, 3), unit normal of the patch at the foot
     std : (m,), standard deviation of the distance
@@ -41,7 +41,7 @@ class Pairs(NamedTuple):
 
     place: NDArray[np.intp]
     node: NDArray[np.intp]
-    share: Array
+    rho: Array
     distance: Array
     normal: Array
     std: Array
@@ -70,7 +70,7 @@ class Charts:
     rims: Array
 
     def pairs(self, points: Array, near: float = np.inf, margin: float = MARGIN) -> Pairs:
-        """What patches say of places (k, 3) within the length `near`, and within REACH, of them.
+        """Pairs of places (k, 3) and the patches within the length `near`, and within REACH, of them.
 
         margin : how far out a patch counts, as a share of its domain's radius
         """
@@ -144,11 +144,11 @@ class Charts:
         h, hx, hy = self._heights(x, y, node)
         off = (z - h) / (1.0 + hx**2 + hy**2)
         foot_x, foot_y = x + off * hx, y + off * hy
-        share = self.shares(foot_x, foot_y, node)
+        rho = self.shares(foot_x, foot_y, node)
         # The foot of a place on a slope is nearer than the surface below it.
-        inside = (share < margin) & (np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[node])
+        inside = (rho < margin) & (np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[node])
         which = np.flatnonzero(inside)
-        place, node, share = place[which], node[which], share[which]
+        place, node, rho = place[which], node[which], rho[which]
         x, y, z, foot_x, foot_y = np.array([x, y, z, foot_x, foot_y])[:, which]
         h, hx, hy = self._heights(foot_x, foot_y, node)
         steep, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[node]
@@ -156,7 +156,7 @@ class Charts:
         aside = (x - foot_x) ** 2 + (y - foot_y) ** 2 + (z - h) ** 2 - distance**2
         std = self.stds_at(foot_x, foot_y, node) * steep
         normal = self._turned(node, np.array([-hx * steep, -hy * steep, steep]))
-        pairs = Pairs(place, node, share, distance * radius, normal, std * radius)
+        pairs = Pairs(place, node, rho, distance * radius, normal, std * radius)
         return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[node]) & (steep > STEEPEST))
 
     def _turned(self, node: NDArray[np.intp], local: Array) -> Array:

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sharp edges and corners of a mesh: vertices where the walls of two or three patches meet.
+"""Sharp edges and corners of a mesh: vertices where the sheets of two or three patches meet.
 
 Beside the paper; like the extended marching cubes of Kobbelt et al. 2001. An edge of the mesh whose ends lie
-on two walls crosses their crease. The end that is near the crease moves onto it, or the edge is split there.
-At a corner one triangle has its vertices on three walls.
+on two sheets crosses their crease. The end that is near the crease moves onto it, or the edge is split there.
+At a corner one triangle has its vertices on three sheets.
 """
 
 from collections.abc import Generator, Iterator
@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from .charts import Charts
-from .field import wall_facing
+from .field import sheet_facing
 from .tetrahedra import Indices, sides_of, split_sides
 
 # python -m benchmarks.atlas judges these.
-SHARP = 0.87  # Two walls meet at a crease where the cosine between their normals is less.
-AWAY = 1.5  # A crease is at most so many edges of the mesh from the middle of the edge that crosses it.
+SHARP = 0.87  # Two sheets meet at a crease where the cosine between their normals is less.
+AWAY = 1.5  # A crease is at most this many edges of the mesh from the middle of the edge that crosses it.
 SNAP = 0.35  # A vertex that is nearer to a crease than this share of an edge moves onto it.
-NEWTON = 3  # The planes of walls are intersected so often.
+NEWTON = 3  # The planes of sheets are intersected this often.
 ROUND = 0.02  # A crease that is farther than this share of an edge from another patch is rounded.
-SIDES_AT_ONCE = 1000  # A step intersects so many walls.
-LEAST = 1e-12  # Walls are parallel below this share of their squared sines.
+SIDES_AT_ONCE = 1000  # A step intersects this many sheets.
+LEAST = 1e-12  # Sheets are parallel below this share of their squared sines.
 
 
 class Creased(NamedTuple):
@@ -43,7 +43,7 @@ class Creased(NamedTuple):
 
 
 class _Met(NamedTuple):
-    """Points (n, 3) where walls meet, how far patches are from there (n,), and whether they meet (n,)."""
+    """Points (n, 3) where sheets meet, how far patches are from there (n,), and whether they meet (n,)."""
 
     points: Array
     unfelt: Array
@@ -55,7 +55,7 @@ def creased(
 ) -> Generator[float, None, Creased]:
     """The mesh with vertices on all creases and corners; yields the share that is done.
 
-    normals : (n, 3), those of the walls on which the vertices (n, 3) lie
+    normals : (n, 3), those of the sheets on which the vertices (n, 3) lie
     edge : the length of the edges
     """
     vertices, free, unfelt = vertices.copy(), np.ones(len(vertices), dtype=bool), np.zeros(len(vertices))
@@ -99,7 +99,7 @@ def _nearest(vertices: Array, sides: Indices, points: Array, edge: float) -> tup
 def _corners(
     charts: Charts, vertices: Array, normals: Array, triangles: Indices, edge: float
 ) -> Iterator[tuple[Array, float, int]]:
-    """Corners (3,) of triangles on three walls, how far patches are from there, and vertices that move there.
+    """Corners (3,) of triangles on three sheets, how far patches are from there, and vertices to move.
 
     Near a tip several triangles have the same corner: the vertex is of as many of these as possible.
     """
@@ -116,9 +116,9 @@ def _corners(
 
 
 def _intersections(charts: Charts, places: Array, normals: Array, edge: float) -> _Met:
-    """Where walls meet.
+    """Where sheets meet.
 
-    places, normals : (n, 2 or 3, 3), a place on each wall, and its normal there
+    places, normals : (n, 2 or 3, 3), a place on each sheet, and its normal there
     """
     count, middle = normals.shape[1], places.mean(axis=1)
     longest = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2).max(axis=1)
@@ -126,18 +126,18 @@ def _intersections(charts: Charts, places: Array, normals: Array, edge: float) -
     points, met = middle.copy(), np.ones(len(places), dtype=bool)
     for _ in range(NEWTON):
         up, felt = normals.copy(), np.zeros(len(places), dtype=bool)
-        # Where no patch reaches, the wall goes on as a plane.
+        # Where no patch reaches, the sheet goes on as a plane.
         distance = np.einsum("nki,nki->nk", points[:, None] - places, normals)
         for i in range(count):
-            wall = wall_facing(charts, points, normals[:, i], near)
-            there = wall.node >= 0
+            sheet = sheet_facing(charts, points, normals[:, i], near)
+            there = sheet.node >= 0
             felt |= there
-            up[there, i], distance[there, i] = wall.normal[there], wall.distance[there]
+            up[there, i], distance[there, i] = sheet.normal[there], sheet.distance[there]
         steps, apart = _steps(up, distance)
         met &= apart
         points += np.where(met[:, None], steps, 0.0)
         met &= np.linalg.norm(points - middle, axis=1) < near
-    if count == 3:  # Near a tip the walls of patches merge, but the planes of the vertices still meet there.
+    if count == 3:  # Near a tip the sheets of patches merge, but the planes of the vertices still meet there.
         distance = np.einsum("nki,nki->nk", middle[:, None] - places, normals)
         steps, apart = _steps(normals, distance)
         tip = ~met & apart & (np.linalg.norm(steps, axis=1) < near)
@@ -147,7 +147,7 @@ def _intersections(charts: Charts, places: Array, normals: Array, edge: float) -
     pairs = charts.pairs(points, edge)
     toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.place])
     own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.place]).max(axis=1)
-    rounded = (toward > own) & (pairs.share < 1.0) & (np.abs(pairs.distance) > ROUND * edge)
+    rounded = (toward > own) & (pairs.rho < 1.0) & (np.abs(pairs.distance) > ROUND * edge)
     met[pairs.place[rounded]] = False
     return _Met(points, np.where(felt, 0.0, np.linalg.norm(points - middle, axis=1)), met)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arguments import Array
 
-# There are so many knots along each axis, evenly spaced over [-half, half]; benchmarks.atlas chose it.
+# There are this many knots along each axis, evenly spaced over [-half, half]; benchmarks.atlas chose it.
 SIDE, CUBIC = 23, 3
 EDGE_ROUNDING = 1e-9  # Places at the edge of the square are so much inside, as a share of the pitch.
 # The weights of four knots as polynomials of the share of the way between the middle two; and their slopes.

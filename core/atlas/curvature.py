@@ -17,7 +17,7 @@ from .meshing import LEAST_DIVISOR, Mesh
 from .tetrahedra import Indices
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
-SAGITTA = 80.0  # A quadric is so wide that its sagitta is so many deviations of the surface.
+SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations of the surface.
 LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
 EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nearest 128 at most, 6 at least.
 TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.

@@ -17,7 +17,7 @@ from .finger import Finger
 from .rims import felt_rim
 from .touching import FIRST_EXTENT, NEAR, SIZE
 
-# Patches overlap, so that all have so many times the area of the object: python -m benchmarks.add_menu.
+# Patches overlap, so that all have this many times the area of the object: python -m benchmarks.add_menu.
 OVERLAP = 2.0
 
 

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface of many patches near a place: walls, and the creases where these meet.
+"""The surface of many patches near a place: sheets, and the creases where these meet.
 
 Beside the paper. Which way the surface faces follows from the indicator of the whole object. Patches that
-face much alike are one wall: a partition of unity with the weights of Ohtake et al. 2003 over each patch's
-variance. Where walls meet, the inside is in both (a convex crease) or in either (a concave one), as the
+face much alike are one sheet: a partition of unity with the weights of Ohtake et al. 2003 over each patch's
+variance. Where sheets meet, the inside is in both (a convex crease) or in either (a concave one), as the
 indicator has it on both sides of the crease.
 """
 
@@ -20,23 +20,23 @@ from .indicator import Indicator
 # python -m benchmarks.atlas judges these.
 OUTERMOST = 0.999  # Weights beyond this share of MARGIN are those there, so that none is 0.
 FLOOR = 1e-3  # No deviation below this share of the radius counts in a weight.
-# The cosines of 37 and of 53 degrees: patches that turn by less are one wall, from there on they fade out of
-# it, and those that turn by more are another wall.
+# The cosines of 37 and of 53 degrees: patches that turn by less are one sheet, from there on they fade out of
+# it, and those that turn by more are another sheet.
 AGREE, APART = 0.8, 0.6
-FLAT_AGREE, FLAT_APART = 0.87, 0.75  # Those of flat patches, of 30 and 41 degrees: these end where walls do.
-# Patches of one wall differ in distance by at most this share of the radius, and this share of the distance
+FLAT_AGREE, FLAT_APART = 0.87, 0.75  # Those of flat patches, of 30 and 41 degrees: these end where sheets do.
+# Patches of one sheet differ in distance by at most this share of the radius, and this share of the distance
 # more.
 LAYER, SLANT = 0.15, 0.5
 INSIDE = 1.0  # A patch covers what is within this share of its domain's radius.
 SIDEWAYS = 0.15  # A patch faces as the indicator does if the cosine between their normals is more.
 CONTINUED = 1.6  # Where no patch is, those count that can be continued by this factor of their radius.
-FARTHEST = 10.0  # A crease is looked for within so many cells along the normals of its walls.
-LEAST_SINE = 0.1  # Walls of a crease count as turned by this much at least.
-WALLS = 3  # At most so many walls meet at a place.
+FARTHEST = 10.0  # A crease is looked for within this many cells along the normals of its sheets.
+LEAST_SINE = 0.1  # Sheets of a crease count as turned by this much at least.
+SHEETS = 3  # At most this many sheets meet at a place.
 
 
 class Blend(NamedTuple):
-    """A wall, or the surface, near k places.
+    """A sheet, or the surface, near k places.
 
     distance, std : (k,), signed, and its deviation; 0 and inf where no patch reaches
     normal : (k, 3), the gradient
@@ -49,7 +49,7 @@ class Blend(NamedTuple):
     node: NDArray[np.intp]
 
     def chosen(self, which: NDArray[np.intp]) -> "Blend":
-        """The wall near some of the places."""
+        """The sheet near some of the places."""
         return Blend(self.distance[which], self.std[which], self.normal[which], self.node[which])
 
     def where(self, which: NDArray[np.bool_], other: "Blend") -> "Blend":
@@ -66,42 +66,42 @@ class Surface(NamedTuple):
     """The surface near k places.
 
     distance, std, normal, node : as in a Blend
-    share : (k,), how far out the places are on the patch where they are least so; inf where no patch reaches
-    creases : (k,), the number of other walls there
+    rho : (k,), how far out the places are on the patch where they are least so; inf where no patch reaches
+    creases : (k,), the number of other sheets there
     """
 
     distance: Array
     std: Array
     normal: Array
     node: NDArray[np.intp]
-    share: Array
+    rho: Array
     creases: NDArray[np.intp]
 
     def chosen(self, which: NDArray[np.intp]) -> "Surface":
         """The surface near some of the places."""
-        distance, std, normal, node, share, creases = self
-        return Surface(distance[which], std[which], normal[which], node[which], share[which], creases[which])
+        distance, std, normal, node, rho, creases = self
+        return Surface(distance[which], std[which], normal[which], node[which], rho[which], creases[which])
 
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
     """The weights (m,) of patches in a blend."""
-    return weights_of(pairs.share, pairs.std, charts.radii[pairs.node])
+    return weights_of(pairs.rho, pairs.std, charts.radii[pairs.node])
 
 
-def weights_of(share: Array, std: Array, radius: Array) -> Array:
+def weights_of(rho: Array, std: Array, radius: Array) -> Array:
     """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), where u is how far out a foot is, 1 at MARGIN."""
-    u = np.minimum(share / MARGIN, OUTERMOST)
+    u = np.minimum(rho / MARGIN, OUTERMOST)
     weights: Array = (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (std**2 + (FLOOR * radius) ** 2)
     return weights
 
 
 def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius: Array) -> Array:
-    """From 1 to 0, (m,), how much patches belong to the wall with normals `up` (m, 3) at distances `offset`.
+    """From 1 to 0, (m,), how much patches belong to the sheet with normals `up` (m, 3) at distances `offset`.
 
-    radius : (m,), that of a patch of the wall
+    radius : (m,), that of a patch of the sheet
     """
-    room = LAYER * np.maximum(charts.radii[pairs.node], radius) + SLANT * np.abs(offset)
-    return _facing(charts, pairs, up) * _within(pairs.distance - offset, room)
+    band = LAYER * np.maximum(charts.radii[pairs.node], radius) + SLANT * np.abs(offset)
+    return _facing(charts, pairs, up) * _within(pairs.distance - offset, band)
 
 
 def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
@@ -114,60 +114,60 @@ def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
     return agree
 
 
-def _within(off: Array, room: Array) -> Array:
-    """From 1 to 0, (m,), as lengths come near the room for them."""
-    inside: Array = np.clip(1.0 - (off / room) ** 2, 0.0, 1.0)
+def _within(off: Array, band: Array) -> Array:
+    """From 1 to 0, (m,), as lengths come near the band for them."""
+    inside: Array = np.clip(1.0 - (off / band) ** 2, 0.0, 1.0)
     return inside * inside
 
 
-def walls_at(charts: Charts, pairs: Pairs, count: int) -> list[Blend]:
-    """At most so many walls at each of `count` places, the nearest first, of pairs of places and patches."""
-    weights, walls = node_weights(charts, pairs), []
-    for _ in range(WALLS):
-        key = np.abs(pairs.distance) + 0.5 * LAYER * charts.radii[pairs.node] * pairs.share**2
+def sheets_at(charts: Charts, pairs: Pairs, count: int) -> list[Blend]:
+    """At most SHEETS sheets at each of `count` places, the nearest first, of pairs of places and patches."""
+    weights, sheets = node_weights(charts, pairs), []
+    for _ in range(SHEETS):
+        key = np.abs(pairs.distance) + 0.5 * LAYER * charts.radii[pairs.node] * pairs.rho**2
         nearest = least_of(pairs.place, key, count)[pairs.place]
         up, offset, radius = pairs.normal[nearest], pairs.distance[nearest], charts.radii[pairs.node[nearest]]
         alike = facing_alike(charts, pairs, up, offset, radius)
-        walls.append(_mean(pairs, weights * alike, count))
+        sheets.append(_mean(pairs, weights * alike, count))
         left = np.flatnonzero(alike <= 0.0)
         pairs, weights = pairs.chosen(left), weights[left]
-    return walls
+    return sheets
 
 
-def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, room: float) -> Surface:
+def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, band: float) -> Surface:
     """The surface within a length of places (k, 3) that faces about as `up` (k, 3)."""
-    found = patched(charts, indicator, points, up, room)
+    found = patched(charts, indicator, points, up, band)
     lost = np.flatnonzero(found.node < 0)
     if len(lost):
-        farther = patched(charts, indicator, points[lost], up[lost], room, CONTINUED)
+        farther = patched(charts, indicator, points[lost], up[lost], band, CONTINUED)
         for old, new in zip(found, farther, strict=True):
             old[lost] = new
     return found
 
 
 def patched(
-    charts: Charts, indicator: Indicator, points: Array, up: Array, room: float, margin: float = MARGIN
+    charts: Charts, indicator: Indicator, points: Array, up: Array, band: float, margin: float = MARGIN
 ) -> Surface:
     """The surface of `surface_at`, but only where patches are that count as far out as a margin."""
-    pairs, count = charts.pairs(points, room, margin), len(points)
+    pairs, count = charts.pairs(points, band, margin), len(points)
     pairs = pairs.chosen(np.einsum("mi,mi->m", pairs.normal, up[pairs.place]) > SIDEWAYS)
-    share = np.full(count, np.inf)
-    np.minimum.at(share, pairs.place, pairs.share)
-    walls = walls_at(charts, pairs, count)
-    found, several = walls[0], np.flatnonzero(walls[1].node >= 0)
+    rho = np.full(count, np.inf)
+    np.minimum.at(rho, pairs.place, pairs.rho)
+    sheets = sheets_at(charts, pairs, count)
+    found, several = sheets[0], np.flatnonzero(sheets[1].node >= 0)
     if len(several):
-        some = [wall.chosen(several) for wall in walls]
+        some = [sheet.chosen(several) for sheet in sheets]
         for old, new in zip(found, _met(indicator, points[several], some), strict=True):
             old[several] = new
-    return Surface(*found, share, (walls[1].node >= 0).astype(np.intp) + (walls[2].node >= 0))
+    return Surface(*found, rho, (sheets[1].node >= 0).astype(np.intp) + (sheets[2].node >= 0))
 
 
-def _met(indicator: Indicator, points: Array, walls: list[Blend]) -> Blend:
-    """The surface of two or three walls at places (k, 3)."""
-    one, two, three = walls
+def _met(indicator: Indicator, points: Array, sheets: list[Blend]) -> Blend:
+    """The surface of two or three sheets at places (k, 3)."""
+    one, two, three = sheets
     convex = [_is_convex(indicator, points, a, b) for a, b in ((one, two), (one, three), (two, three))]
     third = three.node >= 0
-    # Of three creases at a corner two are alike: the walls of the other one meet first.
+    # Of three creases at a corner two are alike: the sheets of the other one meet first.
     last = third & (convex[0] == convex[1]) & (convex[0] != convex[2])
     middle = third & (convex[0] == convex[2]) & (convex[0] != convex[1])
     a, b, c = two.where(last, one), three.where(last | middle, two), one.where(last, two.where(middle, three))
@@ -177,12 +177,12 @@ def _met(indicator: Indicator, points: Array, walls: list[Blend]) -> Blend:
 
 
 def _both(a: Blend, b: Blend, convex: NDArray[np.bool_]) -> Blend:
-    """The surface of two walls, inside both where their crease is convex, and inside either elsewhere."""
+    """The surface of two sheets, inside both where their crease is convex, and inside either elsewhere."""
     return b.where((b.distance > a.distance) == convex, a)
 
 
 def _is_convex(indicator: Indicator, points: Array, a: Blend, b: Blend) -> NDArray[np.bool_]:
-    """Whether the crease of two walls near places (k, 3) is convex: on both sides of it is the outside."""
+    """Whether the crease of two sheets near places (k, 3) is convex: on both sides of it is the outside."""
     cosine = np.einsum("ki,ki->k", a.normal, b.normal)
     sine = np.maximum(1.0 - cosine**2, LEAST_SINE**2)
     most = FARTHEST * indicator.cell
@@ -193,8 +193,8 @@ def _is_convex(indicator: Indicator, points: Array, a: Blend, b: Blend) -> NDArr
     return indicator.at(crease + across) + indicator.at(crease - across) < 0.0
 
 
-def wall_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
-    """The wall with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
+def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
+    """The sheet with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
     pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
     alike = _facing(charts, pairs, up[pairs.place]) * _within(pairs.distance, near[pairs.place])
     return _mean(pairs, node_weights(charts, pairs) * alike, len(points))
@@ -203,7 +203,7 @@ def wall_facing(charts: Charts, points: Array, up: Array, near: Array | float) -
 def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
     """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3)."""
     pairs = charts.pairs(points)
-    on = pairs.share < INSIDE
+    on = pairs.rho < INSIDE
     on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
     on &= _facing(charts, pairs, normals[pairs.place]) > 0.0
     found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
@@ -225,7 +225,7 @@ def least_of(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[
 
 
 def _mean(pairs: Pairs, w: Array, count: int) -> Blend:
-    """Weighted means. Deviations do not average out, because patches that share contacts err alike."""
+    """Weighted means. Deviations do not average out, because patches that rho contacts err alike."""
     place = pairs.place
 
     def total(values: Array) -> Array:

@@ -16,11 +16,11 @@ from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of
 from ..contours.finger import ALIKE, Contact, Hit, Surface, contact_of
 
 # python -m benchmarks.atlas judges these.
-DISK_PLACES = 36  # A disk around a contact is felt at so many places.
+DISK_PLACES = 36  # A disk around a contact is felt at this number of places.
 LOW = 0.1  # The finger comes down on a place from at most this share of the radius above it.
 ABOVE = 0.6  # The finger is this share of the disk's radius above a contact when it feels around it.
 HAIR = 0.02  # The finger slides along the surface this share of the radius above it.
-FACING = 0.34  # The cosine of 70 degrees: what turns away by more is another wall.
+FACING = 0.34  # The cosine of 70 degrees: what turns away by more is another sheet.
 
 
 class Finger(NamedTuple):

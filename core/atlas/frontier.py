@@ -28,27 +28,27 @@ from .reference_mesh import ReferenceMesh
 from .rims import felt_rim
 
 # python -m benchmarks.atlas judges these.
-RIM = 24  # Each rim has so many places.
+RIM = 24  # Each rim has this many places.
 # The finger taps each patch at these shares of its rim, on every first or second ray to RIM places.
 BETWEEN = ((0.97, 1), (0.6, 2))
 REACHES = (0.35, 0.12, 0.04)  # The finger goes on by these shares of the radius, until something is new.
-DISK_REACHES = 3.0  # What is new is measured on a disk of so many reaches, at most the patch's radius.
+DISK_REACHES = 3.0  # What is new is measured on a disk of this many reaches, at most the patch's radius.
 BORDER_RADIUS, BORDER_APART = (
     5.0,
     0.5,
-)  # Places on the border of a mesh have a radius of so many edges, and are so many radii apart.
-OFF = 0.5  # Beyond a border a contact counts from so many edges off the mesh.
+)  # Places on the border of a mesh have a radius of this many edges, and are this many radii apart.
+OFF = 0.5  # Beyond a border a contact counts from this many edges off the mesh.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
-IN_VAIN = 2.0  # What is within so many radii of the least patch of a touch in vain brings nothing, too.
-TRIES = 3  # Touches go on from a place at most so many times.
-LOOK = 15  # So many other places are looked at together with the first of the queue, which is faster.
+IN_VAIN = 2.0  # What is within this many radii of the least patch of a touch in vain brings nothing, too.
+TRIES = 3  # Touches go on from a place at most this many times.
+LOOK = 15  # This many other places are looked at together with the first of the queue, which is faster.
 ALONG = 0.9  # A direction is along another if the cosine of the angle between them is more.
-PLACES_AT_ONCE = 2000  # A step looks whether so many places are covered.
-TOUCHES_APART = 2.2  # Touches that are made side by side are so many radii apart.
+PLACES_AT_ONCE = 2000  # A step looks whether this many places are covered.
+TOUCHES_APART = 2.2  # Touches that are made side by side are this many radii apart.
 
 # Kernels of linear algebra round differently, which may not choose between what is equal but for rounding.
 TIE = 1e-6  # Distances within this share of the largest count as equal.
-GAIN_DIGITS = 9  # Gains are areas in the caller's unit, and equal if so many significant digits are.
+GAIN_DIGITS = 9  # Gains are areas in the caller's unit, and equal if this many significant digits are.
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from ..arguments import Array
 
 # python -m benchmarks.atlas judges these.
-LAYERS = 3.0  # So many cells across a wall resolve it.
+LAYERS = 3.0  # This many cells across a wall resolve it.
 BORDER = 0.1  # The grid is wider than the samples by this share of the size, on each side.
 MOST_CELLS = 16_000_000  # More cells, of four bytes each, and a copy of them would take too much memory.
-SAMPLES_AT_ONCE = 3000  # A step takes so many samples,
-CELLS_AT_ONCE = 500_000  # or so many cells.
+SAMPLES_AT_ONCE = 3000  # A step takes this many samples,
+CELLS_AT_ONCE = 500_000  # or this many cells.
 NEAR = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=-1).reshape(
     -1, 3
 )  # A B-spline's cells.

@@ -16,20 +16,20 @@ from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .cubic_spline import SIDE, between
-from .field import LAYER, wall_facing
+from .field import LAYER, sheet_facing
 from .finger import FACING
 from .smoothing_spline import preparing, smoothing_spline
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.
 UNDOUBTED = 2.0  # A contact that is off a patch by fewer of its deviations weighs 1.
-LOOSER = 5.0  # So many times larger they count a radius beyond the rim, where a patch is less certain.
-FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another wall.
+LOOSER = 5.0  # This many times larger they count a radius beyond the rim, where a patch is less certain.
+FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another sheet.
 LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
-PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes so many patches, or so many places.
-FARTHEST_RIM = 1.25  # A patch that is not flat counts up to so many radii of its domain.
-KNOTS_WITHIN = 1.3  # A patch is asked for heights at knots up to so many times its domain's radius.
-ROUNDS = 2  # Patches are moved so often.
+PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes this many patches, or this many places.
+FARTHEST_RIM = 1.25  # A patch that is not flat counts up to this many radii of its domain.
+KNOTS_WITHIN = 1.3  # A patch is asked for heights at knots up to this many times its domain's radius.
+ROUNDS = 2  # Patches are moved this often.
 MOVED = 0.03  # A place of a patch is moved by less than this share of the radius.
 
 Table = tuple[Array, float, Array, Array]  # Radii of the domain, half the side, coefficients, deviations.
@@ -89,7 +89,7 @@ def _joined_table(
     half = _half(rim)
     least = max(noise / r.radius, LEAST_NOISE)
     likely = np.hypot(least, UNDOUBTED * r.mean_height_std / r.radius)
-    likely = likely * (1.0 + LOOSER * np.maximum(some.share - 1.0, 0.0))
+    likely = likely * (1.0 + LOOSER * np.maximum(some.rho - 1.0, 0.0))
     off = np.abs(some.distance) / (r.radius * likely)
     facing = np.einsum("mi,mi->m", some.normal, normals[some.place]) > ALIGNED
     on = own[some.place] | ((off < FARTHEST) & facing)
@@ -125,7 +125,7 @@ def agreed(charts: Charts) -> Joining:
 def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
     """How far patches (k,) have to move above local (x, y), in unit radius, to lie on the blend."""
     points, normals = charts.world(node, x, y)
-    field = wall_facing(charts, points, normals, LAYER * charts.radii[node])
+    field = sheet_facing(charts, points, normals, LAYER * charts.radii[node])
     up = np.einsum("ki,ki->k", field.normal, charts.axes[node, :, 2])
     move = -field.distance / np.maximum(up, FACING) / charts.radii[node]
     on = (field.node >= 0) & (up > FACING) & (np.abs(move) < MOVED)

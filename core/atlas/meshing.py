@@ -21,21 +21,21 @@ from .indicator import Indicator
 from .tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
 
 # python -m benchmarks.atlas judges these.
-CELL = 2.1  # A cube of the lattice is as long as so many edges of the mesh.
+CELL = 2.1  # A cube of the lattice is as long as this many edges of the mesh.
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
-SMOOTHINGS = 3  # So often vertices move toward their neighbors' mean.
-BESIDE = 8  # A place is felt if it is beside one of so many contacts that are nearest:
-BETWEEN = 1.5  # up to so many times as far from it as its neighbors are,
+SMOOTHINGS = 3  # This often vertices move toward their neighbors' mean.
+BESIDE = 8  # A place is felt if it is beside one of this many contacts that are nearest:
+BETWEEN = 1.5  # up to this many times as far from it as its neighbors are,
 ONE_SIDED = 0.75  # if the mean of the directions to these is shorter; it is 2 / pi on a straight border.
-BRIDGED = 4.0  # Holes that are not larger than so many cells of the indicator are bridged.
-# Vertices that were off by more cells, or are of folded triangles, are moved again, so often.
+BRIDGED = 4.0  # Holes that are not larger than this many cells of the indicator are bridged.
+# Vertices that were off by more cells, or are of folded triangles, are moved again, this often.
 FAR, STEPS = 0.05, 4
 WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none is lost between them.
 CONTINUED_STD = 0.25  # The deviation of what is continued beyond all patches is this share of the way there.
-ROOM = 5.0  # The surface is within so many cells of the level of the indicator.
-HALVINGS = 5  # So many halvings of an edge of the lattice find the level.
-LATTICE_AT_ONCE = 100_000  # A step takes so many points of the lattice,
-PLACES_AT_ONCE = 3000  # or the surface near so many places.
+BAND = 5.0  # The surface is within this many cells of the level of the indicator.
+HALVINGS = 5  # This many halvings of an edge of the lattice find the level.
+LATTICE_AT_ONCE = 100_000  # A step takes this many points of the lattice,
+PLACES_AT_ONCE = 3000  # or the surface near this many places.
 # The squares of an edge and of a cube's side take so much memory, and a mesh takes at most so much.
 EDGE_BYTES, LATTICE_BYTES, MOST_BYTES = 900.0, 17_000.0, 2e9
 LEAST_DIVISOR = 1e-300  # No vector is divided by less.
@@ -176,13 +176,13 @@ def meshed(
     edge = min(edge, WALL * indicator.resolved)
     size, halvings = lattice_of(indicator, edge)
     vertices, up, triangles = yield from _level(indicator, size)
-    room = max(ROOM * indicator.cell, CLIP * size)
-    vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
+    band = max(BAND * indicator.cell, CLIP * size)
+    vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, band)
     for _ in range(halvings):
         vertices, triangles = halved(vertices, triangles)
         up = indicator.outward(vertices)
         yield 0.7
-        vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, room)
+        vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, band)
     yield 0.9
     found = yield from creased(charts, vertices, triangles, surface.normal, edge)
     yield 0.9
@@ -245,19 +245,19 @@ def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]
 
 
 def _settled(
-    charts: Charts, indicator: Indicator, vertices: Array, up: Array, triangles: Indices, room: float
+    charts: Charts, indicator: Indicator, vertices: Array, up: Array, triangles: Indices, band: float
 ) -> Generator[float, None, tuple[Array, Surface]]:
     """Vertices (k, 3) evened out on the surface, and the surface there; yields the share that is done.
 
-    up : (k, 3), the way outward; room : a length within which the surface is
+    up : (k, 3), the way outward; band : a length within which the surface is
     """
-    surface = yield from _onto(charts, indicator, vertices, up, room)
+    surface = yield from _onto(charts, indicator, vertices, up, band)
     far = np.abs(surface.distance) > FAR * indicator.cell
-    yield from _again(charts, indicator, vertices, up, surface, far, room)
+    yield from _again(charts, indicator, vertices, up, surface, far, band)
     for _ in range(SMOOTHINGS):
         vertices = evened(vertices, surface.normal, triangles)
         yield 0.5
-    surface = yield from _onto(charts, indicator, vertices, up, room)
+    surface = yield from _onto(charts, indicator, vertices, up, band)
     for _ in range(STEPS):
         far = np.abs(surface.distance) > FAR * indicator.cell
         folded = _folded(vertices, surface.normal, triangles)
@@ -265,7 +265,7 @@ def _settled(
             vertices[folded] = evened(vertices, surface.normal, triangles)[folded]
         if not (far | folded).any():
             break
-        yield from _again(charts, indicator, vertices, up, surface, far | folded, room)
+        yield from _again(charts, indicator, vertices, up, surface, far | folded, band)
     return vertices, surface
 
 
@@ -276,12 +276,12 @@ def _again(
     up: Array,
     surface: Surface,
     which: NDArray[np.bool_],
-    room: float,
+    band: float,
 ) -> Generator[float, None, None]:
     """Moves some of the vertices (k, 3) onto the surface again, and changes both in place."""
     some = np.flatnonzero(which)
     moved = vertices[some]
-    again = yield from _onto(charts, indicator, moved, up[some], room)
+    again = yield from _onto(charts, indicator, moved, up[some], band)
     for old, new in zip((vertices, *surface), (moved, *again), strict=True):
         old[some] = new
 
@@ -296,16 +296,16 @@ def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.b
 
 
 def _onto(
-    charts: Charts, indicator: Indicator, vertices: Array, up: Array, room: float
+    charts: Charts, indicator: Indicator, vertices: Array, up: Array, band: float
 ) -> Generator[float, None, Surface]:
     """Moves vertices (k, 3) onto the surface, in place; returns the surface where they were before."""
     parts = []
     for start in range(0, max(len(vertices), 1), PLACES_AT_ONCE):
         some = slice(start, start + PLACES_AT_ONCE)
-        parts.append(surface_at(charts, indicator, vertices[some], up[some], room))
+        parts.append(surface_at(charts, indicator, vertices[some], up[some], band))
         yield 0.5
     surface = Surface(*(np.concatenate(values) for values in zip(*parts, strict=True)))
-    vertices -= np.clip(surface.distance, -room, room)[:, None] * surface.normal
+    vertices -= np.clip(surface.distance, -band, band)[:, None] * surface.normal
     return surface
 
 
@@ -327,8 +327,8 @@ def _felt(
     from scipy.sparse.csgraph import connected_components
 
     yield 0.9
-    near = surface.share < MARGIN
-    inside = near & ((surface.share < INSIDE) | (surface.creases > 0))
+    near = surface.rho < MARGIN
+    inside = near & ((surface.rho < INSIDE) | (surface.creases > 0))
     beyond = triangles[~inside[triangles].all(axis=1)]
     links = np.ones(2 * len(beyond)), (beyond[:, :2].ravel(), beyond[:, 1:].ravel())
     count, piece = connected_components(coo_matrix(links, (len(vertices),) * 2))

@@ -28,15 +28,15 @@ from .samples import indicated
 # Edges that are chosen by the curvature are between these shares of the size, those for thin walls above the
 # last one.
 FINE, SHARE, FINEST = 1.0 / 160.0, 1.0 / 60.0, 4e-3
-LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above so many tolerances.
-OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from so many of both away.
-IMPROVABLE = 1.0  # A touch improves the surface where a contact is so many tolerances away.
+LIMIT, ROUGH = 1.5, 0.01  # At most this share of the surface has a deviation above this many tolerances.
+OFF_STDS, OFF_TOLERANCES = 5.0, 3.0  # A contact contradicts the surface from this many of both away.
+IMPROVABLE = 1.0  # A touch improves the surface where a contact is this many tolerances away.
 THIN = 0.9  # Walls are resolved from this share of the thickness that cells are made for.
-BORDER = 2.0  # Beyond the border of the mesh it does from so many edges away.
-WITHIN_90 = 1.645  # So many deviations are a 90 % interval.
-WIDENINGS = 4  # Deviations grow so often until 90 % of the check's contacts are within.
-AT_ONCE = 3000  # Distances are found for so many places at once,
-CURVED_AT_ONCE = 1000  # and curvatures at so many.
+BORDER = 2.0  # Beyond the border of the mesh it does from this many edges away.
+WITHIN_90 = 1.645  # This many deviations are a 90 % interval.
+WIDENINGS = 4  # Deviations grow this often until 90 % of the check's contacts are within.
+AT_ONCE = 3000  # Distances are found for this many places at once,
+CURVED_AT_ONCE = 1000  # and curvatures at this many.
 TURNS, STEPS = (0.0, 60.0, 120.0), 12  # The planes of the next touch, and the steps of a half curve.
 GRAPH_VERSION = 2  # The version of the graph as plain values.
 
@@ -63,7 +63,7 @@ class Check(NamedTuple):
 
     points, normals : (n, 3), where it met the object
     missed : (k, 3), places of the surface that it did not meet
-    at_random : so many contacts are at random places, and come first; the others are where errors are likely
+    at_random : the number of contacts at random places, which come first; at the others errors are likely
     """
 
     points: Array

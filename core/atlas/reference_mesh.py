@@ -19,17 +19,17 @@ from .meshing import LEAST_DIVISOR, Mesh
 from .tetrahedra import Indices
 
 # python -m benchmarks.atlas judges these.
-NEAREST = 3  # The nearest triangle is looked for at so many of the nearest vertices.
+NEAREST = 3  # The nearest triangle is looked for at this many of the nearest vertices.
 SAME = 1e-6  # Triangles that are nearer by a smaller share of the distance are as near.
 AHEAD = 0.95  # The normal at a foot gives the sign if the cosine of its angle to the way there is more.
-FAR = 2.0  # Places that are farther away than so many cells have the sign of the indicator.
+FAR = 2.0  # Places that are farther away than this many cells have the sign of the indicator.
 PREPARED = ("tree", "fans", "edge", "normals", "is_open", "angles")  # Each is found once for a mesh.
 # python -m benchmarks.measured judges these: where the surface goes on unfelt,
-SHALLOW = 1.0  # the inside is known so many cells below the surface,
+SHALLOW = 1.0  # the inside is known this many cells below the surface,
 CLOSED = 0.25  # and where the indicator is above its level by more: felt area is around it;
-REACHES = 3.0  # the outside is known so many times farther than the foot is from the border,
+REACHES = 3.0  # the outside is known this many times farther than the foot is from the border,
 ABOVE = 0.12  # and up to this share of the size,
-BEYOND = 1.0  # and the surface is known so many edges beyond the border.
+BEYOND = 1.0  # and the surface is known this many edges beyond the border.
 ON_SIDE = 1e-6  # A foot with a smaller weight of a vertex is on the side across from it.
 
 

@@ -20,15 +20,15 @@ from .finger import Finger
 from .join import FARTHEST_RIM
 
 # python -m benchmarks.atlas judges these.
-TAPS = 48  # The finger taps along so many rays,
+TAPS = 48  # The finger taps along this many rays,
 INNER = (0.25, 0.5, 0.75, 1.0, FARTHEST_RIM)  # at these shares of the domain's radius,
 OUTER = FARTHEST_RIM * 1.12 ** np.arange(1, 7)  # and at these where the wall is flat.
 FLAT = 3.0  # It is flat where the finger is nearer to the continued patch by this factor than it has to be.
-HALVINGS = 5  # So many halvings find where a patch ends,
+HALVINGS = 5  # This many halvings find where a patch ends,
 LEAST_RIM = 0.02  # which is at least this share of its largest radius away.
 STEEP = 0.7  # A patch ends where it is steeper, this cosine to its own plane.
 INWARD = 0.98  # A corner is felt at this share of its radius.
-NARROWEST = 5.0  # A patch reaches at most so many times as far as it is wide.
+NARROWEST = 5.0  # A patch reaches at most this many times as far as it is wide.
 SLOPE = 1e-3  # Slopes are differences over this share of the radius.
 
 

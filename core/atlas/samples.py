@@ -14,15 +14,15 @@ from .field import facing_alike, node_weights, weights_of
 from .indicator import LAYERS, Indicator, solved
 
 # python -m benchmarks.atlas judges these.
-PITCH = 1.2  # Samples of a patch are so many cells apart.
+PITCH = 1.2  # Samples of a patch are this many cells apart.
 # Weights of other patches are those of one sample for at most PARTS^2 around, ACROSS^2 or more a patch.
 ACROSS, PARTS = 12, 8
 FINEST, COARSEST = 1.0 / 200.0, 1.0 / 80.0  # Cells are between these shares of the size.
-TOLERANCES = 5.0  # A cell is at most so many tolerances.
+TOLERANCES = 5.0  # A cell is at most this many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall if the cosine between their normals is less.
 THIN_SHARE = 0.01  # Walls are at least as thick as all but this share of the area is.
-CERTAIN = 5.0  # Two sides that are nearer than so many deviations are no wall.
-PATCHES_AT_ONCE, SAMPLES_AT_ONCE = 20, 3000  # A step takes so many patches, or so many samples.
+CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall.
+PATCHES_AT_ONCE, SAMPLES_AT_ONCE = 20, 3000  # A step takes this many patches, or this many samples.
 
 
 def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None, Indicator]:
@@ -113,13 +113,13 @@ def _spread(
 
 
 def _others(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
-    """Weights of the other patches of a wall at local (x, y) of patches, and its thickness, (n,) each."""
+    """Weights of the other patches of a sheet at local (x, y) of patches, and its thickness, (n,) each."""
     points, normals = charts.world(node, x, y)
     pairs, count = charts.pairs(points), len(points)
     up, radius = normals[pairs.place], charts.radii[node[pairs.place]]
     alike = facing_alike(charts, pairs, up, np.zeros(len(up)), radius) * (pairs.node != node[pairs.place])
     others: Array = np.bincount(pairs.place, node_weights(charts, pairs) * alike, count).astype(np.float64)
-    behind = (np.einsum("mi,mi->m", pairs.normal, up) < OPPOSITE) & (pairs.share < 1.0)
+    behind = (np.einsum("mi,mi->m", pairs.normal, up) < OPPOSITE) & (pairs.rho < 1.0)
     behind &= np.abs(pairs.distance) > CERTAIN * pairs.std
     thickness = np.full(count, np.inf)
     np.minimum.at(thickness, pairs.place[behind], np.abs(pairs.distance[behind]))

@@ -28,24 +28,24 @@ from .object_atlas import LIMIT, Atlas, Check, surfaced
 from .reference_mesh import ReferenceMesh
 
 # python -m benchmarks.atlas judges these.
-MOST = 1000  # There are at most so many touches, unless the caller says otherwise.
-FIRST_EXTENT = 300.0  # A half curve of the first touch is at most so many tolerances long.
-GOOD = 10.0  # The first patch is looked for beside the start if its radius is below so many tolerances,
-BESIDE, AROUND = (10.0, 30.0), 8  # so many tolerances away, in so many directions.
-SIZE = 1.4  # A patch may have a mean deviation of so many tolerances before its neighbors are known.
-SMALL = 5.0  # Touches do not go on from a patch whose radius is below so many tolerances.
-NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only so many tolerances.
-SIDE_BY_SIDE = 8  # So many touches at once are faster, and still done in a tenth of a second.
+MOST = 1000  # There are at most this many touches, unless the caller says otherwise.
+FIRST_EXTENT = 300.0  # A half curve of the first touch is at most this many tolerances long.
+GOOD = 10.0  # The first patch is looked for beside the start if its radius is below this many tolerances,
+BESIDE, AROUND = (10.0, 30.0), 8  # at these many tolerances away, in this many directions.
+SIZE = 1.4  # A patch may have a mean deviation of this many tolerances before its neighbors are known.
+SMALL = 5.0  # Touches do not go on from a patch whose radius is below this many tolerances.
+NARROW = 1.0  # Where a touch was in vain before, a patch needs a radius of only this many tolerances.
+SIDE_BY_SIDE = 8  # This many touches at once are faster, and still done in a tenth of a second.
 NEAR = 3.0  # A patch ends where the surface is off it by more tolerances.
-AGAIN = 3  # Where something is missing or less certain, touches go on at most so often.
-CHECKS, CHECK_SEED = 256, 0  # So many rays from outside check the surface.
+AGAIN = 3  # Where something is missing or less certain, touches go on at most this often.
+CHECKS, CHECK_SEED = 256, 0  # This many rays from outside check the surface.
 HAIR = 0.01  # It is cast again this share of the tolerance aside.
-SHARPEST, SPIKES = 64, 16  # So many more go to its sharpest vertices, and to the triangles around so many.
+SHARPEST, SPIKES = 64, 16  # This many go to its sharpest vertices, and to the triangles around the sharpest.
 STRAIGHT = 0.5  # A ray must meet what it is aimed at if the cosine between it and the normal is more.
 JOINED = 0.5  # Joining is this share of the way to a surface that is checked.
-BORDERS = 2  # So often a mesh is moved to the borders that are felt.
-ROUGH_APART = 0.5  # Touches where the surface is less certain are so many radii apart.
-LARGER = 2.0  # A touch reaches at most so many radii of the patch from which it goes on.
+BORDERS = 2  # This often a mesh is moved to the borders that are felt.
+ROUGH_APART = 0.5  # Touches where the surface is less certain are this many radii apart.
+LARGER = 2.0  # A touch reaches at most this many radii of the patch from which it goes on.
 
 Contact = tuple[ArrayLike, ArrayLike]  # A point and its normal, (3,) each.
 
@@ -320,7 +320,7 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     centers = mesh.vertices[mesh.triangles].mean(axis=1)
     aims[: CHECKS // 2] = centers[aimed]
     ways = (aims - middle - away)[: CHECKS // 2]
-    # The triangle's own normal counts: that of a vertex on a crease is between those of its walls.
+    # The triangle's own normal counts: that of a vertex on a crease is between those of its sheets.
     ahead = np.einsum("ni,ni->n", reference.normals[aimed], ways)
     facing = ahead < -STRAIGHT * np.linalg.norm(ways, axis=1)
     sharpest = np.argsort(np.where(reference.is_open, np.inf, reference.angles), kind="stable")[:SHARPEST]

@@ -14,8 +14,8 @@ from ..arguments import LARGEST, Array
 from ..contours.contour import Contour
 
 POINT_COLUMNS, NORMAL_COLUMNS = ("x", "y", "z"), ("nx", "ny", "nz")
-LETTERS_AT_ONCE = 1 << 16  # So many letters are read together.
-LONGEST_LINE = 1 << 20  # Lines have at most so many letters, for the words of one take 80 times its memory.
+LETTERS_AT_ONCE = 1 << 16  # This many letters are read together.
+LONGEST_LINE = 1 << 20  # Lines have at most this many letters, for the words of one take 80 times its memory.
 
 
 class Contacts(NamedTuple):

@@ -22,11 +22,11 @@ from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 
 MOST_APART = 0.1  # A curve may miss the point by this share of its size.
 GAP = 0.25  # Around the point, a curve may have no contacts within this share of its size.
-NEWTON_STEPS = 50  # Gauss-Newton takes at most so many steps; five are the rule.
-MOST_STARTS = 3  # So many starts are tried: curves may come near each other in several places.
-MOST_SEARCHED = 1000  # Starts are looked for among so many contacts of each curve,
-QUERIES = 10**6  # and among so many distances of a contact from a curve.
-CONTACTS_AROUND = 4 * WINDOW  # So many contacts of a curve are looked at around a point.
+NEWTON_STEPS = 50  # Gauss-Newton takes at most this many steps; five are the rule.
+MOST_STARTS = 3  # This many starts are tried: curves may come near each other in several places.
+MOST_SEARCHED = 1000  # Starts are looked for among this many contacts of each curve,
+QUERIES = 10**6  # and among this many distances of a contact from a curve.
+CONTACTS_AROUND = 4 * WINDOW  # This many contacts of a curve are looked at around a point.
 
 
 def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:

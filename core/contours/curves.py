@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..arguments import SMALLEST, Array, unit_vectors
 from .contour import Contour
 
-# So many contacts are "very close to p" (benchmarks.accuracy). The number is even, because a cubic term does
-# not bend a quadratic over equal sides.
+# This many contacts are "very close to p" (benchmarks.accuracy). The number is even, because a cubic term
+# does not bend a quadratic over equal sides.
 WINDOW = 10
 LEAST_CONTACTS = 3  # A contour has more than the quadratic's two unknowns, besides the reference point.
 RIDGE = 1e-12  # This share is added to the equations of r0, r1 and r2, because all s may be the same.

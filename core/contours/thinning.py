@@ -17,7 +17,7 @@ from ..arguments import Array
 from .contour import Contour, alike
 from .curves import WINDOW, besides_point
 
-# With so many contacts a contour no fit is worse, with noise in all directions (tests: test_thinning).
+# With this many contacts a contour no fit is worse, with noise in all directions (tests: test_thinning).
 MOST_CONTACTS = 100
 
 

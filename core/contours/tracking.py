@@ -13,7 +13,7 @@ from ..arguments import LARGEST, Array, finite_array, list_of, number, shown, un
 from .contour import EXTENT, Contour, SamplingPlane, Vector, dot, tangent_of, vector_of
 from .finger import LEAST_IN_PLANE, Surface, contacts, first_contact, section
 
-MOST_IN_HALF = 10_000  # Half a contour has at most so many contacts.
+MOST_IN_HALF = 10_000  # Half a contour has at most this many contacts.
 
 
 def track(

@@ -14,11 +14,11 @@ from ..contours.contour import SamplingPlane
 from ..contours.tracking import generator_of
 from ..reconstruction.options import FitOptions
 
-MOST_EVEN = 24  # At most so many planes are laid out evenly.
+MOST_EVEN = 24  # At most this many planes are laid out evenly.
 
 
 def planes_of(planes: int | Sequence[SamplingPlane]) -> tuple[SamplingPlane, ...]:
-    """So many evenly spread planes, or the planes that are given. Raises ValueError for neither."""
+    """This many evenly spread planes, or the planes that are given. Raises ValueError for neither."""
     if not isinstance(planes, int | np.integer):
         found = tuple(list_of("planes", planes, SamplingPlane))
         if not found:
@@ -35,7 +35,7 @@ class ExplorationOptions:
 
     planes : sampling planes
     farthest, largest_std, tolerance : lengths, or None, as in `explore`
-    most_planes : planes are added until there are so many
+    most_planes : planes are added until there are this many
     extent, step : lengths; None or "auto" if the touch chooses them
     noise, rng, tangent : as in `track`
     method, degree, weight, solver : as in `reconstruct`

@@ -13,7 +13,7 @@ from ..reconstruction.result import Reconstruction
 
 # benchmarks.amount chose these.
 CONTACT_COUNTS = (12, 24, 48)  # The longest half curve has the first of these numbers that suffices.
-SHORTEST = 4  # The shortest half curve has at least so many contacts.
+SHORTEST = 4  # The shortest half curve has at least this many contacts.
 # More contacts help if twice as many would lower the mean deviation of the height by the share NOTICEABLE.
 # They cannot, if noise is below QUIET times that deviation.
 NOTICEABLE = 0.15
@@ -46,7 +46,7 @@ def suffices(r: Reconstruction) -> bool:
 
 
 def stride_of(counts: NDArray[np.intp]) -> int:
-    """The number of steps from one fitted contact to the next, of half curves of so many (c, 2)."""
+    """The number of steps from one fitted contact to the next, of half curves of this many (c, 2)."""
     return max(1, int(spacing(counts, CONTACT_COUNTS[0])))
 
 

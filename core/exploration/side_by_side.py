@@ -23,7 +23,7 @@ from .one_touch import Answer, Ask, Exploration, Steps, Touch
 from .options import ExplorationOptions
 from .taps import tapped
 
-GLANCE_CONTACTS = 8  # A half curve has so many contacts where it is only asked whether it ends.
+GLANCE_CONTACTS = 8  # A half curve has this many contacts where it is only asked whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
 # Touches with a given deviation, as those of a whole object, end where normals are not ALIKE from one
 # contact to the next; all others go on whatever the cosine between these.

@@ -19,7 +19,7 @@ from .least_squares import Problem, on_grid
 ROUNDINGS = np.geomspace(1.0, 1e-5, 14)
 SETTLED_OBJECTIVE = 1e-3  # When a step wins less than this share of the objective, the next rounding begins.
 CONVERGED = 1e-8
-NEWTON_CAP, DESCENT_CAP = 200, 20_000  # There are at most so many steps.
+NEWTON_CAP, DESCENT_CAP = 200, 20_000  # There are at most this many steps.
 
 
 class _Fields(NamedTuple):

@@ -24,12 +24,12 @@ CHORD = 4.6  # side^2 = CHORD tolerance / curvature; for equilateral triangles i
 # Bounds of the distance of neighbors, in mean radii: they carry colors.
 COARSEST_EDGE, FINEST_EDGE = 0.25, 0.02
 VISIBLE = 1e-3  # A rim that is farther off the boundary, as a share of the mean radius, shows its corners.
-RIM_SAMPLES, MOST_RIM_EDGES = 128, 256  # The boundary is sampled so often; the rim has at most so many edges.
+RIM_SAMPLES, MOST_RIM_EDGES = 128, 256  # Numbers of samples of the boundary and, at most, of its edges.
 # Points on the rim are this share of the inner distance apart: the lattice does not fit there.
 RIM_SPACING = 0.65
 EDGE_GROWTH = 0.5  # The distance of neighbors grows by this share of the distance from the rim.
 CLEAR = 0.6  # The lattice keeps this share of a rim's edge away from the rim.
-SMOOTHING_PASSES = 3  # Inner points are smoothed so often.
+SMOOTHING_PASSES = 3  # Inner points are smoothed this often.
 UNEQUAL = 1e-6  # Points are moved by this share, so that no four lie on a circle, which has two diagonals.
 
 Size = Callable[[Array], Array]

@@ -71,7 +71,7 @@ def test_a_place_far_beside_the_normal_at_its_foot_has_no_foot():
     pairs = charts_of([result]).pairs(points)
     assert len(pairs.place) > 4000
     assert np.abs(pairs.distance - BALL.distances(points[pairs.place])).max() < 0.1 * result.radius
-    assert (pairs.share < MARGIN).all()
+    assert (pairs.rho < MARGIN).all()
 
 
 def test_deviations_are_linear_between_knots(charts):
