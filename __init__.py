@@ -2,20 +2,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tactile Patch, as Blender finds it. The add-on is imported when enabled, so `core` works without it."""
 
+from typing import TYPE_CHECKING, Any
 
-def register():
+if TYPE_CHECKING:
+    from . import core
+
+
+def register() -> None:
     from . import tactile_addon
 
     tactile_addon.register()
 
 
-def unregister():
+def unregister() -> None:
     from . import tactile_addon
 
     tactile_addon.unregister()
 
 
-def reconstruction_of(obj):
+def reconstruction_of(obj: Any) -> "core.Reconstruction":
     """The core.Reconstruction of a patch, or of its probe or contours, in the world, where the patch is now.
 
     Raises ValueError, with a sentence, if there is none.

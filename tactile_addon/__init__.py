@@ -48,7 +48,7 @@ _drawings: list[Any] = []
 HERE = str(Path(__file__).resolve().parent)  # It holds presets/.
 
 
-def register():
+def register() -> None:
     probe.register()
     color_range.register()
     map_object.register()
@@ -66,7 +66,7 @@ def register():
     _drawings.extend(overlay.draw_handlers())
 
 
-def unregister():
+def unregister() -> None:
     while _drawings:
         bpy.types.SpaceView3D.draw_handler_remove(_drawings.pop(), "WINDOW")
     change_handlers.unregister()

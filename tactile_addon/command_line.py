@@ -4,7 +4,9 @@
 
 import argparse
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from .. import core
 from .command_run import Misuse, run, write
@@ -23,12 +25,13 @@ NOT_OF_ALL = (
     "tilts",
 )
 SURFACE = "save the scene with the surface as .blend, or the surface alone as .ply"
-VECTOR = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
+VECTOR: dict[str, Any] = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
 
-def main(args):
+def main(args: Sequence[str]) -> int:
     """Blender calls this for the command with the words that follow its name; returns the exit code."""
-    sys.stdout.reconfigure(line_buffering=True)
+    stdout: Any = sys.stdout
+    stdout.reconfigure(line_buffering=True)
     parser = _parser()
     options = parser.parse_args([f" {a}" if _is_number(a) else a for a in args])
     try:
@@ -44,7 +47,7 @@ def main(args):
     return 0
 
 
-def _parser():
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="blender -c tactile", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
     for name, add_arguments, help in (
@@ -60,7 +63,7 @@ def _parser():
     return parser
 
 
-def _add_reconstruct(command):
+def _add_reconstruct(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     add("--location", **VECTOR, help="where to touch (default: the 3D cursor)")
     add("--outward", **VECTOR, help="outward direction there (default: the surface's own)")
@@ -71,7 +74,7 @@ def _add_reconstruct(command):
     _add_verify(add)
 
 
-def _add_fit(command):
+def _add_fit(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     _add_contacts(add, ".csv or .ply with the curves of one patch")
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
@@ -94,7 +97,7 @@ def _add_fit(command):
     _add_verify(add)
 
 
-def _add_contacts(add, help):
+def _add_contacts(add: Callable[..., Any], help: str) -> None:
     """Adds the options of measured contacts."""
     add("files", nargs="+", type=Path, metavar="FILE", help=help)
     add("--unit", choices=list(core.UNIT_METERS), help="unit of the numbers (the file's)")
@@ -103,21 +106,21 @@ def _add_contacts(add, help):
     add("--noise", type=float, help="noise floor: a contact has at least this standard deviation")
 
 
-def _add_join(command):
+def _add_join(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     _add_contacts(add, ".csv or .ply with curves all over an object")
     add("--tolerance", type=float, help="standard deviation to reach for heights (1.2 %% of each patch)")
     _add_output(add, SURFACE)
 
 
-def _add_map(command):
+def _add_map(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     help = "distance between the points that are touched (a quarter of the extent)"
     add("--spacing", type=float, help=help)
     _add_inputs(add)
 
 
-def _add_object(command):
+def _add_object(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     _add_target(add)
     add("--location", **VECTOR, help="where to begin (default: any place that works)")
@@ -128,19 +131,19 @@ def _add_object(command):
     _add_output(add, SURFACE)
 
 
-def _add_table(command):
+def _add_table(command: argparse.ArgumentParser) -> None:
     command.add_argument("file", nargs="?", type=Path, metavar="FILE", help=".blend (the open scene)")
     command.add_argument("--output", type=Path, metavar="OUT", required=True, help="the table to write, .csv")
 
 
-def _add_verify(add):
+def _add_verify(add: Callable[..., Any]) -> None:
     add("--verify", type=Path, metavar="OUT", help="write the distances to the mesh as .csv")
 
 
-def _add_inputs(add):
+def _add_inputs(add: Callable[..., Any]) -> None:
     """Adds the options of what to touch, and how."""
     _add_target(add)
-    degrees = {"type": float, "nargs": "+", "metavar": "DEGREES"}
+    degrees: dict[str, Any] = {"type": float, "nargs": "+", "metavar": "DEGREES"}
     add("--azimuths", **degrees, help="three to six plane directions (0 60 120)")
     add("--tilts", **degrees, help="tilts of the planes, one each (0)")
     help = "length of each half curve (as far as a patch can be trusted; map: size / 8)"
@@ -150,19 +153,19 @@ def _add_inputs(add):
     _add_method(add)
 
 
-def _add_target(add):
+def _add_target(add: Callable[..., Any]) -> None:
     help = ".blend, .ply, .stl or .obj (the open scene)"
     add("file", nargs="?", type=Path, metavar="FILE", help=help)
     help = "object to touch (default: the active one, or the only mesh)"
     add("--target", default="", metavar="NAME", help=help)
 
 
-def _add_sensor(add):
+def _add_sensor(add: Callable[..., Any]) -> None:
     add("--noise", type=float, help="standard deviation of the simulated sensor (0)")
     add("--seed", type=int, help="seed of the noise (0)")
 
 
-def _add_method(add):
+def _add_method(add: Callable[..., Any]) -> None:
     """Adds the options of how to fit, and what to write."""
     add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (bayes)")
     help = "degree of the polynomial (auto: the lowest that describes what the contacts show)"
@@ -174,14 +177,14 @@ def _add_method(add):
     )
 
 
-def _add_output(add, help):
+def _add_output(add: Callable[..., Any], help: str) -> None:
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
     add("--output", type=Path, metavar="OUT", help=help)
     help = "write a page for a browser: pictures, deviations, tolerance bands, settings, versions"
     add("--report", type=Path, metavar="HTML", help=help)
 
 
-def _is_number(text):
+def _is_number(text: str) -> bool:
     """Whether a word is a number: argparse would take -1e-3 for an option, unless a space precedes it."""
     try:
         float(text)
@@ -190,7 +193,7 @@ def _is_number(text):
     return True
 
 
-def _sentence(error):
+def _sentence(error: Exception) -> str:
     """The message of an operator's error, without the words that Blender adds."""
     words = str(error).strip()
     if isinstance(error, RuntimeError):  # There may be several reports.

@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the command does: it opens files, runs the operator, saves, and writes the report."""
 
+import argparse
 import csv
 import io
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bpy
 
@@ -20,6 +21,7 @@ from .files import contact_file, measured, mesh_file, patch_table, whole_file
 from .report import report_operator
 from .scene import patch_record
 from .stability_map.map_report import map_readable
+from .touch.types import Object
 from .touch.units import ADAPTIVE, METERS
 from .touch.wording import readable
 from .whole_object.object_report import object_readable
@@ -37,8 +39,8 @@ class Command(NamedTuple):
 
     operator: str
     record: str
-    words: Callable
-    more: dict
+    words: Callable[[Any], str]
+    more: dict[str, Any]
 
 
 COMMANDS = {
@@ -65,7 +67,7 @@ KINDS = {"reconstruct": PATCH_FILES, "fit": PATCH_FILES, "table": (".csv",)}
 KINDS |= dict.fromkeys(("object", "join", "map"), MESH_FILES)
 
 
-def _require_numbers(options):
+def _require_numbers(options: argparse.Namespace) -> None:
     """Raises Misuse for numbers that operators cannot have."""
     for name in NEVER_NEGATIVE:
         value = vars(options).get(name)
@@ -73,7 +75,7 @@ def _require_numbers(options):
             raise Misuse(f"--{name.replace('_', '-')}: expected a finite number of 0 or more, got {value:g}")
 
 
-def _arguments(options):
+def _arguments(options: argparse.Namespace) -> dict[str, Any]:
     """The operator's arguments from the options."""
     _require_numbers(options)
     given = {name: value for name, value in vars(options).items() if name in PLAIN and value is not None}
@@ -101,7 +103,7 @@ def _arguments(options):
     return given
 
 
-def run(options):
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Opens the file, runs the operator, saves, and returns the report."""
     if "files" in options and options.verify is not None and options.onto is None:
         raise Misuse("--verify: expected --onto MESH too, the mesh to compare with")
@@ -111,11 +113,13 @@ def run(options):
     if options.command == "table":
         return {"rows": _write_table(options.output)}
     arguments = _arguments(options)
-    before = set(bpy.data.objects)
+    before: set[Object] = set(bpy.data.objects)
     command = COMMANDS[options.command]
-    getattr(bpy.ops.tactile, command.operator)(**arguments, **command.more)
+    operators: Any = bpy.ops
+    getattr(operators.tactile, command.operator)(**arguments, **command.more)
     # It cannot be found by name, and it is not active if the scene was saved in edit mode.
-    (made,) = (obj for obj in set(bpy.data.objects) - before if command.record in obj)
+    added: set[Object] = set(bpy.data.objects) - before
+    (made,) = (obj for obj in added if command.record in obj)
     if command.record == patch_record.RECORD:
         _compare(made, options)
     report = made[command.record].to_dict()
@@ -133,7 +137,7 @@ def run(options):
     return report
 
 
-def _require_outputs(options):
+def _require_outputs(options: argparse.Namespace) -> None:
     """Raises Misuse, before anything is done, if a file to write is also read or cannot be a file."""
     given = {name: getattr(options, name) for name in ("json", "output", "contacts", "verify", "report")}
     outputs = {name: Path(path) for name, path in given.items() if path not in (None, "-")}
@@ -158,7 +162,7 @@ def _require_outputs(options):
         raise Misuse(f"--report: expected a file .html, got {options.report}")
 
 
-def _compare(patch, options):
+def _compare(patch: Object, options: argparse.Namespace) -> None:
     """Compares the patch with the mesh that was touched, or with the one onto which it is put."""
     target = None if "files" in options else bpy.data.objects[patch[patch_record.RECORD]["source"]]
     if options.onto is not None:
@@ -168,12 +172,12 @@ def _compare(patch, options):
         verify_patch(patch, target, bpy.context.evaluated_depsgraph_get())
 
 
-def _open_contacts(options):
+def _open_contacts(options: argparse.Namespace) -> dict[str, Any]:
     """The files as arguments. If no .blend is open, an empty scene gets their unit, so that numbers stay."""
     if not bpy.data.filepath:
         bpy.ops.wm.read_homefile(use_empty=True)
         unit = measured.read(options.files, options.unit or "FILE", 1.0, options.command == "join").unit
-        settings = bpy.context.scene.unit_settings
+        settings: Any = bpy.context.scene.unit_settings
         name = {symbol: name for name, (symbol, _) in METERS.items()}.get(unit)
         settings.system = "METRIC" if unit else "NONE"
         settings.scale_length = core.UNIT_METERS.get(unit, 1.0)
@@ -189,7 +193,7 @@ def _open_contacts(options):
     }
 
 
-def _save(path, made):
+def _save(path: Path, made: Object) -> None:
     """Saves the scene, or by the path's ending the patch or map alone: .ply with attributes, or .json."""
     kind = path.suffix.lower()
     if kind == ".json":
@@ -200,14 +204,14 @@ def _save(path, made):
         mesh_file.save_scene(path)
 
 
-def _write_table(path):
+def _write_table(path: Path) -> int:
     """Writes the table of the scene's patches, and returns their number."""
     patches = patch_table.patches_of(bpy.context.view_layer.objects)
     patch_table.write(path, patches, bpy.context.scene)
     return len(patches)
 
 
-def _default_target():
+def _default_target() -> str:
     """The name of the scene's only mesh, if nothing else is active."""
     if bpy.context.view_layer.objects.active is not None:
         return ""
@@ -215,7 +219,7 @@ def _default_target():
     return meshes[0] if len(meshes) == 1 else ""
 
 
-def write(report, options):
+def write(report: Mapping[str, Any], options: argparse.Namespace) -> None:
     """Prints the report, or writes it to the files that were named."""
     if options.verify is not None:
         table = io.StringIO()
@@ -229,5 +233,5 @@ def write(report, options):
     print(COMMANDS[options.command].words(report))
 
 
-def _six_radians(degrees):
+def _six_radians(degrees: list[float]) -> list[float]:
     return [math.radians(a) for a in degrees] + [0.0] * (6 - len(degrees))

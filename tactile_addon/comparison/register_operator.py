@@ -3,7 +3,9 @@
 """The operator that puts a patch whose place is unknown onto a mesh, and the search behind it."""
 
 import threading
+from collections.abc import Iterator
 from time import perf_counter
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,10 +14,12 @@ from mathutils import Matrix
 
 from ... import core
 from ..probes import probe
-from ..probes.in_slices import InSlices
+from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import patch_record
 from ..touch.surface import MeshSurface
+from ..touch.touch_report import Registration
+from ..touch.types import Object, Outcome
 from ..touch.wording import registration_summary
 from .verify_operator import chosen_mesh
 
@@ -29,17 +33,19 @@ class Search:
     poses : a list, once `wait` says that it is done; raises ValueError, with a sentence, if there are none
     """
 
-    def __init__(self, patch, target, depsgraph):
+    def __init__(self, patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) -> None:
         if probe.probe_of(patch) is not None:
             raise ValueError(f'The place of "{patch.name}" is that of its probe, so it is known already')
         vertices, faces = MeshSurface(target, depsgraph).triangles()
         given = patch_record.reconstruction_of(patch), vertices, faces
         self.patch, self.target, self._matrix = patch.name, target.name, patch.matrix_world.copy()
-        self._found, self._error, self._begun = None, None, perf_counter()
+        self._found: list[core.Pose] | None = None
+        self._error: ValueError | None = None
+        self._begun = perf_counter()
         self._thread = threading.Thread(target=self._run, args=given, daemon=True)
         self._thread.start()
 
-    def _run(self, *given):
+    def _run(self, *given: Any) -> None:
         try:
             self._found = core.register(*given, best=POSES)
         except MemoryError:
@@ -49,33 +55,34 @@ class Search:
         except ValueError as error:
             self._error = error
 
-    def wait(self, seconds=None):
+    def wait(self, seconds: float | None = None) -> bool:
         """Waits for some seconds, or to the end, and returns whether the search is done."""
         self._thread.join(seconds)
         return not self._thread.is_alive()
 
-    def steps(self):
+    def steps(self) -> Iterator[None]:
         """Waits to the end, as a generator between whose steps a window may draw."""
         while not self.wait(HURRY):
             yield
 
     @property
-    def seconds(self):
+    def seconds(self) -> float:
         """How long the search has taken so far."""
         return perf_counter() - self._begun
 
     @property
-    def poses(self):
+    def poses(self) -> list[core.Pose]:
         """The core.Poses that were found. Raises the error with which the search has ended."""
         if self._error is not None:
             raise self._error
         return self._found
 
-    def put(self, pose):
+    def put(self, pose: int) -> Registration:
         """Moves the patch to one of the poses, and returns its `registration`, a dict."""
         if pose > len(self.poses):
             raise ValueError(f'There are {len(self.poses)} poses on "{self.target}": choose one of them')
-        chosen, matrix, patch = self.poses[pose - 1], np.eye(4), bpy.data.objects.get(self.patch)
+        chosen, matrix = self.poses[pose - 1], np.eye(4)
+        patch: Object = bpy.data.objects.get(self.patch)
         if patch is None:
             raise ValueError(f'"{self.patch}" was deleted while its place was searched for')
         matrix[:3, :3], matrix[:3, 3] = chosen.rotation, chosen.translation
@@ -90,7 +97,9 @@ class Search:
         return patch[patch_record.RECORD]["registration"].to_dict()
 
 
-def register_patch(patch, target, depsgraph, pose=1):
+def register_patch(
+    patch: Object, target: Object, depsgraph: bpy.types.Depsgraph, pose: int = 1
+) -> Registration:
     """Moves the patch object to where its contacts are nearest to the mesh object `target`.
 
     pose : 1 for the best place, up to POSES for others
@@ -123,28 +132,28 @@ class TACTILE_OT_register(InSlices, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return (
             has_patch(cls, context, "Select a mesh and then the patch to put onto it")
             and is_in_object_mode(cls, context, "Patches are registered")
             and is_unlocked(cls, context)
         )
 
-    def _begin(self, context):
+    def _begin(self, context: bpy.types.Context) -> None:
         patch = probe.patch_near(context.view_layer.objects.active)
         target = target_object(context, self.target or chosen_mesh(context, patch))
         self._search = Search(patch, target, context.evaluated_depsgraph_get())
         self._steps = self._search.steps()
 
-    def _done(self):
+    def _done(self) -> Progress:
         return f'Looking for the patch on "{self._search.target}": {self._search.seconds:.0f} s', None
 
-    def _finish(self, context):
+    def _finish(self, context: bpy.types.Context) -> Outcome:
         found = self._search.put(self.pose)
         self.report({"WARNING"} if found["is_ambiguous"] else {"INFO"}, registration_summary(found))
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop_search(self, "target", context.scene, "objects")

@@ -2,9 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A verification as tables and sentences for people, and as the columns of a file."""
 
+from collections.abc import Iterator, Mapping
+from typing import Any
+
 import bpy
 
 from ..touch import units
+from ..touch.touch_report import TouchReport
+from ..touch.units import Unit
 from ..touch.wording import SPREAD, cell
 
 # The results of core.verify, in the order of a table.
@@ -16,7 +21,7 @@ VERIFIED = (
 )
 
 
-def verification_summary(record):
+def verification_summary(record: TouchReport) -> tuple[bool, str]:
     """Whether a verification gives reason to doubt, and a sentence on what it has found."""
     found = record["verification"]
     name, vertices, percent = found["target"], found["vertices"], 100.0 * found["overlap"]
@@ -37,7 +42,7 @@ def verification_summary(record):
     )
 
 
-def verification_columns(report):
+def verification_columns(report: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """(heading, value) of the columns in a patch's row; a value that is not known is empty."""
     found = report["verification"]
     lengths = [key for key in VERIFIED if "distance" in key or "error" in key]
@@ -48,11 +53,11 @@ def verification_columns(report):
     ]
 
 
-def verification_table(found, unit):
+def verification_table(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, ...]]:
     """Rows of a label and the values for the mesh and for the contacts; lengths are without unit."""
     symbol, bare = units.symbol(1, unit), ("", unit[1])
 
-    def lengths(key):
+    def lengths(key: str) -> Iterator[str]:
         return (_length(found, f"{what}_distance_{key}", bare) for what in ("vertex", "contact"))
 
     names = zip(("Mean", "Median", "Maximum", "RMS"), SPREAD, strict=True)
@@ -63,7 +68,7 @@ def verification_table(found, unit):
     ]
 
 
-def verification_rows(found, unit):
+def verification_rows(found: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of everything else that a verification has found."""
     return [
         ("Error on Curves", _length(found, "fit_error", unit)),
@@ -73,5 +78,5 @@ def verification_rows(found, unit):
     ]
 
 
-def _length(found, key, unit):
+def _length(found: Mapping[str, Any], key: str, unit: Unit) -> str:
     return units.say(found[key], 1, unit) if key in found else "–"

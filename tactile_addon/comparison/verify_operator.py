@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that compares a patch, where it is now, with any mesh, and the work behind it."""
 
+from collections.abc import Iterator, Sequence
+from typing import Any
+
 import bpy
 import numpy as np
 from bpy.props import StringProperty
@@ -9,11 +12,12 @@ from bpy.props import StringProperty
 from ... import core
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
-from ..probes.in_slices import InSlices
+from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
-from ..scene import mesh_data, patch_record, shown
+from ..scene import attributes, mesh_data, patch_record, shown
 from ..touch.surface import MeshSurface
-from ..touch.touch_report import judgment
+from ..touch.touch_report import TouchReport, judgment
+from ..touch.types import Array, Object, Outcome
 from .verification_wording import verification_summary
 
 VERTICES_AT_ONCE = 2000  # A step looks at so many vertices.
@@ -27,14 +31,16 @@ class Verification:
     Raises ValueError, with a sentence, if they cannot be compared.
     """
 
-    def __init__(self, patch, target):
+    def __init__(self, patch: Object, target: Object) -> None:
         probe.require_unlocked(patch)
         self._r = patch_record.reconstruction_of(patch)
         self._patch, self.patch, self.target = patch.session_uid, patch.name, target.name
         self._target, self._given = target.session_uid, _inputs(patch, target)
-        self._surface, self._found, self.done, self.count = None, {}, 0, 0
+        self._surface: MeshSurface | None = None
+        self._found: dict[str, Any] = {}
+        self.done, self.count = 0, 0
 
-    def look(self, depsgraph):
+    def look(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Lets the steps go on in the scene as it is now. Raises ValueError if patch or mesh have changed."""
         patch, target = self._objects()
         # When Blender evaluates again, it frees what it has evaluated before.
@@ -44,11 +50,11 @@ class Verification:
                 f'"{self.patch}" or "{self.target}" was changed while it was verified: start again'
             )
 
-    def ray_cast(self, *ray):
+    def ray_cast(self, *ray: Any) -> tuple[Sequence[float], Sequence[float]] | None:
         """Casts a ray at the target, as MeshSurface does."""
         return self._surface.ray_cast(*ray)
 
-    def steps(self):
+    def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         r = self._r
         _, vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
@@ -64,14 +70,14 @@ class Verification:
             self._found = found
             yield
 
-    def write(self):
+    def write(self) -> TouchReport:
         """Writes what was found to the patch: its deviations, and `verification` in its record."""
         (patch, _), r, surface = self._objects(), self._r, self._surface
         record = patch[patch_record.RECORD]
         points, normals = _vertices(patch.data, r, r.radius / record["radius"])
         deviations = surface.deviations(r.frame.to_world(points), normals @ r.frame.axes.T, r.radius)
         mesh_data.own_mesh(patch)
-        mesh_data.write(patch.data, "deviation", "FLOAT", deviations)
+        mesh_data.write(patch.data, attributes.DEVIATION, deviations)
         shown.recolor(patch)
         shown.share_range(patch)
         record["verification"] = {"target": self.target, **self._found}
@@ -80,7 +86,7 @@ class Verification:
             record.update(judgment(r, mean, record["ended"], record.get("few_facets", False)))
         return record.to_dict()
 
-    def _objects(self):
+    def _objects(self) -> tuple[Object, Object]:
         """The patch and the target. Raises ValueError if they are no longer there."""
         found = {obj.session_uid: obj for obj in bpy.data.objects}
         if self._patch not in found or self._target not in found:
@@ -88,7 +94,7 @@ class Verification:
         return found[self._patch], found[self._target]
 
 
-def verify_patch(patch, target, depsgraph):
+def verify_patch(patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) -> None:
     """Compares the patch object with the mesh object `target`; its record gets the result as `verification`.
 
     Raises ValueError with a sentence, and changes nothing, if that cannot be done.
@@ -100,17 +106,17 @@ def verify_patch(patch, target, depsgraph):
     verification.write()
 
 
-def _inputs(patch, target):
+def _inputs(patch: Object, target: Object) -> tuple[Any, ...]:
     """The properties of patch and target that must not change meanwhile."""
     return patch[patch_record.RECONSTRUCTION], *(
         tuple(map(tuple, obj.matrix_world)) for obj in (patch, target)
     )
 
 
-def _vertices(mesh, r, scale):
+def _vertices(mesh: bpy.types.Mesh, r: core.Reconstruction, scale: float) -> tuple[Array, Array]:
     """Points and unit normals of the patch's vertices, in its frame and scaled by `scale`."""
-    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", points.ravel())
+    points: Array = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    attributes.attribute_of(mesh, attributes.POSITION).data.foreach_get("vector", points.ravel())
     points = scale * points.astype(float)
     return points, r.geometry.normal(points[:, 0], points[:, 1])
 
@@ -129,14 +135,14 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return (
             has_patch(cls, context, "Select a patch; to compare it with another mesh, select that first")
             and is_in_object_mode(cls, context, "Patches are verified")
             and is_unlocked(cls, context)
         )
 
-    def _begin(self, context):
+    def _begin(self, context: bpy.types.Context) -> None:
         obj = context.view_layer.objects.active
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         if found is not None and is_pending(found):  # Completing it later would undo the verification.
@@ -145,28 +151,28 @@ class TACTILE_OT_verify(InSlices, bpy.types.Operator):
         self._verification = Verification(patch, target)
         self._steps = self._verification.steps()
 
-    def _check(self, context):
+    def _check(self, context: bpy.types.Context) -> None:
         self._verification.look(context.evaluated_depsgraph_get())
 
-    def _done(self):
+    def _done(self) -> Progress:
         done, count = self._verification.done, self._verification.count
         share = done / count if count else None
         return f'Comparing with "{self._verification.target}": {done} of {count} vertices', share
 
-    def _finish(self, context):
+    def _finish(self, context: bpy.types.Context) -> Outcome:
         record = self._verification.write()
         probe.patch_near(context.view_layer.objects.active).tactile_colors = "deviation"
         doubt, summary = verification_summary(record)
         self.report({"WARNING"} if doubt else {"INFO"}, summary)
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop_search(self, "target", context.scene, "objects")
 
 
-def chosen_mesh(context, patch):
+def chosen_mesh(context: bpy.types.Context, patch: Object) -> str:
     """The name of the selected mesh, or of the patch's own target, or of the mesh it was touched on.
 
     Raises ValueError if there is none, or if several meshes are selected.

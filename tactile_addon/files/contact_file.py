@@ -11,7 +11,7 @@ from ...core import Contacts
 from . import ply_contacts, whole_file
 
 
-def read(path):
+def read(path: str | Path) -> Contacts:
     """The Contacts of a .csv or .ply file, with numbers as they are.
 
     The contacts of each curve are sorted by time, if that is given, and each is there once. Raises OSError if
@@ -30,7 +30,7 @@ def read(path):
         raise ValueError(f"{name}: expected contacts that fit into memory, got more") from None
 
 
-def contacts_of(r):
+def contacts_of(r: core.Reconstruction) -> Contacts:
     """The Contacts that a reconstruction was fitted to; fitting them gives the same reconstruction."""
     noise, (origin, normal) = r.noise * r.radius, (r.frame.origin, r.frame.axes[:, 2])
     contours = [replace(contour, noise=noise) for contour in r.contours]
@@ -38,21 +38,21 @@ def contacts_of(r):
     return Contacts(contours, "", origin.tolist(), normal.tolist(), strokes)
 
 
-def write(path, contacts):
+def write(path: str | Path, contacts: Contacts) -> None:
     """Writes Contacts as CSV, such that `read` finds the same numbers."""
     whole_file.write_text(path, core.contacts_to_csv(contacts))
 
 
-def write_patch(path, r):
+def write_patch(path: str | Path, r: core.Reconstruction) -> None:
     """Writes a reconstruction as JSON, which core.from_dict reads."""
     whole_file.write_text(path, json.dumps(core.to_dict(r), allow_nan=False) + "\n")
 
 
-def _read_csv(name, path):
+def _read_csv(name: str, path: Path) -> Contacts:
     return core.contacts_from_csv(_text(name, path), name)
 
 
-def _text(name, path):
+def _text(name: str, path: Path) -> str:
     """The whole text of a file in one of the usual encodings."""
     data = path.read_bytes()
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):

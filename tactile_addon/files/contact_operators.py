@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import (
@@ -17,10 +18,11 @@ from bpy.props import (
 from bpy_extras.io_utils import ImportHelper
 
 from ... import core
-from ..probes.in_slices import InSlices
+from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import is_in_object_mode, make_active, report_error
 from ..scene import patch_object
 from ..touch.settings import FitSettings, draw_chosen, draw_solver, length_property
+from ..touch.types import Outcome
 from ..touch.units import length
 from ..touch.wording import fit_summary, many
 from ..whole_object import whole_mesh
@@ -45,6 +47,8 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
     bl_label = "Import Contact Data"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
+    if TYPE_CHECKING:  # At run time this would hide the property of ImportHelper.
+        filepath: str
     filter_glob: StringProperty(default="*.csv;*.tsv;*.txt;*.ply", options={"HIDDEN"})
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
@@ -106,14 +110,14 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return context.area is None or is_in_object_mode(cls, context, "Contacts are imported")
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         self._in_window = not bpy.app.background
         return self.invoke_popup(context)  # A file was dropped; without one, the file browser opens.
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         self._paths = [str(Path(self.directory) / each.name) for each in self.files if each.name]
         self._paths = self._paths or [self.filepath]
         try:
@@ -123,7 +127,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         except (OSError, ValueError) as error:
             return report_error(self, error)
 
-    def _patch(self, context):
+    def _patch(self, context: bpy.types.Context) -> Outcome:
         """Adds the patch around one point."""
         touched = measured.fit(
             Path(self._paths[0]).name,
@@ -148,7 +152,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, summary)
         return {"FINISHED"}
 
-    def _begin(self, context):
+    def _begin(self, context: bpy.types.Context) -> None:
         self._object = measured.MeasuredObject(
             self._contacts,
             outward=self._given("outward"),
@@ -158,15 +162,15 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         )
         self._steps = self._object.steps()
 
-    def _done(self):
+    def _done(self) -> Progress:
         return f"Joining {many(len(self._paths), 'file', 'files')}", self._object.share
 
-    def _stopped(self, context):
+    def _stopped(self, context: bpy.types.Context) -> Outcome:
         self._leave(context)
         self.report({"INFO"}, "Stopped: nothing was imported")
         return {"CANCELLED"}
 
-    def _finish(self, context):
+    def _finish(self, context: bpy.types.Context) -> Outcome:
         more = f" and {len(self._paths) - 1} more" if len(self._paths) > 1 else ""
         report = self._object.report()
         made = whole_mesh.insert(context.scene, Path(self._paths[0]).name + more, self._object.whole, report)
@@ -174,10 +178,10 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, object_summary(report))
         return {"FINISHED"}
 
-    def _given(self, name):
+    def _given(self, name: str) -> list[float] | None:
         return list(getattr(self, name)) if self.properties.is_property_set(name) else None
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         of_patch = "point", "strokes", "radius", "flip", "noise", "normal_std"
@@ -197,11 +201,11 @@ class TACTILE_FH_contacts(bpy.types.FileHandler):
     bl_file_extensions = ".csv;.ply"
 
     @classmethod
-    def poll_drop(cls, context):
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def draw_import(self, context):
+def draw_import(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.operator(TACTILE_OT_import_contacts.bl_idname, text="Contact Data (.csv, .ply)")
 
 

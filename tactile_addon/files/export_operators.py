@@ -3,7 +3,9 @@
 """The export of patches: File > Export."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -13,32 +15,37 @@ from ... import core
 from ..probes import probe
 from ..probes.operators import report_error
 from ..scene import patch_record
+from ..touch.types import Object, OperatorMixin, Outcome
 from . import contact_file, patch_table
 
 
-class ObjectExport(ExportHelper):
+class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `invoke`, by the stubs
     """For operators that write what is active to inherit: a patch, by itself, its probe or its contours."""
 
+    if TYPE_CHECKING:  # At run time this would hide the property of ExportHelper.
+        filepath: str
+    filename_ext: str
+    write: Callable[[Object], None]
     hint = "Select a patch, its probe or its contours first"
 
     @staticmethod
-    def written(context):
+    def written(context: bpy.types.Context) -> Object | None:
         """The object to write, or None."""
         return probe.patch_near(context.view_layer.objects.active)
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if cls.written(context) is None:
             cls.poll_message_set(cls.hint)
             return False
         return True
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if not self.filepath:
             self.filepath = bpy.path.clean_name(self.written(context).name) + self.filename_ext
         return super().invoke(context, event)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         try:
             self.write(self.written(context))
         except (OSError, ValueError) as error:
@@ -55,7 +62,7 @@ class TACTILE_OT_export_contacts(ObjectExport, bpy.types.Operator):
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
 
-    def write(self, patch):
+    def write(self, patch: Object) -> None:
         contacts = contact_file.contacts_of(patch_record.reconstruction_of(patch))
         settings = bpy.context.scene.unit_settings
         named = core.UNIT_METERS.items() if settings.system != "NONE" else ()
@@ -74,29 +81,31 @@ class TACTILE_OT_export_patch(ObjectExport, bpy.types.Operator):
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    def write(self, patch):
+    def write(self, patch: Object) -> None:
         contact_file.write_patch(self.filepath, patch_record.reconstruction_of(patch))
 
 
-class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):
+class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore[misc]  # as above
     """Write what all patches have found as CSV, one row a probe, in the scene's units"""
 
     bl_idname = "tactile.export_table"
     bl_label = "Export Table of Patches"
     filename_ext = ".csv"
+    if TYPE_CHECKING:
+        filepath: str
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
     use_selection: BoolProperty(
         name="Selected Only", description="Write the selected probes and patches only", default=False
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if not patch_table.patches_of(context.view_layer.objects):
             cls.poll_message_set("There is no patch to export: pick a reference point first")
             return False
         return True
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         objects = context.view_layer.objects
         try:
             patches = patch_table.patches_of(objects.selected if self.use_selection else objects)
@@ -107,7 +116,7 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):
         return {"FINISHED"}
 
 
-def draw_export(self, context):
+def draw_export(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.operator(TACTILE_OT_export_contacts.bl_idname, text="Contact Data (.csv)")
     self.layout.operator(TACTILE_OT_export_patch.bl_idname, text="Tactile Patch (.json)")
     self.layout.operator(TACTILE_OT_export_table.bl_idname, text="Table of Tactile Patches (.csv)")

@@ -3,23 +3,27 @@
 """Measured contacts from files, as a patch or a whole surface with a report; nothing in the scene changes."""
 
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
 from ... import core
 from ..touch.single_precision import require_single
 from ..touch.touch_object import Touched, reference_axes
-from ..touch.touch_report import measures, reconstruction_report, suggestion_report
+from ..touch.touch_report import TouchReport, measures, reconstruction_report, suggestion_report
+from ..touch.types import Array, Point
 from ..whole_object.whole_surface import WholeSurface
 from . import contact_file
 
 FLAT = 0.02  # A surface whose |k1 + k2| is less, in unit radius, bulges to no side.
 
 
-def read(paths, unit, meters, whole=False):
+def read(paths: Iterable[str | Path], unit: str, meters: float, whole: bool = False) -> core.Contacts:
     """The core.Contacts of files whose curves belong together.
 
     unit : of the numbers, as in core.UNIT_METERS; "FILE" for the unit that each file names; "NONE" to
@@ -57,7 +61,15 @@ class MeasuredObject:
     whole : the WholeSurface, once the steps are done
     """
 
-    def __init__(self, contacts, *, outward=None, flip=False, tolerance=0.0, noise=0.0):
+    def __init__(
+        self,
+        contacts: core.Contacts,
+        *,
+        outward: Sequence[float] | None = None,
+        flip: bool = False,
+        tolerance: float = 0.0,
+        noise: float = 0.0,
+    ) -> None:
         """Prepares core.Contacts.
 
         outward : a hint, a direction to the outer side where contacts have no normals; None for that of the
@@ -82,7 +94,7 @@ class MeasuredObject:
         self._outward = None if outward is None else sign * np.array(outward)
         self._tolerance, self._noise, self.share = tolerance, noise, 0.0
 
-    def steps(self):
+    def steps(self) -> Iterator[None]:
         """Does everything, as a generator. Raises ValueError with a sentence for the user."""
         steps = core.cover_contacts(
             self._felt,
@@ -101,30 +113,30 @@ class MeasuredObject:
             self.share = 0.5 + 0.5 * share
             yield
 
-    def report(self):
+    def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
         found = {"contacts": sum(len(contour.points) for contour in self._felt), **self.whole.report()}
         return found | {"tolerance": self._tolerance, "noise": self._noise}
 
 
-def _scaled(curve, factor):
+def _scaled(curve: core.Contour, factor: float) -> core.Contour:
     noise = None if curve.noise is None else factor * curve.noise
     return replace(curve, points=factor * curve.points, noise=noise)
 
 
 def fit(
-    source,
-    contacts,
+    source: str,
+    contacts: core.Contacts,
     *,
-    point=None,
-    outward=None,
-    flip=False,
-    noise=0.0,
-    normal_std=0.0,
-    all_strokes=False,
-    radius=0.0,
-    **options,
-):
+    point: Point | None = None,
+    outward: Point | None = None,
+    flip: bool = False,
+    noise: float = 0.0,
+    normal_std: float = 0.0,
+    all_strokes: bool = False,
+    radius: float = 0.0,
+    **options: Any,
+) -> Touched:
     """The patch that core.Contacts show, as a Touched without a surface.
 
     point : where the curves meet, exactly; None for the point of the file, or core.common_point. For strokes
@@ -148,7 +160,15 @@ def fit(
         raise ValueError("There are more contacts than fit into memory: use fewer of them") from None
 
 
-def _fit(source, contacts, point, outward, flip, normal_std, options):
+def _fit(
+    source: str,
+    contacts: core.Contacts,
+    point: Point | None,
+    outward: Point | None,
+    flip: bool,
+    normal_std: float,
+    options: dict[str, Any],
+) -> Touched:
     start = perf_counter()
     contours, unit, of_file, up, strokes = contacts
     point = of_file if point is None else point
@@ -168,14 +188,21 @@ def _fit(source, contacts, point, outward, flip, normal_std, options):
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     require_single("patch", result.radius, result.frame.origin)
-    given = {"source": source, "unit": unit, "curves": len(contours), "strokes": len(strokes)}
-    given["given_contacts"] = sum(len(contour.points) for contour in felt)
-    missed = {} if distances is None else {"misses": distances.tolist()}
-    seconds = {"fit": perf_counter() - start}
-    return Touched(None, result, given | _report(result, options["method"]) | missed | {"seconds": seconds})
+    report: TouchReport = {
+        "source": source,
+        "unit": unit,
+        "curves": len(contours),
+        "strokes": len(strokes),
+        "given_contacts": sum(len(contour.points) for contour in felt),
+        **_report(result, options["method"]),
+    }
+    if distances is not None:
+        report["misses"] = distances.tolist()
+    report["seconds"] = {"fit": perf_counter() - start}
+    return Touched(None, result, report)
 
 
-def _report(result, method):
+def _report(result: core.Reconstruction, method: str) -> TouchReport:
     """What a fit has found, in the form of a touch's report."""
     axes = reference_axes(result.frame.axes[:, 2])
     return {
@@ -189,7 +216,7 @@ def _report(result, method):
     }
 
 
-def _mean_normal(contours):
+def _mean_normal(contours: Sequence[core.Contour]) -> Array:
     """The mean of all measured normals, or +z if there are none."""
     normals = [contour.normals for contour in contours if contour.normals is not None]
     mean = np.sum(np.vstack(normals), axis=0) if normals else np.zeros(3)

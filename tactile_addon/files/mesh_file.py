@@ -3,10 +3,12 @@
 """Scenes and meshes in files, by Blender's own importers and exporter, without a window."""
 
 import sys
+from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ..touch.types import Object
 from . import mesh_numbers, ply_contacts, whole_file
 
 HEADER = 1 << 16  # The header of a .ply ends within so many bytes.
@@ -19,7 +21,7 @@ IMPORTS = {
 }
 
 
-def open_file(path):
+def open_file(path: Path) -> None:
     """Makes a file the scene: opens a .blend, or imports a mesh into an empty scene, unchanged."""
     if path.suffix.lower() == ".blend" and path.is_file():
         bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
@@ -28,7 +30,7 @@ def open_file(path):
         bpy.context.scene.unit_settings.system = "NONE"  # Such a file does not name its unit.
 
 
-def add(path, empty=False):
+def add(path: Path, empty: bool = False) -> Object:
     """Adds the mesh of a .ply, .stl or .obj file to the scene, or to an empty one, and returns its object.
 
     Raises OSError with a sentence for the user.
@@ -48,13 +50,14 @@ def add(path, empty=False):
             getattr(bpy.ops.wm, operator)(filepath=str(path.absolute()), **options)
     except RuntimeError as error:
         raise _unreadable(path) from error
-    for obj in set(bpy.data.objects) - there:
+    added: set[Object] = set(bpy.data.objects) - there
+    for obj in added:
         if obj.type == "MESH" and len(obj.data.polygons):
             return obj
     raise _unreadable(path)
 
 
-def _require_readable(path):
+def _require_readable(path: Path) -> None:
     """Raises OSError for a file that would end Blender, or of which Blender would read something else."""
     try:
         wrong = mesh_numbers.unreadable(path)
@@ -67,11 +70,11 @@ def _require_readable(path):
         )
 
 
-def _unreadable(path):
+def _unreadable(path: Path) -> OSError:
     return OSError(f'no mesh could be read from "{path.name}": is the file complete?')
 
 
-def write(path, obj):
+def write(path: Path, obj: Object) -> None:
     """Writes the mesh of an object without modifiers, with its attributes, as .ply.
 
     Raises OSError with a sentence, as save_scene does; the old file is then as it was.
@@ -91,7 +94,7 @@ def write(path, obj):
             raise OSError(INCOMPLETE)
 
 
-def save_scene(path):
+def save_scene(path: Path) -> None:
     """Writes the open scene as .blend."""
     with whole_file.replacing(path) as temporary:
         try:
@@ -102,7 +105,7 @@ def save_scene(path):
             raise OSError(INCOMPLETE)
 
 
-def _is_whole_blend(path):
+def _is_whole_blend(path: Path) -> bool:
     """Whether a file ends as a .blend does: with the magic number of its table of frames, or with ENDB."""
     with path.open("rb") as file:
         start = file.read(4)
@@ -111,7 +114,7 @@ def _is_whole_blend(path):
     return end.endswith(b"\xb1\xea\x92\x8f") if start == b"\x28\xb5\x2f\xfd" else b"ENDB" in end
 
 
-def _size_of_ply(path, mesh):
+def _size_of_ply(path: Path, mesh: bpy.types.Mesh) -> int:
     """The size that the header of a .ply with the faces of `mesh` promises; huge without a header."""
     with path.open("rb") as file:
         head, end, _ = file.read(HEADER).partition(b"end_header\n")

@@ -4,10 +4,17 @@
 
 import csv
 import io
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
 
 from ..probes import probe
 from ..scene import patch_record
 from ..touch import units
+from ..touch.types import Object
+from ..touch.units import Unit
 from ..touch.wording import cell
 from . import whole_file
 
@@ -24,13 +31,13 @@ NUMBER_POWERS = {
 WORD_COLUMNS = ("source", "method", "status", "message")
 
 
-def patches_of(objects):
+def patches_of(objects: Iterable[Object]) -> list[Object]:
     """The patches among objects, or that belong to probes and contours among them, by name."""
     patches = {probe.patch_near(obj) for obj in objects} - {None}
     return sorted((patch for patch in patches if probe.record_of(patch) is not None), key=lambda p: p.name)
 
 
-def write(path, patches, scene):
+def write(path: str | Path, patches: Sequence[Object], scene: bpy.types.Scene) -> None:
     """Writes a .csv with a header that names the unit, and a row for each patch; unknown fields are empty.
 
     The row of a patch that was edited has only its name and a message. Raises ValueError if there are no
@@ -48,7 +55,7 @@ def write(path, patches, scene):
     whole_file.write_text(path, text.getvalue())
 
 
-def _row(patch, record, unit):
+def _row(patch: Object, record: Mapping[str, Any], unit: Unit) -> dict[str, str]:
     """The row of a patch as a dict of headings and values."""
     owner = probe.probe_of(patch)
     named = {"probe": cell(owner.name) if owner else "", "patch": cell(patch.name)}
@@ -59,7 +66,7 @@ def _row(patch, record, unit):
         return named | {"message": cell(str(error))}
 
 
-def _numbers(record, unit):
+def _numbers(record: Mapping[str, Any], unit: Unit) -> dict[str, str]:
     """The numbers of a report in words, by headings."""
     numbers = {_heading("xyz"[i], 1, unit): x / unit[1] for i, x in enumerate(record["frame"]["origin"])}
     numbers |= dict(zip(("nx", "ny", "nz"), record["frame"]["normal"], strict=True))
@@ -68,6 +75,6 @@ def _numbers(record, unit):
     return {key: "" if value is None else f"{value:.9g}" for key, value in numbers.items()}
 
 
-def _heading(name, power, unit):
+def _heading(name: str, power: int, unit: Unit) -> str:
     symbol = units.symbol(power, unit)
     return f"{name} [{symbol}]" if symbol else name

@@ -6,13 +6,19 @@ Blender's own import keeps these attributes, too, but in single precision, and r
 """
 
 import itertools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from ...core.arguments import LARGEST
 from ...core.contact_data import rows as contact_rows
 from ...core.contact_data.rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
+from ..touch.types import Array
 
+# Names and types of the properties of an element; a list has the types of its length and of its items.
+Fields: TypeAlias = list[tuple[str, Any]]
 PLY_ROWS = 1000  # So many rows of a .ply are read together.
 PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -27,7 +33,7 @@ PLY_TYPES = {
 PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
-def read(name, path):
+def read(name: str, path: Path) -> Contacts:
     """The Contacts of a file. Raises ValueError, with its name and the place, if it holds none."""
     table = _vertices(name, path.read_bytes())
     points = np.column_stack([table[key] for key in POINT_COLUMNS])
@@ -45,14 +51,14 @@ def read(name, path):
     return Contacts(contours, "")
 
 
-def _vertices(name, data):
+def _vertices(name: str, data: bytes) -> dict[str, Array]:
     """The values of the vertices' properties, by name."""
     rows, fields, first = vertex_rows(name, data)
     rows = _ply_rows(name, first, rows, fields) if first else rows
     return {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
 
 
-def vertex_rows(name, data):
+def vertex_rows(name: str, data: bytes) -> tuple[Any, Fields, int]:
     """The rows of the vertices, their fields, and the number of the first line.
 
     The rows are lines of text, or an array with these fields, for which the number is 0. Raises ValueError if
@@ -81,7 +87,7 @@ def vertex_rows(name, data):
     return text[start : start + count], fields, len(lines) + 2 + start
 
 
-def _after(data, start, fields, count):
+def _after(data: bytes, start: int, fields: Fields, count: int) -> int:
     """The place after so many rows with these fields from `start` on, or one beyond the data."""
     lists, skipped = [], 0  # The bytes before each list, and the types of its length and of its items.
     for _, kind in fields:
@@ -92,7 +98,9 @@ def _after(data, start, fields, count):
             skipped = 0
     if not lists:
         return start + count * skipped
-    order = "big" if fields[0][1][0].startswith(PLY_ORDERS["binary_big_endian"]) else "little"
+    order: Literal["big", "little"] = (
+        "big" if fields[0][1][0].startswith(PLY_ORDERS["binary_big_endian"]) else "little"
+    )
     for _ in range(count):
         for before, length, item in lists:
             start += before + length
@@ -103,7 +111,7 @@ def _after(data, start, fields, count):
     return start
 
 
-def _in_order(labels):
+def _in_order(labels: Array) -> tuple[Array, list[float]]:
     """Numbers from 0 in the order in which labels first appear, and the label of each number."""
     titles, first, places = np.unique(labels, return_index=True, return_inverse=True)
     order = np.argsort(first)
@@ -112,7 +120,9 @@ def _in_order(labels):
     return rank[places.ravel()], titles[order].tolist()
 
 
-def _ply_vertices(name, lines, order):
+def _ply_vertices(
+    name: str, lines: list[list[str]], order: str
+) -> tuple[list[tuple[Fields, int]], int, Fields]:
     """(fields, number) of the rows before the vertices, the number of vertices, and their fields."""
     elements = _elements(name, lines, order)
     places = [place for place, (element, *_) in enumerate(elements) if element == "vertex"]
@@ -125,9 +135,9 @@ def _ply_vertices(name, lines, order):
     return [(kinds, number) for _, number, kinds in elements[: places[0]]], count, fields
 
 
-def _elements(name, lines, order):
+def _elements(name: str, lines: list[list[str]], order: str) -> list[tuple[str, int, Fields]]:
     """The name, number and fields of each element; a list has the types of its length and items."""
-    elements = []
+    elements: list[tuple[str, int, Fields]] = []
     for line in lines:
         try:
             if line[:1] == ["element"]:
@@ -143,7 +153,7 @@ def _elements(name, lines, order):
     return elements
 
 
-def _ply_rows(name, first, lines, fields):
+def _ply_rows(name: str, first: int, lines: Sequence[bytes], fields: Fields) -> Array:
     """The values of lines of text, of which the first is line `first` of the file."""
     rows = np.empty(len(lines), [(key, "f8") for key, _ in fields])
     for start in range(0, len(lines), PLY_ROWS):
@@ -159,7 +169,7 @@ def _ply_rows(name, first, lines, fields):
     return rows
 
 
-def _refuse_ply_row(name, first, words, fields):
+def _refuse_ply_row(name: str, first: int, words: Sequence[Sequence[str]], fields: Fields) -> None:
     """Raises ValueError for the first row that cannot be read."""
     for number, row in enumerate(words, first):
         at = f"{name}, line {number}"

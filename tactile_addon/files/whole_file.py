@@ -6,6 +6,7 @@ import os
 import secrets
 import shutil
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -14,7 +15,7 @@ STALE = 3600.0  # Whoever has not written to such a file for so many seconds was
 
 
 @contextmanager
-def replacing(path):
+def replacing(path: str | Path) -> Iterator[Path]:
     """The path of a file that replaces `path` once it is written, at the end of the block.
 
     Raises OSError, with a sentence, if that fails. The old file is then as it was, and nothing is beside it.
@@ -46,7 +47,7 @@ def replacing(path):
             temporary.unlink(missing_ok=True)
 
 
-def _sweep(folder, start, end):
+def _sweep(folder: Path, start: str, end: str) -> None:
     """Removes files with such names that nobody writes any more."""
     with suppress(OSError), os.scandir(folder) as found:
         for left in found:
@@ -55,7 +56,7 @@ def _sweep(folder, start, end):
                 os.unlink(left)
 
 
-def write_text(path, text):
+def write_text(path: str | Path, text: str) -> None:
     """Writes a text in UTF-8, with line ends as they are, as the file `path`."""
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.write(text)

@@ -10,16 +10,17 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Matrix
 
 from ..scene import patch_record
+from ..touch.types import Array, Object
 
 BASE = "tactile_base"  # A patch's custom property: its target's matrix and its own when it was touched.
 SEAT = 20  # So many numbers tell the place in the target, directions there, and the target's scale and shear.
 CLOSE = 1e-5  # A smaller change of a number, or of a length as a share of the extent, is rounding of float32.
 
 
-def attach(probe, target):
+def attach(probe: Object, target: Object) -> None:
     """Makes the probe a child of its target without moving it, unless the target depends on the probe."""
     above = target
     while above is not None:
@@ -31,25 +32,25 @@ def attach(probe, target):
     patch_record.place(probe, place)
 
 
-def detach(probe):
+def detach(probe: Object) -> None:
     """Takes the probe's parent away without moving the probe."""
     place = probe.matrix_world.copy()
     probe.parent = None
     probe.matrix_world = probe.matrix_basis = place
 
 
-def is_attached(probe):
+def is_attached(probe: Object) -> bool:
     """Whether the probe is a child of its target, so that it goes where the target goes."""
     target = probe.tactile_probe.target
     return target is not None and probe.parent == target and probe.parent_type == "OBJECT"
 
 
-def can_have_children(probe):
+def can_have_children(probe: Object) -> bool:
     """Whether children of an object can be placed: not if its scale is 0 or not finite."""
     return all(0.0 < abs(scale) < math.inf for scale in probe.matrix_world.to_scale())
 
 
-def put(probe, matrix):
+def put(probe: Object, matrix: Matrix) -> None:
     """Puts the probe at a matrix of the world."""
     if is_attached(probe):
         patch_record.place(probe, matrix)
@@ -57,7 +58,7 @@ def put(probe, matrix):
         probe.matrix_world = matrix
 
 
-def is_carried(probe):
+def is_carried(probe: Object) -> bool:
     """Whether the target has carried the probe away from its own coordinates, as during a gesture."""
     if not is_attached(probe) or probe.constraints or probe.animation_data:
         return False
@@ -66,7 +67,7 @@ def is_carried(probe):
 
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
-def settle(probe, extent):
+def settle(probe: Object, extent: float) -> None:
     """Makes the world's coordinates the probe's own again, without the target's scale and shear."""
     if not is_carried(probe):
         return
@@ -80,11 +81,11 @@ def settle(probe, extent):
     x /= np.linalg.norm(x)
     turn = Matrix(np.column_stack([x, np.cross(z, x), z]).tolist())
     scale = probe.matrix_basis.to_scale()
-    patch_record.place(probe, Matrix.LocRotScale(Vector(at + to_world[:3, 3]), turn, scale))
+    patch_record.place(probe, Matrix.LocRotScale((at + to_world[:3, 3]).tolist(), turn, scale))
 
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
-def seat(probe, extent):
+def seat(probe: Object, extent: float) -> list[float]:
     """Where the probe is on its target, SEAT numbers that stay the same if both are moved or turned together.
 
     They are those that the probe keeps, as long as it is still there.
@@ -102,7 +103,7 @@ def seat(probe, extent):
 
 
 @lru_cache(maxsize=16)  # It is asked for several times in a row whenever something has changed.
-def _seat(*matrices):
+def _seat(*matrices: float) -> Array:
     """SEAT numbers from the world matrices of a target and a probe, 16 each; NaN if the target is flat."""
     to_world, place = np.reshape(matrices, (2, 4, 4))
     linear = to_world[:3, :3]
@@ -115,7 +116,7 @@ def _seat(*matrices):
     return np.concatenate([at, *axes, [np.log(size), np.sign(volume)], shape.ravel() / size**2])
 
 
-def keep(probe, patch):
+def keep(probe: Object, patch: Object) -> None:
     """Keeps where the probe's target is in a patch that was touched just now."""
     target = probe.tactile_probe.target
     axes, origin = patch_record.touched_frame(patch)
@@ -123,7 +124,7 @@ def keep(probe, patch):
 
 
 @np.errstate(all="ignore")  # Objects may be beyond all numbers.
-def carry(probe, patch):
+def carry(probe: Object, patch: Object) -> None:
     """Moves the patch in its record as its target was moved since.
 
     It does nothing if the probe was left behind because it is no child of the target.
@@ -150,5 +151,5 @@ def carry(probe, patch):
     patch_record.move_record(patch, turn @ frame[:3, :3], origin)
 
 
-def _numbers(matrix):
+def _numbers(matrix: Matrix | Array) -> list[float]:
     return np.array(matrix, dtype=float).ravel().tolist()

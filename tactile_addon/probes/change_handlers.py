@@ -10,6 +10,7 @@ done at once.
 import math
 from contextlib import suppress
 from time import perf_counter
+from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
@@ -18,6 +19,7 @@ from ..scene import undo
 from ..scene.family import remembered
 from ..scene.viewports import has_gesture
 from ..touch.settings import something_happened
+from ..touch.types import Object
 from . import anchor, deleted
 from .probe import forget_targets, is_free, is_probe, probe_of, record_of, targets
 from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
@@ -31,18 +33,18 @@ _seen = None  # The scene and view layer that were looked at last.
 
 
 @persistent
-def on_depsgraph_update(scene, depsgraph):
+def on_depsgraph_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Brings the patches of outdated live probes up to date. If no input has changed, nothing happens."""
     _bring_up_to_date(depsgraph, math.inf)
 
 
 @persistent
-def on_frame_change(scene, depsgraph):
+def on_frame_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Brings patches up to date in another frame, unless that takes longer than playback has time for."""
     _bring_up_to_date(depsgraph, CHEAP)
 
 
-def _bring_up_to_date(depsgraph, dearest):
+def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
     global _unsure
     something_happened()
@@ -59,7 +61,9 @@ def _bring_up_to_date(depsgraph, dearest):
         concerned, unsure = _concerned(depsgraph)
         if not concerned:
             return
-        reshaped = {u.id.original: None for u in depsgraph.updates if u.is_updated_geometry}
+        reshaped: dict[Any, int | None] = {
+            u.id.original: None for u in depsgraph.updates if u.is_updated_geometry
+        }
         if unsure:  # It may have been edited when no handler was told, as while the extension was off.
             reshaped |= {probe.tactile_probe.target: None for probe in concerned}
         end = perf_counter() + EVENT_SLICE
@@ -68,13 +72,15 @@ def _bring_up_to_date(depsgraph, dearest):
             _look_at(probe, depsgraph, reshaped, in_time)
 
 
-def _seconds(probe):
+def _seconds(probe: Object) -> float:
     """How long the probe's last touch took, without what is filled in once a gesture has ended."""
     record = record_of(probe)
     return 0.0 if record is None else sum(record["seconds"].get(key, 0.0) for key in ("prepare", "touch"))
 
 
-def _look_at(probe, depsgraph, reshaped, in_time):
+def _look_at(
+    probe: Object, depsgraph: bpy.types.Depsgraph, reshaped: dict[Any, int | None], in_time: bool
+) -> None:
     """Brings a probe up to date, or notes it for the end of the gesture if there is no time now."""
     settings = probe.tactile_probe
     deleted.relink(probe)
@@ -91,16 +97,16 @@ def _look_at(probe, depsgraph, reshaped, in_time):
 
 
 @persistent
-def on_blend_import(imported):
+def on_blend_import(imported: Any) -> None:
     """Makes a probe that was appended without its patch touch again; a linked one belongs to its own file."""
     on_other_data()
     for item in imported.import_items:
-        if isinstance(item.id, bpy.types.Object) and is_probe(item.id) and item.id.library is None:
+        if item.id.id_type == "OBJECT" and is_probe(item.id) and item.id.library is None:
             item.id.tactile_probe.digest = ""
 
 
 @persistent
-def on_other_data(*_):
+def on_other_data(*_: Any) -> None:
     """Notes that after undo, or when a file was opened, any probe may be there and any patch may differ."""
     global _unsure
     forget_targets()
@@ -109,12 +115,12 @@ def on_other_data(*_):
         _settle_soon()
 
 
-def _has_come_or_gone(depsgraph):
+def _has_come_or_gone(depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether an object may have come or gone, because its scene and collections are updated then."""
     return any(isinstance(u.id, bpy.types.Scene | bpy.types.Collection) for u in depsgraph.updates)
 
 
-def _concerned(depsgraph):
+def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
     """The probes to which something has happened: to them, to their patch or target, or to what is there.
 
     Also returns whether anything may have happened to any of them, as after undo or in a new scene.
@@ -132,7 +138,7 @@ def _concerned(depsgraph):
     if not (scene or owners or len(named) > len(objects) or any(o.session_uid in known for o in objects)):
         return [], False
     _unsure, _seen = False, layer
-    there = set(depsgraph.view_layer.objects)
+    there: set[Object] = set(depsgraph.view_layer.objects)
     found = [obj for obj in there if is_probe(obj)]
     if scene and not found:
         forget_targets()  # The last one may have been deleted.
@@ -147,23 +153,23 @@ def _concerned(depsgraph):
     return concerned, unsure
 
 
-def _name_of(target):
+def _name_of(target: Object | None) -> str | None:
     return None if target is None else target.name
 
 
-def is_pending(probe):
+def is_pending(probe: Object) -> bool:
     """Whether the slow part of a probe's patch is still to be filled in."""
     record = record_of(probe)
     return record is not None and not probe.tactile_probe.message and not record["is_verified"]
 
 
-def _settle_soon():
+def _settle_soon() -> None:
     if bpy.app.timers.is_registered(_settle):
         bpy.app.timers.unregister(_settle)
     bpy.app.timers.register(_settle, first_interval=SETTLE)
 
 
-def _settle():
+def _settle() -> float | None:
     """Completes the patches of a gesture once it has ended, some at a time; Blender calls it as a timer."""
     if not targets():
         return None
@@ -175,7 +181,8 @@ def _settle():
             depsgraph = bpy.context.evaluated_depsgraph_get()
             if _unsure:
                 on_depsgraph_update(window.scene, depsgraph)
-            for probe in filter(is_probe, list(window.view_layer.objects)):
+            objects: list[Object] = list(window.view_layer.objects)
+            for probe in filter(is_probe, objects):
                 late = probe.tactile_probe.live and is_outdated(probe, depsgraph)
                 if not is_free(probe):
                     continue
@@ -189,13 +196,13 @@ def _settle():
 
 
 @persistent
-def before_undo(*_):
+def before_undo(*_: Any) -> None:
     """Takes out what no undo step has, so that nothing points to what undo frees."""
     undo.take_out()
 
 
 @persistent
-def after_undo(*_):
+def after_undo(*_: Any) -> None:
     """Puts back what is still there, and makes the handlers look at all probes."""
     undo.put_back()
     on_other_data()
@@ -213,13 +220,13 @@ HANDLERS = {
 }
 
 
-def register():
+def register() -> None:
     on_other_data()
     for name, handler in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(handler)
 
 
-def unregister():
+def unregister() -> None:
     for timer in filter(bpy.app.timers.is_registered, (_settle, deleted.remove)):
         bpy.app.timers.unregister(timer)
     for name, handler in HANDLERS.items():

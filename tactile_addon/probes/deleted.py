@@ -2,20 +2,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What was deleted beneath a probe, and what undo brings back."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import bpy
 
 from ..scene import patch_object, patch_record
 from ..scene.viewports import has_gesture
 from ..touch.settings import silent
+from ..touch.types import Object
 from . import anchor
 from .probe import DIGEST, is_result
 
 LATER = 0.25  # After so many seconds it is checked again whether a gesture has ended.
-_deleted = set()  # The session_uids of deleted targets.
-_owners = {}  # By those of contours, those of their last patches: undo may bring these back.
+_deleted: set[int] = set()  # The session_uids of deleted targets.
+_owners: dict[int, int] = {}  # By those of contours, those of their last patches: undo may bring these back.
 
 
-def forget_target(probe):
+def forget_target(probe: Object) -> None:
     """Clears a probe's target if it was deleted, because it lives on as long as the probe points to it.
 
     The undo step was stored before, and undo takes back only what differs between two steps. So the probe
@@ -40,7 +44,7 @@ def forget_target(probe):
         _remove_soon()
 
 
-def _follow(probe, target):
+def _follow(probe: Object, target: Object) -> None:
     """Follows a library's object, which is not deleted if it is in no scene of this file.
 
     Its override may be in a scene, or it may be in one of its own file. The override takes the place of the
@@ -61,20 +65,20 @@ def _follow(probe, target):
         anchor.attach(probe, found)
 
 
-def _remove_soon():
+def _remove_soon() -> None:
     """Calls `remove` later, because a handler may not delete what is being evaluated."""
     # Without a window no timer runs, and a registered one keeps Blender's module from ending.
     if not bpy.app.background and not bpy.app.timers.is_registered(remove):
         bpy.app.timers.register(remove)
 
 
-def relink(probe):
+def relink(probe: Object) -> None:
     """Makes the probe point again to the target that it lost, if undo has brought that back."""
     settings = probe.tactile_probe
     if settings.target is not None or not settings.lost:
         return
     number, was_attached, name = settings.lost.split(" ", 2)
-    target = bpy.data.objects.get(name)
+    target: Object = bpy.data.objects.get(name)
     if target is not None and str(target.session_uid) == number and target.users_scene:
         with silent():
             settings.target = target
@@ -82,14 +86,14 @@ def relink(probe):
             anchor.attach(probe, target)
 
 
-def has_contours():
+def has_contours() -> bool:
     """Whether any contours were seen that may lose their patch."""
     return bool(_owners)
 
 
-def look_for_contours():
+def look_for_contours() -> None:
     """Deletes contours whose patch was deleted, because without its coordinates they mean nothing."""
-    there = {obj.session_uid: obj for obj in bpy.data.objects}
+    there: dict[int, Object] = {obj.session_uid: obj for obj in bpy.data.objects}
     for number, obj in there.items():
         if patch_record.CONTOURS in obj and obj.parent is not None:
             _owners[number] = obj.parent.session_uid
@@ -97,23 +101,24 @@ def look_for_contours():
         _remove_soon()
 
 
-def _is_left(obj, there):
+def _is_left(obj: Object, there: dict[int, Object]) -> bool:
     """Whether an object is contours whose patch was deleted."""
     owner = _owners.get(obj.session_uid)
     return owner is not None and owner not in there and obj.parent is None and obj.is_editable
 
 
-def _is_data(datablock):
+def _is_data(datablock: bpy.types.ID) -> bool:
     """Whether a datablock is an object or the like; scenes and windows drop a deleted one by themselves."""
     kinds = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
     return not isinstance(datablock, kinds)
 
 
-def _unused_meshes():
-    return [mesh for mesh in bpy.data.meshes if DIGEST in mesh and not mesh.users]
+def _unused_meshes() -> list[bpy.types.Mesh]:
+    meshes: Iterable[Any] = bpy.data.meshes
+    return [mesh for mesh in meshes if DIGEST in mesh and not mesh.users]
 
 
-def remove():
+def remove() -> float | None:
     """Removes the datablocks of what was deleted if nobody uses them; Blender calls it as a timer."""
     if has_gesture():
         return LATER

@@ -3,12 +3,15 @@
 """Long work that is done in slices between a window's events, with progress and Esc."""
 
 import sys
+from collections.abc import Callable, Iterator
 from time import perf_counter
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import bpy
 from bpy.props import BoolProperty
 
 from ..touch.settings import UNSAVED
+from ..touch.types import OperatorMixin, Outcome
 from .operators import report_error, target_object
 
 # These are seconds.
@@ -16,9 +19,10 @@ FIRST_SLICE = 0.2  # Work that takes no longer is done without slices.
 TIMER_SLICE, LONGEST_SLICE = 0.03, 0.25  # Work between two events takes so long, or as long as a slow redraw.
 NEXT = 0.01  # The next slice begins after this time.
 SAY = 1.0  # Without a window, a line of progress is printed each time.
+Progress: TypeAlias = tuple[str, float | None]  # Words, and the share that is done, if it is known.
 
 
-class InSlices:
+class InSlices(OperatorMixin):
     """For operators whose work is a generator to inherit.
 
     Each has `_begin(context)`, which sets `_steps`; `_check(context)`, called before each slice, because the
@@ -32,13 +36,19 @@ class InSlices:
         options={"HIDDEN", *UNSAVED},
     )
 
-    _timer = None  # There is one while it runs in a window.
+    if TYPE_CHECKING:  # At run time it is the property of operators that have one.
+        target: str
+    _steps: Iterator[Any]
+    _begin: Callable[[bpy.types.Context], None]
+    _done: Callable[[], Progress]
+    _finish: Callable[[bpy.types.Context], Outcome]
+    _timer: bpy.types.Timer | None = None  # There is one while it runs in a window.
     _worked = 0.0  # When the last slice ended.
     _in_window = False  # Whether a dialog was confirmed, after which it goes on in slices.
     stop = "Stop"  # What Esc does.
     meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         try:
             self._begin(context)
             if self._advance(context, FIRST_SLICE):
@@ -47,7 +57,7 @@ class InSlices:
             return report_error(self, error)
         return self._go_on(context)
 
-    def _ask(self, context):
+    def _ask(self, context: bpy.types.Context) -> Outcome:
         """Asks in a dialog that names the mesh to touch before it begins."""
         if bpy.app.background:
             return self.execute(context)
@@ -58,7 +68,7 @@ class InSlices:
             return report_error(self, error)
         return context.window_manager.invoke_props_dialog(self, confirm_text="Touch")
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         try:
             self._begin(context)
             if self._in_window:
@@ -73,14 +83,14 @@ class InSlices:
         except ValueError as error:
             return report_error(self, error)
 
-    def _go_on(self, context):
+    def _go_on(self, context: bpy.types.Context) -> Outcome:
         """Makes the window do the steps."""
         self._timer = context.window_manager.event_timer_add(NEXT, window=context.window)
         context.workspace.status_text_set(_status(self.stop, *self._done()))
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if event.type == "ESC" and event.value == "PRESS":
             return self._stopped(context)
         if event.type != "TIMER":
@@ -95,11 +105,11 @@ class InSlices:
             self._leave(context)
             return report_error(self, error)
 
-    def _slice(self):
+    def _slice(self) -> float:
         """How long to work: where redraws are slow, as without a graphics card, half of the time."""
         return min(max(perf_counter() - self._worked, TIMER_SLICE), LONGEST_SLICE)
 
-    def _advance(self, context, seconds):
+    def _advance(self, context: bpy.types.Context, seconds: float) -> bool:
         """Works for some seconds, and returns whether all is done then."""
         self._check(context)
         end = perf_counter() + seconds
@@ -109,32 +119,32 @@ class InSlices:
         # `_finish` has a slice of its own, because the last step and the new object may take long together.
         return self._timer is None or perf_counter() < end - 0.5 * seconds
 
-    def _check(self, context):
+    def _check(self, context: bpy.types.Context) -> None:
         """Accepts whatever happens meanwhile, unless an operator overrides it."""
 
-    def _stopped(self, context):
+    def _stopped(self, context: bpy.types.Context) -> Outcome:
         self._leave(context)
         self.report({"INFO"}, "Stopped: the patch stays as it was")
         return {"CANCELLED"}
 
-    def _leave(self, context):
+    def _leave(self, context: bpy.types.Context) -> None:
         """Removes everything that shows that it is going on."""
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             context.workspace.status_text_set(None)
             self._timer = None
 
-    def cancel(self, context):
+    def cancel(self, context: bpy.types.Context) -> None:
         """Blender calls it when it ends the operator itself: by a dialog, a new file or a closed window."""
         if self._timer is not None:
             self._leave(context)
             print(f"{self.bl_label}: stopped because the file or the window was closed", file=sys.stderr)
 
 
-def _status(stop, words, share=None):
+def _status(stop: str, words: str, share: float | None = None) -> Callable[[Any, bpy.types.Context], None]:
     """The function that draws the status bar meanwhile; it may outlive the operator by a redraw."""
 
-    def draw(header, context):
+    def draw(header: Any, context: bpy.types.Context) -> None:
         layout = header.layout
         layout.label(text="", icon="EVENT_ESC")
         layout.label(text=f" {stop}")

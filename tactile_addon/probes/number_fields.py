@@ -7,17 +7,21 @@ each power of ten, which shows and sets the length itself, and a panel takes the
 """
 
 import math
+from collections.abc import Callable, Mapping
 from inspect import get_annotations
+from typing import Any
 
 import bpy
 from bpy.props import FloatProperty, IntProperty
+
+from ..touch.types import Object
 
 # What a pixel changes a length by, as a share of the object's size.
 PACES = {
     "extent": 1.5e-3, "spacing": 5e-4, "step": 1.5e-4, "edge": 1.5e-4, "noise": 1.5e-5, "tolerance": 1.5e-5
 }  # fmt: skip
 DECADES = range(-6, 7)  # The powers of ten of the properties' steps.
-HIDDEN_UNSAVED = {"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"}
+HIDDEN_UNSAVED: set[Any] = {"HIDDEN", "SKIP_SAVE", "SKIP_PRESET"}
 # Blender's units of length in meters, each with the least length that Blender shows in it.
 LENGTH_UNITS = {
     "METRIC": ((1e3, 1e3), (1.0, 1.0), (1e-2, 1e-2), (1e-3, 1e-4), (1e-6, 1e-6)),
@@ -26,7 +30,7 @@ LENGTH_UNITS = {
 WHOLE = {"METRIC": 1.0, "IMPERIAL": 0.3048}  # Lengths below all of these are shown in these units.
 
 
-def annotations(cls, found=lambda owner, name: 0.0):
+def annotations(cls: type, found: Callable[[Object, str], float] = lambda owner, name: 0.0) -> dict[str, Any]:
     """The additional properties for the lengths of a property group or operator, by name.
 
     found : function of an object and the name of a number; gives the value that was found for 0
@@ -39,7 +43,7 @@ def annotations(cls, found=lambda owner, name: 0.0):
     }
 
 
-def dragged(cls):
+def dragged(cls: type[Any]) -> type[Any]:
     """Decorates an operator that shows its lengths through `fields`, and that Blender does not register.
 
     Blender's log of registered operators would list each of these properties.
@@ -48,17 +52,17 @@ def dragged(cls):
     return cls
 
 
-def fields(size):
+def fields(size: float) -> dict[str, str]:
     """By the names of lengths, those of the properties that show them for an object of this size."""
     size = size if 0.0 < size < math.inf else 1.0
 
-    def fitting(pace):
+    def fitting(pace: float) -> int:
         return min(DECADES, key=lambda decade: abs(math.log(pace_of(decade) / (pace * size))))
 
     return {name: _name(name, fitting(pace)) for name, pace in PACES.items()}
 
 
-def pace_of(decade):
+def pace_of(decade: int) -> float:
     """What a pixel changes a property of this step by in the open scene, as Blender's ui_get_but_step_unit.
 
     Blender makes it one unit that suits ten pixels, unless this is the unit of the number 1.
@@ -71,16 +75,16 @@ def pace_of(decade):
     return unit / scale * (step if unit == own else 1.0)
 
 
-def _unit_of(system, meters):
+def _unit_of(system: str, meters: float) -> float:
     found = (unit for unit, least in LENGTH_UNITS[system] if meters >= least * (1.0 - 1e-4))
     return next(found, WHOLE[system])
 
 
-def _name(name, decade):
+def _name(name: str, decade: int) -> str:
     return f"{name}_by_{'m' if decade < 0 else ''}{abs(decade)}"
 
 
-def degree_field(given, found):
+def degree_field(given: Mapping[str, Any], found: Callable[[Object, str], float]) -> Any:
     """The property that shows the degree that was found, and sets the property with the keywords `given`."""
     return IntProperty(
         **{key: given[key] for key in ("name", "description", "min", "max")},
@@ -90,7 +94,7 @@ def degree_field(given, found):
     )
 
 
-def _field(name, given, decade, found):
+def _field(name: str, given: Mapping[str, Any], decade: int, found: Callable[[Object, str], float]) -> Any:
     shown = {key: given[key] for key in ("name", "description", "subtype", "soft_min")}
     return FloatProperty(
         **shown,

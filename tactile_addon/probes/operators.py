@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator behind the menu entry, the scripts and the command line."""
 
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import bpy
 
@@ -18,6 +20,7 @@ from ..touch.settings import (
     touch_arguments,
 )
 from ..touch.touch_object import completed, touch
+from ..touch.types import Object, Outcome
 from ..touch.wording import fit_summary, sentence
 from .number_fields import fields
 from .probe import is_result, lock_of, patch_near, probe_of, record_of
@@ -42,12 +45,12 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if context.area is not None and not is_in_object_mode(cls, context, "Patches are fitted"):
             return False  # Scripts, which have no area, need not leave a mode.
         return has_target(cls, context)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         given = self.properties.is_property_set
         depsgraph = context.evaluated_depsgraph_get()
         try:
@@ -55,7 +58,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
                 touched = touch(
                     target_object(context, self.target),
                     depsgraph,
-                    list(self.location) if given("location") else list(context.scene.cursor.location),
+                    list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
                     outward=list(self.outward) if given("outward") else None,
                     tolerance=self.tolerance if given("tolerance") else None,
                     **touch_arguments(self),
@@ -69,7 +72,7 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, fit_summary(report))
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "target")
@@ -81,13 +84,13 @@ class TACTILE_OT_reconstruct(TouchSettings, bpy.types.Operator):
         layout.prop(self, "tolerance", text="Tolerance" if given else "Tolerance (Off)")
 
 
-def report_error(operator, error):
+def report_error(operator: bpy.types.Operator, error: Exception) -> Outcome:
     """Lets an operator report what is wrong, and returns what ends it."""
     operator.report({"ERROR"}, sentence(error))
     return {"CANCELLED"}
 
 
-def target_object(context, name):
+def target_object(context: bpy.types.Context, name: str) -> Object:
     """The object to touch: by name, or the active one, or that of the active patch, map or whole object."""
     obj = context.view_layer.objects.active
     record, found = record_of(obj) or patch_record.touched_record(obj), probe_of(obj)
@@ -106,7 +109,7 @@ def target_object(context, name):
     return obj
 
 
-def fields_of(context, name):
+def fields_of(context: bpy.types.Context, name: str) -> dict[str, str]:
     """The properties by which an operator shows lengths for the object it touches, see number_fields."""
     try:
         return fields(max(target_object(context, name).dimensions))
@@ -115,7 +118,7 @@ def fields_of(context, name):
 
 
 @contextmanager
-def waiting(context):
+def waiting(context: bpy.types.Context) -> Iterator[None]:
     """Shows in a window that it takes a while, as the first touch of a large mesh, which builds a tree."""
     if bpy.app.background or context.window is None:
         yield
@@ -127,7 +130,7 @@ def waiting(context):
         context.window.cursor_modal_restore()
 
 
-def is_in_object_mode(operator, context, what):
+def is_in_object_mode(operator: type[Any], context: bpy.types.Context, what: str) -> bool:
     """Whether the mode is Object Mode; if it is not, the operator's poll says so."""
     if context.mode == "OBJECT":
         return True
@@ -135,7 +138,7 @@ def is_in_object_mode(operator, context, what):
     return False
 
 
-def has_mesh(operator, context):
+def has_mesh(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the view layer has a mesh that can be touched; if not, the operator's poll says so."""
     found = any(obj.type == "MESH" and not is_result(obj) for obj in context.view_layer.objects)
     if not found:
@@ -143,7 +146,7 @@ def has_mesh(operator, context):
     return found
 
 
-def has_target(operator, context):
+def has_target(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the active object of a viewport can be touched or leads to one that can; poll says why not."""
     if context.area is None or context.area.type != "VIEW_3D":  # A script may name one.
         return True
@@ -158,7 +161,7 @@ def has_target(operator, context):
     return obj.type == "MESH"
 
 
-def has_patch(operator, context, hint):
+def has_patch(operator: type[Any], context: bpy.types.Context, hint: str) -> bool:
     """Whether the active object is a patch, its probe or its contours; if not, the poll gives a hint."""
     found = patch_near(context.view_layer.objects.active) is not None
     if not found:
@@ -166,7 +169,7 @@ def has_patch(operator, context, hint):
     return found
 
 
-def is_unlocked(operator, context):
+def is_unlocked(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the active object's probe or patch can be changed; the operator's poll says why not."""
     lock = lock_of(context.view_layer.objects.active)
     if lock is not None:
@@ -174,7 +177,7 @@ def is_unlocked(operator, context):
     return lock is None
 
 
-def make_active(context, obj):
+def make_active(context: bpy.types.Context, obj: Object) -> None:
     """Selects only the new object, unless that would leave an edit mode or its collection is excluded."""
     context.view_layer.update()  # After `blender -b FILE -c` it would not know the new object yet.
     objects = context.view_layer.objects

@@ -4,9 +4,31 @@
 
 The patch is a child of its probe. So a copy of a probe has none and makes its own, and if a probe is
 deleted, its patch stays as an ordinary object. Each probe keeps the digest of the inputs it was last
-touched with, and so do the datablocks made from them. Undo restores each datablock by itself, and if
-digests differ afterward, change_handlers.py touches again.
+touched with, and so do the datablocks made from them. Undo restores each datablock by itself, so digests
+may differ afterward.
+
+    probe, target or frame changes           undo, redo: undo.take_out before, undo.put_back after
+                  |                                 |
+                  |                                 v
+                  |                   on_other_data: any probe may be outdated
+                  v                                 |
+    change_handlers._look_at  <---------------------+
+                  |
+    touch_again.is_outdated: do the inputs have the digest that the probe, its patch and their meshes keep?
+                  |
+                  +-- they do ----------> stand_by: the patch goes where its target goes
+                  |
+                  +-- not, not live ----> stand_by: the patch is marked "outdated", until Touch Again
+                  |
+                  +-- not, live --------> update: touch, rewrite the patch, give all of them the digest
+                                            |
+                                            v
+                     without a window it is complete; in a window `_settle` completes it after the gesture,
+                     and touches then if there was no time before
 """
+
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import bpy
 from bpy.props import (
@@ -18,9 +40,12 @@ from bpy.props import (
     StringProperty,
 )
 
+from ... import core
 from ..scene import patch_object, patch_record, shown
 from ..scene.family import children_of
 from ..touch.settings import OVERRIDABLE, FitSettings, TouchSettings, changed, is_silent
+from ..touch.touch_report import TouchReport
+from ..touch.types import Object
 from . import anchor, number_fields
 
 DIGEST = "tactile_digest"
@@ -72,30 +97,33 @@ class TactileProbe(TouchSettings, bpy.types.PropertyGroup):
     lost: StringProperty(description="Data of a target that was deleted", options={"HIDDEN"})
 
 
-_targets = None  # The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
+_targets: set[int] | None = (
+    None  # The session_uids of the probes' targets, 0 for none; None if they are to be looked up.
+)
 
 
-def targets():
+def targets() -> set[int]:
     """The session_uids of the targets of all probes in this file; 0 for a probe without target."""
     global _targets
     if _targets is None:
-        of = (obj.tactile_probe.target for obj in bpy.data.objects if is_probe(obj))
+        objects: Iterable[Object] = bpy.data.objects
+        of = (obj.tactile_probe.target for obj in objects if is_probe(obj))
         _targets = {0 if target is None else target.session_uid for target in of}
     return _targets
 
 
-def forget_targets():
+def forget_targets() -> None:
     """Makes `targets` look again, because probes may have come or gone or changed their targets."""
     global _targets
     _targets = None
 
 
-def _appointed(settings, context):
+def _appointed(settings: TactileProbe, context: bpy.types.Context) -> None:
     forget_targets()
     changed(settings, context)
 
 
-def _chosen(settings, context):
+def _chosen(settings: TactileProbe, context: bpy.types.Context) -> None:
     """Makes a probe that was a child of its target a child of the new target."""
     if is_silent():  # It is the same target, which has come back or is an override now.
         forget_targets()
@@ -111,28 +139,28 @@ def _chosen(settings, context):
     _appointed(settings, context)
 
 
-def is_probe(obj):
+def is_probe(obj: Object) -> bool:
     """Whether an object (or None) is an Empty that keeps a patch up to date."""
     return obj is not None and obj.type == "EMPTY" and obj.tactile_probe.is_probe
 
 
-def is_result(obj):
+def is_result(obj: Object) -> bool:
     """Whether an object is a patch, contours, a stability map or a whole object."""
     keys = patch_record.RECORD, patch_record.CONTOURS, patch_record.MAP_RECORD, patch_record.ATLAS_RECORD
     return any(key in obj for key in keys)
 
 
-def patch_of(probe):
+def patch_of(probe: Object) -> Object | None:
     """The patch of a probe, or None."""
     return next((child for child in children_of(probe) if _is_patch(child)), None)
 
 
-def _is_patch(obj):
+def _is_patch(obj: Object) -> bool:
     """Whether an object is a patch that nobody has converted to something else than a mesh."""
     return patch_record.RECORD in obj and obj.type == "MESH"
 
 
-def patch_near(obj):
+def patch_near(obj: Object) -> Object | None:
     """The patch that `obj` is, or keeps as a probe, or is the contours of; or None."""
     if is_probe(obj):
         return patch_of(obj)
@@ -141,7 +169,7 @@ def patch_near(obj):
     return obj if obj is not None and _is_patch(obj) else None
 
 
-def reconstruction_of(obj):
+def reconstruction_of(obj: Object) -> core.Reconstruction:
     """The core.Reconstruction of the patch near `obj`, where it is now. Raises ValueError without one."""
     patch = patch_near(obj)
     if patch is None:
@@ -149,7 +177,7 @@ def reconstruction_of(obj):
     return patch_record.reconstruction_of(patch)
 
 
-def probe_of(obj):
+def probe_of(obj: Object) -> Object | None:
     """The probe that `obj` is, or is the patch or the contours of; or None."""
     if is_probe(obj):
         return obj
@@ -157,13 +185,13 @@ def probe_of(obj):
     return patch.parent if patch is not None and is_probe(patch.parent) else None
 
 
-def record_of(obj):
+def record_of(obj: Object) -> TouchReport | None:
     """The report, an ID property, of the patch near `obj`, or None."""
     patch = patch_near(obj)
     return None if patch is None else patch_record.report_of(patch)
 
 
-def require_unlocked(obj):
+def require_unlocked(obj: Object) -> None:
     """Raises ValueError if anything of the probe or patch near `obj` cannot be changed."""
     patch = patch_near(obj)
     lines = None if patch is None else patch_record.contours_of(patch)
@@ -176,7 +204,7 @@ def require_unlocked(obj):
             raise ValueError(f'"{each.name}" is being edited: leave its Edit Mode first')
 
 
-def lock_of(obj):
+def lock_of(obj: Object) -> str | None:
     """A sentence on why the probe or patch near `obj` cannot be changed, or None if it can."""
     try:
         require_unlocked(obj)
@@ -185,21 +213,21 @@ def lock_of(obj):
     return None
 
 
-def is_free(probe):
+def is_free(probe: Object) -> bool:
     """Whether the probe can be kept up to date: no library has any of it, and nobody edits its patch."""
     return lock_of(probe) is None
 
 
-def make(context, target):
+def make(context: bpy.types.Context, target: Object) -> Object:
     """A new probe, which touches nothing until `is_probe` is set."""
-    probe = bpy.data.objects.new(f"{target.name} Probe", None)
+    probe: Object = bpy.data.objects.new(f"{target.name} Probe", None)
     probe.empty_display_type = "SINGLE_ARROW"
     patch_object.collection(context.scene).objects.link(probe)
     probe.tactile_probe.target = target
     return probe
 
 
-def _show(obj):
+def _show(obj: Object) -> None:
     """Colors a patch by the quantity it is set to show now, without the range of the one before."""
     obj.pop(patch_record.RANGE, None)
     obj.pop(patch_record.COMMON_RANGE, None)
@@ -209,46 +237,48 @@ def _show(obj):
             shown.share_range(obj)
 
 
-def _show_contours(patch, shown):
+def _show_contours(patch: Object, shown: bool) -> None:
     """Shows or hides the contours of a patch, if it has any."""
     lines = patch_record.contours_of(patch)
     if lines is not None:
         lines.hide_viewport = not shown
 
 
-def _found(probe, name):
+def _found(probe: Object, name: str) -> float:
     """The value that the last touch chose for a number that is 0."""
-    record = record_of(probe)
+    record: Mapping[str, Any] | None = record_of(probe)
     return 0.0 if record is None or name == "noise" else record.get(name, 0.0)
 
 
-def register():
+def register() -> None:
+    objects: Any = bpy.types.Object
     TactileProbe.__annotations__.update(number_fields.annotations(TactileProbe, _found))
     degree = FitSettings.__annotations__["degree"].keywords
     TactileProbe.__annotations__["degree_shown"] = number_fields.degree_field(degree, _found)
     bpy.utils.register_class(TactileProbe)
-    bpy.types.Object.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
-    bpy.types.Object.tactile_colors = EnumProperty(
+    objects.tactile_probe = PointerProperty(type=TactileProbe, override=OVERRIDABLE)
+    objects.tactile_colors = EnumProperty(
         name="Colors",
         description="What the colors of the patch show",
         items=[item[:3] for item in patch_record.QUANTITIES],
         override=OVERRIDABLE,
         update=lambda obj, _: _show(obj),
     )
-    bpy.types.Object.tactile_contours = BoolProperty(
+    objects.tactile_contours = BoolProperty(
         name="Contours",
         description="Show the curves that the finger followed",
         get=lambda obj: (lines := patch_record.contours_of(obj)) is not None and not lines.hide_viewport,
         set=lambda obj, shown: _show_contours(obj, shown),
     )
-    bpy.types.Object.tactile_target = StringProperty(  # A pointer would keep a deleted mesh.
+    objects.tactile_target = StringProperty(  # A pointer would keep a deleted mesh.
         name="Target",
         description="Name of the mesh object to put the patch onto, or to compare it with",
         override=OVERRIDABLE,
     )
 
 
-def unregister():
-    del bpy.types.Object.tactile_contours
-    del bpy.types.Object.tactile_target, bpy.types.Object.tactile_colors, bpy.types.Object.tactile_probe
+def unregister() -> None:
+    objects: Any = bpy.types.Object
+    del objects.tactile_contours
+    del objects.tactile_target, objects.tactile_colors, objects.tactile_probe
     bpy.utils.unregister_class(TactileProbe)

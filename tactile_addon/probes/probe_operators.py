@@ -3,6 +3,8 @@
 """The buttons of the panels besides picking: planes, another touch, deletion, and a viewport with colors."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import bpy
 from bpy.props import IntProperty
@@ -11,6 +13,7 @@ from ..scene import color_range, patch_object, patch_record
 from ..scene.viewports import show_colors, shows_colors
 from ..touch import units
 from ..touch.settings import MOST_PLANES, length_property
+from ..touch.types import OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
 from .operators import has_patch, is_in_object_mode, is_unlocked, report_error, waiting
@@ -19,13 +22,13 @@ SUBDIVISIONS = 3  # A target gets so many levels at once,
 MOST_FACES = 500_000  # as long as it has no more faces then.
 
 
-class _ProbeOperator:
+class _ProbeOperator(OperatorMixin):
     """For operators on the active probe, or on that of the active patch or contours, to inherit."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if probe.probe_of(context.view_layer.objects.active) is None:
             cls.poll_message_set("Select a probe, or pick a reference point first")
             return False
@@ -38,7 +41,7 @@ class _PlaneOperator(_ProbeOperator):
     limit, why_not = MOST_PLANES, "A patch has six planes at most: remove one first"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if not super().poll(context):
             return False
         if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == cls.limit:
@@ -53,7 +56,7 @@ class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
     bl_idname = "tactile.add_plane"
     bl_label = "Add Suggested Plane"
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         record = probe.record_of(found)
         _add(found.tactile_probe, None if record is None else record.get("suggested_plane"))
@@ -71,7 +74,7 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         "Tolerance", "Standard deviation of the height to reach; 0 goes on as long as a plane helps"
     )
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         depsgraph = context.evaluated_depsgraph_get()
         try:
@@ -88,12 +91,12 @@ class TACTILE_OT_add_planes(_PlaneOperator, bpy.types.Operator):
         self.report({"INFO"}, added_planes(touched.report, unit))
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
         self.layout.prop(self, "tolerance")
 
 
-def _add(settings, suggested):
+def _add(settings: Any, suggested: Mapping[str, Any] | None) -> None:
     """Adds one more plane, at the suggested azimuth, or with the angles it had before."""
     number = settings.plane_count
     if suggested is not None:
@@ -112,7 +115,7 @@ class TACTILE_OT_remove_plane(_PlaneOperator, bpy.types.Operator):
     limit, why_not = 3, "A patch needs three planes"
     plane: IntProperty(name="Plane", description="Index of the plane, from 0", min=0, max=MOST_PLANES - 1)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         settings = found.tactile_probe
         count = settings.plane_count
@@ -135,7 +138,7 @@ class TACTILE_OT_update(_ProbeOperator, bpy.types.Operator):
     bl_idname = "tactile.update"
     bl_label = "Touch Again"
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         with waiting(context):
             touch_again.refresh(found, context)
@@ -150,7 +153,7 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
     bl_idname = "tactile.add_subdivision"
     bl_label = "Add Subdivision"
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         target = found.tactile_probe.target
         if target is None or not target.is_editable:
@@ -168,7 +171,7 @@ class TACTILE_OT_add_subdivision(_ProbeOperator, bpy.types.Operator):
         touch_again.refresh(found, context)
         if found.tactile_probe.message:
             return report_error(self, ValueError(found.tactile_probe.message))
-        record = probe.record_of(found).to_dict()
+        record = probe.record_of(found)
         self.report({"INFO"}, verdict(record, units.unit_of(context.scene, record["radius"])))
         return {"FINISHED"}
 
@@ -179,7 +182,7 @@ class TACTILE_OT_delete(_ProbeOperator, bpy.types.Operator):
     bl_idname = "tactile.delete"
     bl_label = "Delete Probe and Patch"
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         patch = probe.patch_of(found)
         lines = None if patch is None else patch_record.contours_of(patch)
@@ -194,7 +197,7 @@ class TACTILE_OT_show_colors(bpy.types.Operator):
     bl_label = "Show Patch Colors"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         space = context.space_data
         if space is None or space.type != "VIEW_3D":
             cls.poll_message_set("Use it in a 3D viewport")
@@ -204,9 +207,10 @@ class TACTILE_OT_show_colors(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context):
-        context.space_data.shading.type = "SOLID"
-        show_colors(context.space_data)
+    def execute(self, context: bpy.types.Context) -> Outcome:
+        space: Any = context.space_data
+        space.shading.type = "SOLID"
+        show_colors(space)
         return {"FINISHED"}
 
 
@@ -218,10 +222,10 @@ class TACTILE_OT_share_range(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return has_patch(cls, context, "Select a patch, or its probe")
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         patch = probe.patch_near(context.view_layer.objects.active)
         count = color_range.share(patch, context.view_layer.objects)
         self.report({"INFO"}, f"{count} patches have one range of colors")

@@ -3,15 +3,18 @@
 """How a probe touches again: the inputs of its patch, whether these have changed, and the new patch."""
 
 import hashlib
+from collections.abc import Container, Iterable
+from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Matrix
 
 from ..scene import patch_object, patch_record
 from ..touch.evaluated_mesh import checksum_of, is_disabled, require_invertible
 from ..touch.settings import touch_arguments
-from ..touch.touch_object import completed, touch
+from ..touch.touch_object import Touched, completed, touch
+from ..touch.types import Object
 from ..touch.wording import sentence
 from . import anchor
 from .probe import DIGEST, patch_of, record_of
@@ -20,7 +23,7 @@ NO_SHAPE = " 00000000"  # The end of settings.shape for a mesh that cannot be to
 VERTICES = 1000  # At most so many vertices around are compared with the patch; a quarter or more lie over it.
 
 
-def _put(probe, touched):
+def _put(probe: Object, touched: Touched) -> None:
     """Puts the probe on the reference point, with z outward and x toward azimuth 0.
 
     It stays as it is if it is there already, or if constraints would take it back.
@@ -29,7 +32,7 @@ def _put(probe, touched):
         return
     location, (e1, n, across) = touched.result.frame.origin, np.transpose(touched.report["axes"])
     turn = Matrix(np.column_stack([e1, -across, n]).tolist())
-    wanted = Matrix.LocRotScale(Vector(location), turn.to_quaternion(), None)
+    wanted = Matrix.LocRotScale(location.tolist(), turn.to_quaternion(), None)
     old, new = (np.array(m, dtype=float) for m in (probe.matrix_world.normalized(), wanted))
     # If it were put there again and again, it would creep by rounding.
     near = 1e-5 * touched.report["extent"]
@@ -39,7 +42,7 @@ def _put(probe, touched):
         anchor.put(probe, wanted @ Matrix.Diagonal((*scale, 1.0)))
 
 
-def update(probe, depsgraph, complete):
+def update(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool) -> None:
     """Touches again and rewrites the probe's patch; if that fails, the probe's message says why.
 
     complete : whether to include what takes long, as the distances to the mesh, and to put the probe onto the
@@ -59,7 +62,7 @@ def update(probe, depsgraph, complete):
         adopt(probe, touched, depsgraph, complete)
 
 
-def adopt(probe, touched, depsgraph, complete):
+def adopt(probe: Object, touched: Touched, depsgraph: bpy.types.Depsgraph, complete: bool) -> None:
     """Makes `touched` the probe's patch; `complete` as in update."""
     probe.tactile_probe.message = ""
     if complete:
@@ -75,7 +78,7 @@ def adopt(probe, touched, depsgraph, complete):
     _sign(probe, depsgraph)
 
 
-def stand_by(probe, outdated, complete):
+def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
     """Keeps the patch where it was, because there is no touch now, and lets it say whether it is outdated."""
     settings, patch = probe.tactile_probe, patch_of(probe)
     if complete:
@@ -95,15 +98,16 @@ def stand_by(probe, outdated, complete):
         patch_record.mark_current(patch)
 
 
-def _left_contours(probe):
+def _left_contours(probe: Object) -> Object | None:
     """The contours of a patch that was deleted, if they are still there, or None."""
-    lines = (obj for obj in bpy.data.objects if patch_record.CONTOURS in obj and obj.parent is None)
+    objects: Iterable[Object] = bpy.data.objects
+    lines = (obj for obj in objects if patch_record.CONTOURS in obj and obj.parent is None)
     own = (obj for obj in lines if obj.is_editable and obj.data is not None)
     touched, _ = _signed(probe.tactile_probe)
     return next((obj for obj in own if obj.data.get(DIGEST) == touched), None)
 
 
-def touch_at(probe, depsgraph, complete, **more):
+def touch_at(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool, **more: Any) -> Touched:
     """A touch with the probe's inputs. Raises ValueError, with a sentence, if there can be none."""
     settings, matrix, record = probe.tactile_probe, probe.matrix_world, record_of(probe)
     if settings.target is None:
@@ -133,14 +137,14 @@ def touch_at(probe, depsgraph, complete, **more):
     )
 
 
-def _is_there(target, depsgraph):
+def _is_there(target: Object, depsgraph: bpy.types.Depsgraph) -> bool:
     objects = depsgraph.view_layer.objects
-    named = objects.get(target.name)
+    named: Object = objects.get(target.name)
     # A library's object and its override may both be there under one name.
     return named == target or (named is not None and any(obj == target for obj in objects))
 
 
-def may_be_outdated(probe, there):
+def may_be_outdated(probe: Object, there: Container[Object]) -> bool:
     """Whether something that belongs to the probe was removed, brought back or renamed.
 
     there : the objects in the view layer
@@ -156,7 +160,7 @@ def may_be_outdated(probe, there):
     )
 
 
-def is_outdated(probe, depsgraph):
+def is_outdated(probe: Object, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether the patch differs from what the inputs ask for, by the digests of probe and patch."""
     (touched, name), made = _signed(probe.tactile_probe), _made(probe)
     meshes = patch_object.meshes(patch_of(probe))
@@ -166,13 +170,13 @@ def is_outdated(probe, depsgraph):
     return any(other != digest for other in (touched, *(block.get(DIGEST) for block in made)))
 
 
-def _made(probe):
+def _made(probe: Object) -> list[bpy.types.ID]:
     """The datablocks that a touch of the probe writes to."""
     patch = patch_of(probe)
     return [] if patch is None else [patch, *patch_object.meshes(patch)]
 
 
-def _sign(probe, depsgraph):
+def _sign(probe: Object, depsgraph: bpy.types.Depsgraph) -> None:
     measure_shape(probe.tactile_probe, depsgraph)
     probe.tactile_probe.seat = anchor.seat(probe, _extent_of(probe))
     digest = _digest(probe, depsgraph, list(probe.tactile_probe.seat))
@@ -181,13 +185,13 @@ def _sign(probe, depsgraph):
         block[DIGEST] = digest
 
 
-def _signed(settings):
+def _signed(settings: Any) -> tuple[str, str]:
     """The digest of the last touch together with the name of the probe, which a copy does not share."""
     digest, _, name = settings.digest.partition(" ")
     return digest, name
 
 
-def _digest(probe, depsgraph, seat):
+def _digest(probe: Object, depsgraph: bpy.types.Depsgraph, seat: list[float]) -> str:
     """The digest of all inputs of a touch, which do not include names.
 
     seat : where the probe is on its target, see anchor.seat
@@ -202,12 +206,14 @@ def _digest(probe, depsgraph, seat):
     return hashlib.sha1(repr(inputs).encode()).hexdigest()
 
 
-def _extent_of(probe):
+def _extent_of(probe: Object) -> float:
     patch = patch_of(probe)
     return 0.0 if patch is None else patch_record.extent_of(patch)
 
 
-def measure_shape(settings, depsgraph, reshaped=None):
+def measure_shape(
+    settings: Any, depsgraph: bpy.types.Depsgraph, reshaped: dict[Any, int | None] | None = None
+) -> None:
     """Keeps the checksum of the target, computed anew if the target is one of the `reshaped` objects.
 
     reshaped : a dict that gets the checksum of each object that is asked for, so that it is computed once
@@ -226,6 +232,6 @@ def measure_shape(settings, depsgraph, reshaped=None):
     settings.shape = f"{target.session_uid} {checksum:08x}"
 
 
-def refresh(probe, context):
+def refresh(probe: Object, context: bpy.types.Context) -> None:
     """Touches again at the end of a gesture, completely."""
     update(probe, context.evaluated_depsgraph_get(), complete=True)

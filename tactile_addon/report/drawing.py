@@ -2,15 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures of a report as SVG, without a renderer: colored triangles, histograms, scales."""
 
+from collections.abc import Callable, Iterable, Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..scene.colors import shades
+from ..touch.types import Array
 
 PIXELS = 320  # The width and height of a picture.
 BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # A histogram has so many bars, this wide and high at most.
 
 
-def triangles(points, corners, colors, marks=()):
+def triangles(points: Array, corners: Array, colors: Array, marks: ArrayLike = ()) -> str:
     """A picture of triangles (m, 3) between points (n, 2), in colors (m, 3 or 4), with marks (k, 2)."""
     place = _fitted(points)
     shapes = [
@@ -21,7 +25,7 @@ def triangles(points, corners, colors, marks=()):
     return _picture(shapes)
 
 
-def histogram(values, weights, limit, label):
+def histogram(values: Array, weights: Array, limit: float, label: Callable[[float], str]) -> str:
     """A histogram of values (n,) with weights (n,) up to a limit; its end bars count what is beyond, too."""
     low = -limit if np.min(values) < 0.0 else 0.0
     edges = np.linspace(low, limit, BINS + 1)
@@ -42,7 +46,7 @@ def histogram(values, weights, limit, label):
     return f'<svg viewBox="0 0 {width} {HEIGHT + 24}" width="{width}">{"".join([*bars, *ticks])}</svg>'
 
 
-def scale(limit, label, low=-1.0):
+def scale(limit: float, label: Callable[[float], str], low: float = -1.0) -> str:
     """A picture of the colors from `low` times the limit to the limit, with their values."""
     fills = shades(np.linspace(low, 1.0, 64), 1.0)
     boxes = [
@@ -59,20 +63,20 @@ def scale(limit, label, low=-1.0):
     return f'<svg viewBox="0 0 {PIXELS} 32" width="{PIXELS}">{"".join([*boxes, *words])}</svg>'
 
 
-def _picture(shapes):
+def _picture(shapes: Sequence[str]) -> str:
     return f'<svg viewBox="0 0 {PIXELS} {PIXELS}" width="{PIXELS}">{"".join(shapes)}</svg>'
 
 
-def _fitted(points):
+def _fitted(points: Array) -> Callable[[Array], Array]:
     """A function that takes points (n, 2) to the middle of a picture, with y upward."""
     low, high = points.min(axis=0), points.max(axis=0)
     factor = (PIXELS - 10.0) / max((high - low).max(), 1e-300)
     return lambda at: PIXELS / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
 
 
-def _pairs(points, between):
+def _pairs(points: Iterable[Sequence[float]], between: str) -> str:
     return between.join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
-def _hex(color):
+def _hex(color: Sequence[float]) -> str:
     return "#" + "".join(f"{round(255 * min(max(part, 0.0), 1.0)):02x}" for part in color[:3])

@@ -2,19 +2,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page of a stability map: the painted object from three sides, and the errors of its touches."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import bpy
 import numpy as np
 
 from ..scene import patch_record
+from ..scene.attributes import HEIGHT_STD, MAP_COLOR, REASON
 from ..scene.mesh_data import values
 from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
 from ..stability_map.stability import NOTHING
 from ..touch import units
+from ..touch.types import Array, Object
+from ..touch.units import Unit
 from . import page, parts, views
 
 
-def map_page(painted):
+def map_page(painted: Object) -> str:
     """The page of a map object."""
     record = painted[patch_record.MAP_RECORD].to_dict()
     unit = units.unit_of(bpy.context.scene, record["spacing"])
@@ -31,11 +37,11 @@ def map_page(painted):
     return page.page(f"{painted.name}: a stability map of {record['source']}", sections)
 
 
-def _legend(painted, record, unit):
+def _legend(painted: Object, record: Mapping[str, Any], unit: Unit) -> str:
     """The legend of the colors."""
     shown = painted.tactile_map_colors
     swatches = "".join(page.swatch(color, words) for words, color in map_object.swatches(painted))
-    if shown == "reason":
+    if shown == REASON:
         return swatches
     title = next(words for key, words, *_ in map_object.MAP_QUANTITIES if key == shown)
     low = "1" if shown in map_object.LOGARITHMIC else "0"
@@ -43,12 +49,12 @@ def _legend(painted, record, unit):
     return page.words(f"{title}: pale green at {low}, dark red from {high} on.") + swatches
 
 
-def _errors(mesh, record, unit):
+def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list[str]:
     errors = values(mesh, "error")
     known = errors != NOTHING
     if not known.any():
         return []
-    weights, std = np.ones(known.sum()), float(np.median(values(mesh, "height_std")[known]))
+    weights, std = np.ones(known.sum()), float(np.median(values(mesh, HEIGHT_STD)[known]))
     size = (record["extent"], "extent") if record["extent"] else (record["reach_median"], "median reach")
     words = (
         "Shares of the vertices by the error of the touch nearest to them. The last bar counts all "
@@ -63,9 +69,9 @@ def _errors(mesh, record, unit):
     ]
 
 
-def _screen_colors(mesh):
+def _screen_colors(mesh: bpy.types.Mesh) -> Array:
     """The colors of the vertices in sRGB, (n, 4)."""
-    attribute = mesh.attributes[map_object.MAP_COLOR]
+    attribute: Any = mesh.attributes[MAP_COLOR]
     rgba = np.empty((len(attribute.data), 4), dtype=np.float32)
     attribute.data.foreach_get("color_srgb", rgba.ravel())
     return rgba

@@ -2,9 +2,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page of a whole object: its surface from three sides, and how far it is off the mesh."""
 
+from collections.abc import Mapping
+from typing import Any
+
+import bpy
+
 from ..scene import patch_record
+from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
+from ..touch.types import Object
+from ..touch.units import Unit
 from ..whole_object.object_report import object_summary, object_table_rows, unit_of
 from . import drawing, page, parts, views
 
@@ -15,7 +23,7 @@ SCALE_WORDS = {
 }
 
 
-def object_page(obj):
+def object_page(obj: Object) -> str:
     """The page of a whole object. Raises ValueError if it was edited."""
     patch_record.require_colored(obj)
     record = obj[patch_record.ATLAS_RECORD].to_dict()
@@ -29,7 +37,7 @@ def object_page(obj):
     return page.page(f"{obj.name}: the surface of a whole object", sections)
 
 
-def _pictures(mesh, unit, shown):
+def _pictures(mesh: bpy.types.Mesh, unit: Unit, shown: str) -> str:
     shown_values = values(mesh, shown).astype(float)
     limit = symmetric_range(shown_values, parts.LEAST_RANGE)
     low = 0.0 if shown in patch_record.POSITIVE else -1.0
@@ -37,9 +45,9 @@ def _pictures(mesh, unit, shown):
     return page.section("Pictures", *views.three_sides(mesh, shades(shown_values, limit)), scale)
 
 
-def _deviations(mesh, record):
-    unit, off = unit_of(record), values(mesh, "deviation").astype(float)
-    areas = parts.vertex_areas(values(mesh, "position").astype(float), parts.corners(mesh))
+def _deviations(mesh: bpy.types.Mesh, record: Mapping[str, Any]) -> list[str]:
+    unit, off = unit_of(record), values(mesh, DEVIATION).astype(float)
+    areas = parts.vertex_areas(values(mesh, POSITION).astype(float), parts.corners(mesh))
     reaches = [(f"± {times:g} × the tolerance", times * record["tolerance"]) for times in TOLERANCES]
     words = "Shares of the area by its distance from the mesh. The outermost bars count all larger distances."
     return [

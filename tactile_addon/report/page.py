@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page around the parts of a report: HTML in a single file."""
 
+from collections.abc import Iterable, Sequence
 from html import escape
 
 PAGE = """<!doctype html>
@@ -25,39 +26,39 @@ tr {{ border-bottom: 1px solid #ddd; }}
 """
 
 
-def page(title, parts):
+def page(title: str, parts: Iterable[str]) -> str:
     """The page with a title in plain text and parts in HTML."""
     return PAGE.format(title=escape(title), body="\n".join(parts))
 
 
-def section(heading, *parts):
+def section(heading: str, *parts: str) -> str:
     """A heading in plain text, and parts of HTML below it."""
     return f"<h2>{escape(heading)}</h2>\n" + "\n".join(parts)
 
 
-def verdict(words, is_good):
+def verdict(words: str, is_good: bool) -> str:
     """A sentence in the color of good or of doubt."""
     return f'<p class="{"ok" if is_good else "doubt"}">{escape(words)}</p>'
 
 
-def words(text):
+def words(text: str) -> str:
     """A paragraph of plain text."""
     return f"<p>{escape(text)}</p>"
 
 
-def swatch(color, text):
+def swatch(color: Sequence[float], text: str) -> str:
     """A box of a color, whose parts are from 0 to 1, with words beside it."""
     red, green, blue = (round(255.0 * part) for part in color[:3])
     style = f"border-left: 1rem solid rgb({red}, {green}, {blue}); padding-left: .5rem"
     return f'<p style="{style}">{escape(text)}</p>'
 
 
-def figure(picture, caption):
+def figure(picture: str, caption: str) -> str:
     """A picture in SVG with a caption in plain text."""
     return f"<figure>{picture}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
-def table(rows, header=()):
+def table(rows: Iterable[Sequence[str]], header: Sequence[str] = ()) -> str:
     """A table of rows of plain values, with the first value of each in bold."""
     lines = ["".join(f"<th>{escape(name)}</th>" for name in header)] if header else []
     for first, *others in rows:

@@ -4,13 +4,17 @@
 
 import platform
 import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ..scene.colors import symmetric_range
 from ..touch import units
+from ..touch.types import Array
+from ..touch.units import Unit
 from . import drawing, page
 
 SHARES = (0.005, 0.01, 0.02, 0.05)  # The bands, as shares of the radius of a patch or the extent of a map.
@@ -21,21 +25,23 @@ WORDS = {"most": "most touches"}  # Settings whose names are no words.
 MANIFEST = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
 
 
-def spread(values, weights, unit, caption):
+def spread(values: Array, weights: Array, unit: Unit, caption: str) -> str:
     """The histogram of lengths (n,) with a caption."""
     limit = symmetric_range(values, LEAST_RANGE)
     return page.figure(drawing.histogram(values, weights, limit, label(1, unit)), caption)
 
 
-def shares_of(length, what):
+def shares_of(length: float, what: str) -> list[tuple[str, float]]:
     """The names and lengths of the bands that are shares of a length."""
     return [(f"± {100.0 * share:g} % of the {what}", share * length) for share in SHARES]
 
 
-def bands(values, weights, std, unit, reaches):
+def bands(
+    values: Array, weights: Array, std: float | None, unit: Unit, reaches: Sequence[tuple[str, float]]
+) -> str:
     """The shares of the weights (n,) within named lengths, and within one to three standard deviations."""
 
-    def row(name, reach, due=""):
+    def row(name: str, reach: float, due: str = "") -> tuple[str, ...]:
         within = weights[np.abs(values) <= reach].sum() / weights.sum()
         return name, units.say(reach, 1, unit), f"{100.0 * within:.1f} %", due
 
@@ -51,7 +57,7 @@ def bands(values, weights, std, unit, reaches):
     return page.table(rows, ("band", "", "within it", "expected, if normal"))
 
 
-def ending(rows, record):
+def ending(rows: Iterable[tuple[str, str]], record: Mapping[str, Any]) -> list[str]:
     """The sections at the end of a page: what was found, as rows, and how."""
     return [
         page.section("What was found", page.table(rows)),
@@ -60,12 +66,12 @@ def ending(rows, record):
     ]
 
 
-def label(power, unit):
+def label(power: int, unit: Unit) -> Callable[[float], str]:
     """A function that gives a value in length^power in words."""
     return lambda value: units.say(value, power, unit) if value else "0"
 
 
-def _settings(record):
+def _settings(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
     rows = [
         (WORDS.get(name, name), f"{record[name]:.4g}" if isinstance(record[name], float) else record[name])
@@ -76,7 +82,7 @@ def _settings(record):
     return [*rows, *([("planes", ", ".join(planes))] if planes else [])]
 
 
-def _versions():
+def _versions() -> list[tuple[str, str]]:
     import scipy
 
     return [
@@ -88,14 +94,14 @@ def _versions():
     ]
 
 
-def corners(mesh):
+def corners(mesh: bpy.types.Mesh) -> Array:
     """The triangles (m, 3) of a mesh that has no other faces."""
     indices = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", indices)
     return indices.reshape(-1, 3)
 
 
-def vertex_areas(points, triangles):
+def vertex_areas(points: Array, triangles: Array) -> Array:
     """A third of the area (n,) of the triangles (m, 3) at each of points (n, 3)."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
     thirds = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0

@@ -2,15 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The page of a patch: pictures along its normal, and how far the mesh or the contacts are from it."""
 
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
 
+from ... import core
 from ..scene import patch_record
+from ..scene.attributes import DEVIATION, POSITION
 from ..scene.colors import shades, symmetric_range
 from ..scene.mesh_data import values
 from ..touch import units
+from ..touch.types import Array, Object
+from ..touch.units import Unit
 from ..touch.wording import readable_rows
 from . import drawing, page, parts
 
@@ -24,12 +29,12 @@ SHOWN = (
 class Deviations(NamedTuple):
     """Signed lengths (n,), their weights (n,), and words for what was measured."""
 
-    lengths: np.ndarray
-    weights: np.ndarray
+    lengths: Array
+    weights: Array
     words: str
 
 
-def patch_page(patch, r):
+def patch_page(patch: Object, r: core.Reconstruction) -> str:
     """The page of a patch object and its core.Reconstruction."""
     record = patch[patch_record.RECORD].to_dict()
     unit = units.unit_of(bpy.context.scene, r.radius)
@@ -46,8 +51,8 @@ def patch_page(patch, r):
     return page.page(f"{patch.name}: a patch of {record['source']}", sections)
 
 
-def _pictures(patch, r, record, unit):
-    points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
+def _pictures(patch: Object, r: core.Reconstruction, record: Mapping[str, Any], unit: Unit) -> Iterator[str]:
+    points, corners = values(patch.data, POSITION).astype(float), parts.corners(patch.data)
     contacts = r.contacts[:, :2] * record["radius"] / r.radius  # The object's mesh has this scale.
     for attribute, title, power in SHOWN if _has_mesh(record) else SHOWN[:-1]:
         shown = values(patch.data, attribute)
@@ -58,18 +63,18 @@ def _pictures(patch, r, record, unit):
         yield page.figure(f"{picture}<br>{scale}", f"{title}, along the normal, with the contacts")
 
 
-def _has_mesh(record):
+def _has_mesh(record: Mapping[str, Any]) -> bool:
     return bool(record.get("vertices") or record.get("verification"))
 
 
-def _deviations(patch, r, record):
+def _deviations(patch: Object, r: core.Reconstruction, record: Mapping[str, Any]) -> Deviations:
     if _has_mesh(record):
-        points, corners = values(patch.data, "position").astype(float), parts.corners(patch.data)
+        points, corners = values(patch.data, POSITION).astype(float), parts.corners(patch.data)
         words = (
             "Shares of the patch's area by its distance from the mesh. The outermost bars count all "
             "larger distances."
         )
-        off = values(patch.data, "deviation").astype(float)
+        off = values(patch.data, DEVIATION).astype(float)
         return Deviations(off, parts.vertex_areas(points, corners), words)
     x, y, z = r.contacts.T
     words = (

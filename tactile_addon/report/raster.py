@@ -5,15 +5,18 @@
 import base64
 import struct
 import zlib
+from collections.abc import Iterator
 
 import numpy as np
+
+from ..touch.types import Array
 
 PIXELS, BORDER = 480, 4  # A picture has so many pixels on each side, so many of them free around its mesh.
 APART = 0.7  # Samples of a triangle are at most so many pixels apart.
 AT_ONCE = 500_000  # So many samples fit into memory at once.
 
 
-def picture(points, depths, corners, colors, shown):
+def picture(points: Array, depths: Array, corners: Array, colors: Array, shown: float) -> str:
     """An HTML image, `shown` pixels wide, of triangles (m, 3) between points (n, 2), on a clear ground.
 
     depths : (n,), larger ones are nearer
@@ -34,14 +37,14 @@ def picture(points, depths, corners, colors, shown):
     return f'<img width="{shown}" height="{shown}" alt="" src="data:image/png;base64,{text}">'
 
 
-def _fitted(points):
+def _fitted(points: Array) -> Array:
     """Points (n, 2) in the pixels of a picture, with y downward."""
     low, high = points.min(axis=0), points.max(axis=0)
     factor = (PIXELS - 2.0 * BORDER) / max((high - low).max(), 1e-300)
     return PIXELS / 2.0 + factor * (points - 0.5 * (low + high)) * (1.0, -1.0)
 
 
-def _samples(values, corners):
+def _samples(values: Array, corners: Array) -> Iterator[Array]:
     """Values (k, c) all over triangles (m, 3), whose corners have values (n, c), some at once.
 
     The first two values are places in pixels.
@@ -57,14 +60,14 @@ def _samples(values, corners):
             yield np.einsum("kc,mcv->mkv", weights, part).reshape(-1, values.shape[1])
 
 
-def _weights(count):
+def _weights(count: int) -> Array:
     """Weights (k, 3) of the corners of a triangle at places all over it, `count` steps from side to side."""
     i, j = np.mgrid[: count + 1, : count + 1].reshape(2, -1)
     i, j = (along[i + j <= count] / count for along in (i, j))
     return np.column_stack([i, j, 1.0 - i - j])
 
 
-def _png(rgba):
+def _png(rgba: Array) -> bytes:
     """The bytes of a .png of pixels (h, w, 4), uint8.
 
     Blender writes pictures of the file's images only, and a report adds nothing to the file.

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Export Report: the page of the active patch, stability map or whole object as a file."""
 
+from pathlib import Path
+
 import bpy
 from bpy.props import StringProperty
 
@@ -9,12 +11,13 @@ from ..files import whole_file
 from ..files.export_operators import ObjectExport
 from ..probes import probe
 from ..scene import patch_record
+from ..touch.types import Object
 from .map_page import map_page
 from .object_page import object_page
 from .patch_page import patch_page
 
 
-def write(path, obj):
+def write(path: str | Path, obj: Object) -> None:
     """Writes the page of a patch, map or whole object as the file `path`.
 
     Raises ValueError if the object was edited, and OSError if the file cannot be written.
@@ -38,16 +41,16 @@ class TACTILE_OT_export_report(ObjectExport, bpy.types.Operator):
     hint = "Select a patch, its probe or its contours, a stability map or a touched object first"
 
     @staticmethod
-    def written(context):
-        obj = context.view_layer.objects.active
+    def written(context: bpy.types.Context) -> Object | None:
+        obj: Object = context.view_layer.objects.active
         alone = (patch_record.MAP_RECORD, patch_record.ATLAS_RECORD)
         return obj if obj is not None and any(key in obj for key in alone) else probe.patch_near(obj)
 
-    def write(self, obj):
+    def write(self, obj: Object) -> None:
         write(self.filepath, obj)
 
 
-def draw_export(self, context):
+def draw_export(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.operator(TACTILE_OT_export_report.bl_idname, text="Tactile Report (.html)")
 
 

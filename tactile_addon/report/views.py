@@ -2,9 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mesh from three sides, shaded, in the colors of its vertices."""
 
+from collections.abc import Iterator
+
+import bpy
 import numpy as np
 
+from ..scene.attributes import POSITION
 from ..scene.mesh_data import values
+from ..touch.types import Array
 from . import drawing, page, raster
 
 DARKEST = 0.45  # Where the surface turns away, it is this bright.
@@ -16,9 +21,9 @@ VIEWS = (
 )
 
 
-def three_sides(mesh, colors):
+def three_sides(mesh: bpy.types.Mesh, colors: Array) -> Iterator[str]:
     """Three figures of the mesh, in sRGB colors (n, 3 or 4) of its vertices."""
-    points = values(mesh, "position").astype(float)
+    points = values(mesh, POSITION).astype(float)
     normals = np.empty(points.shape, dtype=np.float32)
     mesh.vertices.foreach_get("normal", normals.ravel())
     mesh.calc_loop_triangles()

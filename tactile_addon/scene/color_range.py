@@ -2,22 +2,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The range of the colors of a patch or a whole object when it is given, by hand or as that of several."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import bpy
 from bpy.props import FloatProperty
 
 from ..touch import units
+from ..touch.types import Object
+from ..touch.units import Unit
 from . import shown
 from .patch_record import ATLAS_RECORD, POWERS, RANGE, RECORD, is_colored, report_of
 
 
-def unit_of_range(patch, scene):
+def unit_of_range(patch: Object, scene: bpy.types.Scene) -> tuple[int, Unit]:
     """The power of length in the quantity that a patch or whole object shows, and the unit of its legend."""
     report = _record(patch)
     unit = ("", 1.0) if report is None else units.unit_of(scene, report["radius"])
     return POWERS[patch.tactile_colors], unit
 
 
-def share(patch, patches):
+def share(patch: Object, patches: Iterable[Object]) -> int:
     """Gives all `patches` that show what `patch` shows the largest of their ranges; returns how many."""
     same = [
         other
@@ -32,7 +37,7 @@ def share(patch, patches):
     return len(same)
 
 
-def set_range(patch, limit):
+def set_range(patch: Object, limit: float) -> None:
     """Gives the colors of a patch this range, in units of the world; with 0 the values choose it."""
     patch[RANGE] = limit
     if limit <= 0.0:
@@ -41,28 +46,29 @@ def set_range(patch, limit):
         shown.recolor(patch)
 
 
-def _is_whole(obj):
+def _is_whole(obj: Object) -> bool:
     return is_colored(obj) and obj.is_editable
 
 
-def _record(obj):
+def _record(obj: Object) -> Any:
     """The report of a patch or a whole object, or None."""
     return obj[ATLAS_RECORD] if ATLAS_RECORD in obj else report_of(obj) if RECORD in obj else None
 
 
-def _get(obj):
+def _get(obj: Object) -> float:
     power, unit = unit_of_range(obj, bpy.context.scene)
     limit = obj.get(RANGE) or (_record(obj) or {}).get("color_limit", 0.0)
     return limit / unit[1] ** power
 
 
-def _set(obj, value):
+def _set(obj: Object, value: float) -> None:
     power, unit = unit_of_range(obj, bpy.context.scene)
     set_range(obj, value * unit[1] ** power)
 
 
-def register():
-    bpy.types.Object.tactile_range = FloatProperty(
+def register() -> None:
+    objects: Any = bpy.types.Object
+    objects.tactile_range = FloatProperty(
         name="Range",
         description="Value at which the colors end, in the unit of the legend; 0 chooses it by the values",
         min=0.0,
@@ -73,5 +79,6 @@ def register():
     )
 
 
-def unregister():
-    del bpy.types.Object.tactile_range
+def unregister() -> None:
+    objects: Any = bpy.types.Object
+    del objects.tactile_range

@@ -3,6 +3,9 @@
 """The diverging colors of curvature: blue below zero, pale green at zero, red above."""
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from ..touch.types import Array
 
 # ColorBrewer's RdBu in nine steps (sRGB), which color-blind readers can tell apart. Its middle is not white
 # but pale green, because a flat patch would look like the gray mesh around it.
@@ -14,7 +17,7 @@ COLOR_STOPS = np.array([
 UNKNOWN = (0.5, 0.5, 0.5, 1.0)  # The color of what has no value, in sRGB.
 
 
-def symmetric_range(values, floor):
+def symmetric_range(values: Array, floor: float) -> float:
     """The r of a scale -r..r: the 98th percentile of |values|, so a few wild ones do not bleach the rest."""
     if not len(values):
         return floor
@@ -25,7 +28,7 @@ def symmetric_range(values, floor):
     return max(float(one + (at - before) * (other - one)), floor)
 
 
-def shades(values, limit):
+def shades(values: ArrayLike, limit: float) -> Array:
     """The colors of values (n,) on a scale from -limit to limit, as sRGB with alpha, (n, 4)."""
     at = np.clip(np.asarray(values) / limit, -1.0, 1.0)
     srgb = np.column_stack(
@@ -34,14 +37,14 @@ def shades(values, limit):
     return np.column_stack([srgb, np.ones(len(srgb))])
 
 
-def diverging(values, limit, unknown=()):
+def diverging(values: ArrayLike, limit: float, unknown: ArrayLike = ()) -> Array:
     """Colors of shades() as linear RGBA, as Blender stores them, gray at the indices that are unknown."""
     rgba = shades(values, limit)
     rgba[np.asarray(unknown, dtype=int)] = UNKNOWN
     return linear(rgba)
 
 
-def linear(rgba):
+def linear(rgba: ArrayLike) -> Array:
     """The linear RGBA of colors in sRGB, (n, 4)."""
     rgba = np.array(rgba)
     srgb = rgba[:, :3]

@@ -2,16 +2,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mesh that shows contours as tubes, contacts (those of strokes, too), and the rim of the patch."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
+import bpy
 import numpy as np
 
+from ... import core
+from ..touch.touch_object import Touched
+from ..touch.types import Array
+from .attributes import CONTACT, CONTOUR, POSITION, attribute_of
 from .mesh_data import fill, write
 
 RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # The rim has so many points and this share of a contour's thickness.
-CONTACT = 3.6  # The tips of a contact are so many times a contour's thickness away from it,
-LEAST_CONTACT, GAP = 1.6, 0.4  # or this share of the way to the next one, if they would run together.
+TIP = 3.6  # The tips of a contact are so many times a contour's thickness away from it,
+LEAST_TIP, GAP = 1.6, 0.4  # or this share of the way to the next one, if they would run together.
 CONTACT_TIPS = np.vstack([np.eye(3), -np.eye(3)])
 FACES = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
 SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])  # The corners of a square tube.
@@ -23,14 +29,14 @@ class _Form(NamedTuple):
     before, after : for each point of all paths, the indices of the points between which its tube runs
     """
 
-    before: np.ndarray
-    after: np.ndarray
-    triangles: np.ndarray
-    contour: np.ndarray
-    contact: np.ndarray
+    before: Array
+    after: Array
+    triangles: Array
+    contour: Array
+    contact: Array
 
 
-def fill_contours(mesh, touched):
+def fill_contours(mesh: bpy.types.Mesh, touched: Touched) -> None:
     """Tubes along the contours and an octahedron at each contact, in the Darboux frame.
 
     Point attributes tell them apart: `contour` is the number of the contour, and -1 for strokes and the rim;
@@ -51,55 +57,52 @@ def fill_contours(mesh, touched):
     tubes = _tubes(np.vstack(paths), np.repeat([*across, (0.0, 0.0, 1.0)], lengths, axis=0), sizes, form)
     points = np.vstack([tubes, _octahedra(contours, frame.to_local(strokes), thickness)])
     if _has_form(mesh, form):
-        write(mesh, "position", "FLOAT_VECTOR", points)
+        write(mesh, POSITION, points)
         mesh.update()
     else:
-        attributes = [("contour", "INT", form.contour), ("contact", "INT", form.contact)]
-        fill(mesh, points, form.triangles, attributes)
+        fill(mesh, points, form.triangles, [(CONTOUR, form.contour), (CONTACT, form.contact)])
 
 
-def _has_form(mesh, form):
+def _has_form(mesh: bpy.types.Mesh, form: _Form) -> bool:
     """Whether the mesh shows contours with as many contacts, so that only its points have to change."""
-    contact = mesh.attributes.get("contact")
-    if contact is None or (contact.data_type, contact.domain) != ("INT", "POINT"):
-        return False
-    if (len(contact.data), len(mesh.loops)) != (len(form.contact), form.triangles.size):
+    contact = attribute_of(mesh, CONTACT)
+    if contact is None or (len(contact.data), len(mesh.loops)) != (len(form.contact), form.triangles.size):
         return False
     found = np.empty(len(form.contact), dtype=np.int32)
     contact.data.foreach_get("value", found)
     return np.array_equal(found, form.contact)
 
 
-def _octahedra(contours, strokes, thickness):
+def _octahedra(contours: Sequence[Array], strokes: Array, thickness: float) -> Array:
     """The tips (6n, 3) of the octahedra at the contacts of contours and at those of strokes (m, 3)."""
-    reach = [_reach(path, thickness) for path in contours] + [CONTACT * thickness]
-    reach = np.repeat(reach, [*map(len, contours), len(strokes)])
+    reaches = [_reach(path, thickness) for path in contours] + [TIP * thickness]
+    reach = np.repeat(reaches, [*map(len, contours), len(strokes)])
     contacts = np.vstack([*contours, strokes])
     return (contacts[:, None] + reach[:, None, None] * CONTACT_TIPS).reshape(-1, 3)
 
 
-def _reach(path, thickness):
+def _reach(path: Array, thickness: float) -> float:
     """How far the tips of the contacts of a path (n, 3) are from it: less where many are close together."""
     if len(path) < 2:
-        return CONTACT * thickness
+        return TIP * thickness
     apart = float(np.median(np.linalg.norm(np.diff(path, axis=0), axis=1)))
-    return min(max(GAP * apart, LEAST_CONTACT * thickness), CONTACT * thickness)
+    return min(max(GAP * apart, LEAST_TIP * thickness), TIP * thickness)
 
 
-def _rim(result):
+def _rim(result: core.Reconstruction) -> Array:
     """The closed path (n, 3) around a patch, in its Darboux frame."""
     edge = result.domain.boundary(RIM_CORNERS)
     edge = np.vstack([edge, edge[:1]])
     return np.column_stack([edge, result.height(*edge.T)])
 
 
-def _across(path):
+def _across(path: Array) -> Array:
     """A direction in the tangent plane across a path (n, 3), for a contour without a sampling plane."""
     x, y, _ = path[-1] - path[0]
     return np.array([-y, x, 0.0]) / max(np.hypot(x, y), 1e-30)
 
 
-def _tubes(paths, across, sizes, form):
+def _tubes(paths: Array, across: Array, sizes: Array, form: _Form) -> Array:
     """The corners (4n, 3) of square tubes along paths (n, 3), in the planes normal to `across` (n, 3)."""
     ahead = paths[form.after] - paths[form.before]
     up = np.cross(across, ahead)
@@ -109,7 +112,7 @@ def _tubes(paths, across, sizes, form):
 
 
 @lru_cache(maxsize=8)
-def _form(lengths, strokes):
+def _form(lengths: tuple[int, ...], strokes: int) -> _Form:
     """The form of a mesh of paths with these lengths, the rim being the last, and of so many strokes."""
     paths = [slice(end - n, end) for n, end in zip(lengths, np.cumsum(lengths), strict=True)]
     at, felt = np.arange(sum(lengths)), lengths[:-1]

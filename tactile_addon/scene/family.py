@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The children of objects. Blender looks through all objects for those of one; this looks once for many."""
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
 
-_remembered = None  # Within `remembered`, the children by their parents; empty until somebody asks.
+from ..touch.types import Object
+
+_remembered: dict[Object, list[Object]] | None = (
+    None  # Within `remembered`, the children by their parents; empty until somebody asks.
+)
 
 
-def children_of(obj):
+def children_of(obj: Object) -> list[Object]:
     """The list of an object's children."""
     if _remembered is None:
         return list(obj.children)
@@ -20,14 +25,14 @@ def children_of(obj):
     return _remembered.get(obj, [])
 
 
-def add(child):
+def add(child: Object) -> None:
     """Notes a new object that has a parent or may have one."""
     if _remembered and child.parent is not None:
         _remembered.setdefault(child.parent, []).append(child)
 
 
 @contextmanager
-def remembered():
+def remembered() -> Iterator[None]:
     """Within this context, children are looked up once; no object may be deleted meanwhile."""
     global _remembered
     outer = _remembered

@@ -2,23 +2,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes with point attributes, filled and read as arrays, and the material that shows their colors."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import bpy
 import numpy as np
 
+from ..touch.types import Array, Object
+from .attributes import DOMAIN, KEYS, POSITION, TYPES, attribute_of
 from .undo import note_copied
 
 ABOVE = "tactile_above"  # A custom property of objects: how far above its mesh it is drawn.
-ATTRIBUTE_KEYS = {
-    "FLOAT": "value",
-    "INT": "value",
-    "BOOLEAN": "value",
-    "FLOAT_VECTOR": "vector",
-    "FLOAT_COLOR": "color",
-}
 
 
-def fill(mesh, points, triangles, attributes):
-    """Gives `mesh` points (n, 3), triangles (m, 3) and point attributes (name, Blender's type, values).
+def fill(
+    mesh: bpy.types.Mesh, points: Array, triangles: Array, attributes: Sequence[tuple[str, Array]]
+) -> None:
+    """Gives `mesh` points (n, 3), triangles (m, 3) and attributes, names and values each.
 
     If it has these triangles already, only coordinates and values are written.
     """
@@ -30,32 +30,32 @@ def fill(mesh, points, triangles, attributes):
         mesh.polygons.add(len(triangles))
         mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
         mesh.update(calc_edges=True)
-    for name, kind, values in [("position", "FLOAT_VECTOR", points), *attributes]:
-        write(mesh, name, kind, values)
+    for name, values in [(POSITION, points), *attributes]:
+        write(mesh, name, values)
     mesh.update()
 
 
-def write(mesh, name, kind, values):
-    """Writes a point attribute, and replaces one of this name and another kind."""
+def write(mesh: bpy.types.Mesh, name: str, values: Array) -> None:
+    """Writes an attribute, and replaces one of this name and another type or domain."""
     # References to attributes must not outlive the next `new`, which moves all of them.
-    attribute = mesh.attributes.get(name)
-    if attribute is not None and (attribute.data_type, attribute.domain) != (kind, "POINT"):
-        mesh.attributes.remove(attribute)
-        attribute = None
-    attribute = attribute or mesh.attributes.new(name, kind, "POINT")
-    attribute.data.foreach_set(ATTRIBUTE_KEYS[kind], values.ravel())
+    attribute = attribute_of(mesh, name)
+    if attribute is None:
+        if name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
+        attribute = mesh.attributes.new(name, TYPES[name], DOMAIN)
+    attribute.data.foreach_set(KEYS[TYPES[name]], values.ravel())
 
 
-def values(mesh, name):
-    """The values of a point attribute, (n,) or (n, 3)."""
-    attribute = mesh.attributes[name]
-    key = ATTRIBUTE_KEYS[attribute.data_type]
+def values(mesh: bpy.types.Mesh, name: str) -> Array:
+    """The values of an attribute, (n,) or (n, 3)."""
+    attribute: Any = mesh.attributes[name]
+    key = KEYS[attribute.data_type]
     values = np.empty((len(attribute.data), 3) if key == "vector" else len(attribute.data))
     attribute.data.foreach_get(key, values.ravel())
     return values
 
 
-def own_mesh(obj):
+def own_mesh(obj: Object) -> None:
     """Gives an object a mesh of its own, if it is a linked copy or the override of a library's object."""
     shared = obj.data
     if shared.users > 1 or not shared.is_editable:
@@ -63,7 +63,7 @@ def own_mesh(obj):
         note_copied(obj, shared)
 
 
-def _has_triangles(mesh, count, triangles):
+def _has_triangles(mesh: bpy.types.Mesh, count: int, triangles: Array) -> bool:
     if (len(mesh.vertices), len(mesh.loops)) != (count, triangles.size):
         return False
     corners = np.empty(triangles.size, dtype=np.int32)
@@ -71,14 +71,19 @@ def _has_triangles(mesh, count, triangles):
     return np.array_equal(corners, triangles.ravel())
 
 
-def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0), upright=False):
+def emission(
+    name: str,
+    attribute: str | None = None,
+    color: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
+    upright: bool = False,
+) -> bpy.types.Material:
     """The material of this name, made if missing, which shows a color attribute or one color as it is.
 
     Eevee and Cycles draw what has it above the mesh in which it lies, by the object's length ABOVE: along its
     normals, or upright, which is along the object's z, as a patch and its thin contours are. Solid shading
     draws it in front instead, and neither changes its geometry.
     """
-    material = bpy.data.materials.get(name)
+    material: Any = bpy.data.materials.get(name)
     if material is None:
         material = bpy.data.materials.new(name)
         if material.node_tree is None:  # Blender 4.5 needs this; later ones deprecate it.
@@ -100,11 +105,12 @@ def emission(name, attribute=None, color=(1.0, 1.0, 1.0, 1.0), upright=False):
     return material
 
 
-def _draw_above(material, output, upright):
+def _draw_above(material: bpy.types.Material, output: bpy.types.Node, upright: bool) -> None:
     """Moves what has the material along its normals, or upright, where it is drawn, by the length ABOVE."""
     nodes, links = material.node_tree.nodes, material.node_tree.links
-    length = nodes.new("ShaderNodeAttribute")
+    length: Any = nodes.new("ShaderNodeAttribute")
     length.attribute_type, length.attribute_name = "OBJECT", ABOVE
+    move: Any
     if upright:
         move, along = nodes.new("ShaderNodeVectorDisplacement"), nodes.new("ShaderNodeCombineXYZ")
         move.space = "OBJECT"

@@ -3,17 +3,20 @@
 """The reconstruction as objects of the scene: the patch, and the tracked contours."""
 
 import json
+from collections.abc import Iterable, Sequence
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ... import core
+from ..touch.touch_object import Touched
+from ..touch.types import Array, Object
+from .attributes import COLOR, DEVIATION, HEIGHT_STD, NORMAL, PLACE, POSITION
 from .contour_mesh import fill_contours
 from .family import add
 from .mesh_data import ABOVE, emission, fill, own_mesh, values, write
 from .patch_record import (
-    COLOR,
     CONTOURS,
     QUANTITIES_OF_A_FIT,
     RECONSTRUCTION,
@@ -30,14 +33,15 @@ from .viewports import show_colors
 
 COLLECTION = "Tactile Patches"
 CONTOUR_COLOR = (0.02, 0.02, 0.02, 1.0)
-NORMAL, PLACE = "custom_normal", "domain_place"  # Attributes: normals for shading; places on the unit disk.
 # It is drawn above the mesh by as much as it may be below it: by these shares of its radius at least and at
 # most, and by so many deviations of its height until it is compared with the mesh.
 DRAWN_ABOVE, MOST_ABOVE, DEVIATIONS = 5e-3, 5e-2, 3.0
 STEEP = 1.7  # Where a patch is steep, it has to go up by so many times as much.
 
 
-def insert(scene, touched, parent=None, lines=None):
+def insert(
+    scene: bpy.types.Scene, touched: Touched, parent: Object | None = None, lines: Object | None = None
+) -> Object:
     """Adds a patch and its contours to `scene`, in a collection of their own, and returns the patch object.
 
     lines : an object of contours that has lost its patch, to be used for this one
@@ -55,8 +59,8 @@ def insert(scene, touched, parent=None, lines=None):
     return patch
 
 
-def _new(scene, name, material):
-    obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+def _new(scene: bpy.types.Scene, name: str, material: bpy.types.Material) -> Object:
+    obj: Object = bpy.data.objects.new(name, bpy.data.meshes.new(name))
     obj.show_in_front = True  # It would lie in the surface it describes.
     collection(scene).objects.link(obj)
     obj.data.materials.append(material)
@@ -64,7 +68,7 @@ def _new(scene, name, material):
     return obj
 
 
-def remove_objects(objects):
+def remove_objects(objects: Sequence[Object]) -> None:
     """Deletes objects, with those of their meshes and materials that nothing else uses."""
     meshes = [obj.data for obj in objects if obj.data is not None]
     for obj in objects:
@@ -72,7 +76,7 @@ def remove_objects(objects):
     remove_meshes(meshes)
 
 
-def remove_meshes(meshes):
+def remove_meshes(meshes: Iterable[bpy.types.Mesh]) -> None:
     """Deletes the meshes that nothing uses, and those of their materials that nothing uses then."""
     meshes = [mesh for mesh in meshes if not mesh.users]
     materials = {material for mesh in meshes for material in mesh.materials if material is not None}
@@ -80,7 +84,7 @@ def remove_meshes(meshes):
     bpy.data.batch_remove([material for material in materials if not material.users])
 
 
-def rewrite(patch, touched):
+def rewrite(patch: Object, touched: Touched) -> None:
     """Changes the patch, and its contours if they are still there, to those of another touch, in place."""
     lines = contours_of(patch)
     for obj in filter(None, (patch, lines)):
@@ -107,21 +111,21 @@ def rewrite(patch, touched):
         settle(patch)
 
 
-def _above(patch, touched):
+def _above(patch: Object, touched: Touched) -> float:
     """How far above the mesh a patch and its contours are drawn where they would lie in it."""
     radius, deepest = touched.result.radius, DEVIATIONS * touched.report["height_std"]
     if touched.report["is_verified"] and touched.surface is not None:
-        deepest = max(deepest, -STEEP * float(values(patch.data, "deviation").min()))
+        deepest = max(deepest, -STEEP * float(values(patch.data, DEVIATION).min()))
     return min(max(deepest, DRAWN_ABOVE * radius), MOST_ABOVE * radius)
 
 
-def meshes(patch):
+def meshes(patch: Object | None) -> list[bpy.types.Mesh]:
     """The meshes of a patch object and of its contours; an empty list if `patch` is None."""
     objects = [] if patch is None else [patch, contours_of(patch)]
     return [obj.data for obj in objects if obj is not None]
 
 
-def collection(scene):
+def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """The collection of a scene's patches, made if there is none."""
     # In the file's second scene it is "Tactile Patches.001". That of a library, or its override, cannot be
     # used.
@@ -138,7 +142,7 @@ def collection(scene):
     return found
 
 
-def _fill_patch(obj, touched):
+def _fill_patch(obj: Object, touched: Touched) -> None:
     """Fills the mesh with the patch in its Darboux frame; deviations are 0 until the patch is verified."""
     result, frame, mesh = touched.result, touched.result.frame, obj.data
     points, triangles = result.mesh()
@@ -149,16 +153,16 @@ def _fill_patch(obj, touched):
         deviation = touched.surface.deviations(*world, result.radius)
     places = np.column_stack([result.domain.places(points[:, :2]), np.zeros(len(points))])
     attributes = [
-        *((name, "FLOAT", _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
-        ("deviation", "FLOAT", deviation),
-        (NORMAL, "FLOAT_VECTOR", d.normal),
-        (PLACE, "FLOAT_VECTOR", places),
-        (COLOR, "FLOAT_COLOR", np.ones((len(points), 4))),
+        *((name, _shown(name, result, points)) for name in QUANTITIES_OF_A_FIT),
+        (DEVIATION, deviation),
+        (NORMAL, d.normal),
+        (PLACE, places),
+        (COLOR, np.ones((len(points), 4))),
     ]
     fill(mesh, points, triangles, attributes)
 
 
-def _follow(obj, touched):
+def _follow(obj: Object, touched: Touched) -> None:
     """Moves the vertices to the patch of another touch, each at its place in the domain.
 
     Only the values that the colors show are brought up to date, because a gesture shows no others.
@@ -167,12 +171,12 @@ def _follow(obj, touched):
     plane = result.domain.points_at(values(mesh, PLACE)[:, :2])
     d = result.geometry.derivatives(*plane.T)
     points = np.column_stack([plane, d.z])
-    write(mesh, "position", "FLOAT_VECTOR", points)
-    write(mesh, NORMAL, "FLOAT_VECTOR", d.normal)
+    write(mesh, POSITION, points)
+    write(mesh, NORMAL, d.normal)
     if obj.tactile_colors in QUANTITIES_OF_A_FIT:
-        write(mesh, obj.tactile_colors, "FLOAT", _shown(obj.tactile_colors, result, points))
+        write(mesh, obj.tactile_colors, _shown(obj.tactile_colors, result, points))
 
 
-def _shown(name, result, points):
+def _shown(name: str, result: core.Reconstruction, points: Array) -> Array:
     """The values (n,) of the quantity `name` at points (n, 3) of a surface; curvatures are those of (1)."""
-    return getattr(result if name == "height_std" else result.patch, name)(*points[:, :2].T)
+    return getattr(result if name == HEIGHT_STD else result.patch, name)(*points[:, :2].T)

@@ -3,19 +3,24 @@
 """What a patch object keeps: the report, the reconstruction in double precision, and where it was touched."""
 
 import json
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
+import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ... import core
+from ..touch.touch_report import TouchReport
+from ..touch.types import Array, Object
+from .attributes import COLOR, CURVATURES, DEVIATION, HEIGHT_STD, attribute_of
 from .family import children_of
 
 # Custom properties of objects.
 RECORD = "tactile"  # The report of a patch.
 RECONSTRUCTION = "tactile_reconstruction"  # Its core.to_dict as JSON, once a gesture has ended.
 VERDICT = "tactile_verdict"  # Its status and message, while the report says that it is outdated.
-COLOR = "curvature_color"
 RANGE = "tactile_color_range"  # The range of its colors, if that is given.
 COMMON_RANGE = "tactile_common_range"  # The range that suits all patches of its mesh.
 MAP_RECORD = "tactile_map"  # The report of a stability map.
@@ -33,17 +38,15 @@ QUANTITIES = [
         0,
     ),
     ("curvedness", "Curvedness", "How strongly the surface bends, whatever its shape", -1),
-    ("deviation", "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
-    ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
+    (DEVIATION, "Deviation", "How far the patch is outside the mesh (red) or inside (blue)", 1),
+    (HEIGHT_STD, "Standard Deviation", "How well the contacts determine the height", 1),
 ]
 POWERS = {name: power for name, _, _, power in QUANTITIES}
-CURVATURES = ("gaussian_curvature", "mean_curvature", "shape_index", "curvedness")
-CURVATURE_STD = "mean_curvature_std"  # It is infinite where a whole object's curvatures are unknown.
-QUANTITIES_OF_A_FIT = (*CURVATURES, "height_std")  # These need no mesh to compare with.
-POSITIVE = ("curvedness", "height_std")  # These are never below zero, so they need half a scale.
+QUANTITIES_OF_A_FIT = (*CURVATURES, HEIGHT_STD)  # These need no mesh to compare with.
+POSITIVE = ("curvedness", HEIGHT_STD)  # These are never below zero, so they need half a scale.
 
 
-def report_of(patch):
+def report_of(patch: Object) -> TouchReport | None:
     """The report of a patch object, or None if somebody has made something else of it."""
     report = patch.get(RECORD)
     try:
@@ -57,7 +60,7 @@ def report_of(patch):
     return report if good and numbers[0] > 0.0 and all(isinstance(word, str) for word in words) else None
 
 
-def extent_of(patch):
+def extent_of(patch: Object) -> float:
     """The extent in the report of a patch, which need not be complete; 0 if there is none."""
     try:
         extent = patch[RECORD]["extent"]
@@ -66,13 +69,13 @@ def extent_of(patch):
     return extent if isinstance(extent, float) else 0.0
 
 
-def require_whole(patch):
+def require_whole(patch: Object) -> None:
     """Raises ValueError if the patch object was edited such that it is no patch any more."""
     if report_of(patch) is None or not (patch.type == "MESH" and _is_whole(patch.data)):
         raise edited(patch)
 
 
-def edited(obj):
+def edited(obj: Object) -> ValueError:
     """The error to raise for a patch, a map or a whole object that was edited and is none any more."""
     if RECORD in obj:
         return ValueError(f'"{obj.name}" was edited and is no longer a complete patch: touch again')
@@ -80,7 +83,7 @@ def edited(obj):
 
 
 @contextmanager
-def reading(obj):
+def reading(obj: Object) -> Iterator[None]:
     """Within this context, whatever is wrong with the record of an object is a ValueError with a sentence."""
     try:
         yield
@@ -88,38 +91,34 @@ def reading(obj):
         raise edited(obj) from error
 
 
-def is_colored(obj):
+def is_colored(obj: Object) -> bool:
     """Whether an object is a patch or a whole object that nobody has edited, so that it can show colors."""
     is_one = ATLAS_RECORD in obj or (RECORD in obj and report_of(obj) is not None)
     return is_one and obj.type == "MESH" and _is_whole(obj.data)
 
 
-def require_colored(obj):
+def require_colored(obj: Object) -> None:
     """Raises ValueError if the whole object was edited such that it cannot show its colors."""
     if not is_colored(obj):
         raise edited(obj)
 
 
-def touched_record(obj):
+def touched_record(obj: Object | None) -> Any:
     """The report of a stability map or a whole object, or None for any other object."""
     return None if obj is None else obj.get(MAP_RECORD) or obj.get(ATLAS_RECORD)
 
 
-def _is_whole(mesh):
-    kinds = {name: "FLOAT" for name in POWERS} | {COLOR: "FLOAT_COLOR"}
-    found = {name: mesh.attributes.get(name) for name in kinds}
-    return len(mesh.vertices) > 0 and all(
-        attribute is not None and (attribute.data_type, attribute.domain) == (kinds[name], "POINT")
-        for name, attribute in found.items()
-    )
+def _is_whole(mesh: bpy.types.Mesh) -> bool:
+    names = (*POWERS, COLOR)
+    return len(mesh.vertices) > 0 and all(attribute_of(mesh, name) is not None for name in names)
 
 
-def mark_failed(patch, why):
+def mark_failed(patch: Object, why: str) -> None:
     """Lets the record say that the patch is from an earlier touch, because the last one failed."""
     _outdate(patch, {"message": f"This patch is from an earlier touch, because the last one failed. {why}"})
 
 
-def mark_stale(patch):
+def mark_stale(patch: Object) -> None:
     """Lets the record say that the patch is from an earlier touch, and that nothing was felt since."""
     _outdate(
         patch,
@@ -130,7 +129,7 @@ def mark_stale(patch):
     )
 
 
-def _outdate(patch, verdict):
+def _outdate(patch: Object, verdict: TouchReport) -> None:
     report = report_of(patch)
     if report is None:
         return
@@ -139,14 +138,14 @@ def _outdate(patch, verdict):
     report.update({"status": "outdated", **verdict})
 
 
-def mark_current(patch):
+def mark_current(patch: Object) -> None:
     """Lets the record say again what it said before, because the patch is what its probe asks for."""
     verdict = patch.pop(VERDICT, None)
     if verdict is not None and report_of(patch) is not None:
         patch[RECORD].update(verdict)
 
 
-def reconstruction_of(patch):
+def reconstruction_of(patch: Object) -> core.Reconstruction:
     """The core.Reconstruction of a patch object, in the world, where the object is now.
 
     If the object was not moved, it is what was fitted, to the last bit. Raises ValueError during a gesture,
@@ -171,7 +170,7 @@ def reconstruction_of(patch):
         ) from error
 
 
-def place(obj, matrix):
+def place(obj: Object, matrix: Matrix) -> None:
     """Puts an object at a matrix of the world, such that it stays there if its parent is deleted."""
     if obj.parent is not None:
         obj.matrix_parent_inverse = obj.parent.matrix_world.inverted_safe()
@@ -179,7 +178,7 @@ def place(obj, matrix):
     obj.matrix_basis = matrix
 
 
-def hold(patch):
+def hold(patch: Object) -> None:
     """Puts the patch back where it was touched, if its probe or somebody has moved it.
 
     A patch that constraints or an animation would move again stays where it is.
@@ -192,7 +191,7 @@ def hold(patch):
     _place_contours(contours_of(patch))
 
 
-def _place_contours(lines):
+def _place_contours(lines: Object | None) -> None:
     """Puts contours where their patch is, because they are in its coordinates."""
     if lines is None or lines.constraints or lines.animation_data:
         return
@@ -200,13 +199,13 @@ def _place_contours(lines):
         lines.matrix_parent_inverse = lines.matrix_basis = Matrix()
 
 
-def touched_frame(patch):
+def touched_frame(patch: Object) -> tuple[Array, Array]:
     """The frame in which the patch was touched: axes as columns, and origin."""
     frame = patch[RECORD]["frame"]
     return np.transpose([frame[name] for name in ("d1", "d2", "normal")]), np.array(frame["origin"])
 
 
-def move_record(patch, axes, origin):
+def move_record(patch: Object, axes: Array, origin: Array) -> None:
     """Lets the record say that the patch was touched at this frame, unless it says so already."""
     report, (before, at) = patch[RECORD], touched_frame(patch)
     if np.array_equal(axes, before) and np.array_equal(origin, at):
@@ -221,18 +220,18 @@ def move_record(patch, axes, origin):
     report["frame"].update({"origin": origin.tolist(), "d1": d1, "d2": d2, "normal": normal})
 
 
-def is_at(patch, axes, origin):
+def is_at(patch: Object, axes: Array, origin: Array) -> bool:
     """Whether the patch object is at a frame of the world, except for rounding."""
     near = {"rtol": 1e-6, "atol": 1e-6 * patch[RECORD]["radius"]}
     return np.allclose(patch.matrix_world, matrix_of(axes, origin), **near)
 
 
-def contours_of(patch):
+def contours_of(patch: Object) -> Object | None:
     """The contours of a patch object, or None."""
     return next((child for child in children_of(patch) if CONTOURS in child), None)
 
 
-def matrix_of(axes, origin):
+def matrix_of(axes: Array, origin: Array) -> Array:
     """The matrix (4, 4) of a frame: axes as columns, and origin."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = axes, origin

@@ -2,17 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How patches and whole objects are shown: their colors, and patches that are beside or over each other."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import bpy
 import numpy as np
 
+from ..touch.touch_report import TouchReport
+from ..touch.types import Object
 from . import colors
+from .attributes import COLOR, CURVATURE_STD, CURVATURES
 from .mesh_data import ABOVE, own_mesh, values
 from .patch_record import (
     ATLAS_RECORD,
-    COLOR,
     COMMON_RANGE,
-    CURVATURE_STD,
-    CURVATURES,
     POWERS,
     RANGE,
     RECORD,
@@ -29,7 +32,7 @@ LEAST_LAYER, MOST_LAYER = 3e-3, 3e-2  # and by no less and no more than these sh
 ALIKE = 0.5  # Patches overlap only if the cosine between their normals is more.
 
 
-def recolor(obj):
+def recolor(obj: Object) -> None:
     """Colors a patch or whole object by the quantity it is set to show, and keeps the range in its record.
 
     What is unknown of a whole object is gray, and does not count in the range.
@@ -53,19 +56,19 @@ def recolor(obj):
     record["color_limit"] = limit
 
 
-def _unknown(mesh):
+def _unknown(mesh: bpy.types.Mesh) -> Any:
     """The indices of the vertices whose curvatures are unknown; a patch has none."""
     return np.flatnonzero(np.isinf(values(mesh, CURVATURE_STD))) if CURVATURE_STD in mesh.attributes else []
 
 
-def settle(patch):
+def settle(patch: Object) -> None:
     """Gives a patch one range of colors with others of its mesh, and draws it above those it overlaps."""
     others = _others(patch)
     share_range(patch, others)
     _draw_above(patch, others)
 
 
-def share_range(patch, others=None):
+def share_range(patch: Object, others: list[Object] | None = None) -> None:
     """Gives all patches of its mesh that show what a patch shows the largest of their own ranges."""
     same = [
         obj
@@ -79,7 +82,7 @@ def share_range(patch, others=None):
             recolor(obj)
 
 
-def _draw_above(patch, others):
+def _draw_above(patch: Object, others: list[Object]) -> None:
     """Draws a patch above those that it overlaps, by a modifier that rendering and most exports leave out."""
     over = [obj for obj in others if _overlap(patch[RECORD], obj[RECORD])]
     taken = {obj.get(LAYER, 0) for obj in over}
@@ -93,7 +96,7 @@ def _draw_above(patch, others):
             _lift(part, height)
 
 
-def _layer(upper, lower):
+def _layer(upper: Object, lower: Object) -> float:
     """How far above another a patch is drawn: by more than both may be off, as two in one place flicker."""
     radius = upper[RECORD]["radius"]
     apart = APART * (upper[RECORD]["height_std"] + lower[RECORD]["height_std"])
@@ -102,12 +105,12 @@ def _layer(upper, lower):
     return min(max(apart, LEAST_LAYER * radius), MOST_LAYER * radius) + further
 
 
-def _height(patch):
+def _height(patch: Object) -> float:
     modifier = patch.modifiers.get(ABOVE_OTHERS)
     return 0.0 if modifier is None else modifier.strength
 
 
-def _lift(obj, height):
+def _lift(obj: Object, height: float) -> None:
     """Draws a patch or its contours higher along the patch's normal."""
     modifier = obj.modifiers.get(ABOVE_OTHERS)
     if height == 0.0:
@@ -120,17 +123,18 @@ def _lift(obj, height):
     modifier.strength = height
 
 
-def _overlap(a, b):
+def _overlap(a: TouchReport, b: TouchReport) -> bool:
     """Whether the patches of two reports may lie over each other."""
     apart = np.subtract(a["frame"]["origin"], b["frame"]["origin"])
     alike = np.dot(a["frame"]["normal"], b["frame"]["normal"])
-    return alike > ALIKE and np.linalg.norm(apart) < a["radius"] + b["radius"]
+    return bool(alike > ALIKE and np.linalg.norm(apart) < a["radius"] + b["radius"])
 
 
-def _others(patch):
+def _others(patch: Object) -> list[Object]:
     """All other patches whose colors can be changed without a copy of their meshes."""
+    objects: Iterable[Object] = bpy.data.objects
     return [
         obj
-        for obj in bpy.data.objects
+        for obj in objects
         if RECORD in obj and obj != patch and obj.is_editable and is_colored(obj) and obj.data.users == 1
     ]

@@ -7,18 +7,26 @@ that it goes to. A collection that holds a patch made by a handler would then po
 that was added is unlinked before undo, and linked again afterward if it is still there.
 """
 
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import bpy
 
+from ..touch.types import Object
+
 _is_late = False
-_added = set()  # The session_uids of objects and collections that were added.
-_replaced = {}  # The session_uids of meshes, by those of the copies that have taken their places.
-_links = []  # Links that were taken out: a function that puts one back, and session_uids.
+_added: set[int] = set()  # The session_uids of objects and collections that were added.
+_replaced: dict[
+    int, int
+] = {}  # The session_uids of meshes, by those of the copies that have taken their places.
+_links: list[
+    tuple[Any, ...]
+] = []  # Links that were taken out: a function that puts one back, and session_uids.
 
 
 @contextmanager
-def after_step():
+def after_step() -> Iterator[None]:
     """Within this context, what is added may be in no undo step."""
     global _is_late
     outer, _is_late = _is_late, True
@@ -28,19 +36,19 @@ def after_step():
         _is_late = outer
 
 
-def note_added(datablock):
+def note_added(datablock: Object | bpy.types.Collection) -> None:
     """Notes a new object or collection that is linked to something that was there before."""
     if _is_late:
         _added.add(datablock.session_uid)
 
 
-def note_copied(obj, mesh):
+def note_copied(obj: Object, mesh: bpy.types.Mesh) -> None:
     """Notes an object that got a copy of `mesh` instead of it."""
     if _is_late:
         _replaced[obj.data.session_uid] = mesh.session_uid
 
 
-def take_out():
+def take_out() -> None:
     """Unlinks what was added. It must be called before undo and redo."""
     _links.clear()
     if not (_added or _replaced):
@@ -60,7 +68,7 @@ def take_out():
     _give_back_meshes()
 
 
-def _give_back_meshes():
+def _give_back_meshes() -> None:
     there = {mesh.session_uid: mesh for mesh in bpy.data.meshes} if _replaced else {}
     for obj in bpy.data.objects if there else ():
         before = obj.type == "MESH" and there.get(_replaced.get(obj.data.session_uid))
@@ -69,7 +77,7 @@ def _give_back_meshes():
             obj.data = before
 
 
-def put_back():
+def put_back() -> None:
     """Links again what is still there. It must be called after undo and redo, and in another file."""
     for function, *numbers in reversed(_links):
         function(*numbers)
@@ -78,39 +86,39 @@ def put_back():
     _replaced.clear()
 
 
-def _set_mesh(obj, copy, before):
-    obj, copy = _object(obj), _found(bpy.data.meshes, copy)
-    if obj is not None and copy is not None and obj.data.session_uid == before:
-        obj.data = copy
+def _set_mesh(obj: int, copy: int, before: int) -> None:
+    owner, mesh = _object(obj), _found(bpy.data.meshes, copy)
+    if owner is not None and mesh is not None and owner.data.session_uid == before:
+        owner.data = mesh
 
 
-def _set_parent(child, parent):
-    child, parent = _object(child), _object(parent)
-    if child is not None and parent is not None and child.parent is None:
-        child.parent = parent
+def _set_parent(child: int, parent: int) -> None:
+    below, above = _object(child), _object(parent)
+    if below is not None and above is not None and below.parent is None:
+        below.parent = above
 
 
-def _link_object(obj, collection):
-    obj, collection = _object(obj), _collections().get(collection)
-    if obj is not None and collection is not None and not obj.users_collection:
-        collection.objects.link(obj)
+def _link_object(obj: int, collection: int) -> None:
+    found, above = _object(obj), _collections().get(collection)
+    if found is not None and above is not None and not found.users_collection:
+        above.objects.link(found)
 
 
-def _link_collection(collection, above):
-    collection, above = _collections().get(collection), _collections().get(above)
-    if collection is not None and above is not None and collection.name not in above.children:
-        above.children.link(collection)
+def _link_collection(collection: int, above: int) -> None:
+    child, parent = _collections().get(collection), _collections().get(above)
+    if child is not None and parent is not None and child.name not in parent.children:
+        parent.children.link(child)
 
 
-def _object(number):
+def _object(number: int) -> Object | None:
     return _found(bpy.data.objects, number)
 
 
-def _found(datablocks, number):
+def _found(datablocks: Iterable[Any], number: int) -> Any:
     return next((block for block in datablocks if block.session_uid == number), None)
 
 
-def _collections():
+def _collections() -> dict[int, bpy.types.Collection]:
     """All collections by their session_uids, and the scenes' own collections by those of the scenes."""
     found = {collection.session_uid: collection for collection in bpy.data.collections}
     return found | {scene.session_uid: scene.collection for scene in bpy.data.scenes}

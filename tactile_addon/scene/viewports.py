@@ -2,30 +2,35 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether viewports show the colors of vertices, how to make them do so, and whether anything is dragged."""
 
+from collections.abc import Iterator
+from typing import Any
+
 import bpy
 
 GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
 
-def shows_colors(space):
+def shows_colors(space: Any) -> bool:
     """Whether a 3D viewport draws the colors of vertices."""
     kind = space.shading.type
     return kind in ("MATERIAL", "RENDERED") or (kind == "SOLID" and space.shading.color_type == "VERTEX")
 
 
-def has_gesture():
+def has_gesture() -> bool:
     """Whether something is being dragged in any window, which then keeps pointers to it."""
     windows = bpy.context.window_manager.windows
     names = [operator.bl_idname for window in windows for operator in window.modal_operators]
     return any(name.startswith(GESTURES) or "_move" in name for name in names)
 
 
-def show_colors(chosen=None):
+def show_colors(chosen: Any = None) -> None:
     """Makes a viewport, and all that nobody has set otherwise, draw the colors of vertices in Solid shading.
 
     A file that is made without a window also has viewports, in which it will be opened.
     """
-    areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    areas: Iterator[Any] = (
+        area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"
+    )
     for shading in (area.spaces.active.shading for area in areas):
         if shading.color_type == "MATERIAL":
             shading.color_type = "VERTEX"

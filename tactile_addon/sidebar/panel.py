@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panels of the sidebar's tab."""
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface
 
@@ -26,6 +29,9 @@ from ..stability_map.map_operator import TACTILE_OT_stability_map
 from ..stability_map.map_report import map_rows, median_rows
 from ..touch import units
 from ..touch.settings import draw_chosen, draw_sensor, draw_solver
+from ..touch.touch_report import TouchReport
+from ..touch.types import Object, PanelMixin
+from ..touch.units import Unit
 from ..touch.wording import registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
@@ -41,12 +47,13 @@ OTHER_MODE = "Objects are touched in Object Mode, so the buttons are gray"
 ICONS = {"ok": "CHECKMARK", "uncertain": "ERROR", "not_converged": "ERROR"}
 
 
-class _Sidebar:
+class _Sidebar(PanelMixin):
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = TAB
+    draw_active: Callable[[bpy.types.Context, bpy.types.UILayout, Object], None]
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split, self.layout.use_property_decorate = True, False
         self.draw_active(context, self.layout, context.view_layer.objects.active)
 
@@ -55,7 +62,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_probe"
     bl_label = "Tactile Probe"
 
-    def draw_active(self, context, layout, obj):
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         if context.mode != "OBJECT":
             draw_sentence(context, layout, OTHER_MODE, "INFO")
             leave = layout.operator("object.mode_set", text="Go to Object Mode", icon="OBJECT_DATAMODE")
@@ -88,7 +95,7 @@ class TACTILE_PT_probe(_Sidebar, bpy.types.Panel):
                 draw(body, settings, chosen, fields)
 
 
-def _draw_pick(context, layout, obj):
+def _draw_pick(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
     """Draws the button that makes a probe, and what it does or needs."""
     layout.operator(TACTILE_OT_pick.bl_idname, icon="EYEDROPPER")
     if not any(each.type == "MESH" for each in context.view_layer.objects):
@@ -97,13 +104,13 @@ def _draw_pick(context, layout, obj):
         draw_sentence(context, layout, HELP, "INFO")
 
 
-def _size_of(target, record):
+def _size_of(target: Object | None, record: TouchReport | None) -> float:
     if target is not None:
         return max(target.dimensions)
     return 0.0 if record is None else record["radius"]
 
 
-def _draw_planes(layout, settings):
+def _draw_planes(layout: bpy.types.UILayout, settings: Any) -> None:
     column = layout.column(align=True)
     heading = column.row(align=True)
     heading.label(text="", icon="BLANK1")
@@ -124,11 +131,11 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
     bl_label = "Patch"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         obj = context.view_layer.objects.active
         return probe.probe_of(obj) is not None or probe.patch_near(obj) is not None
 
-    def draw_active(self, context, layout, obj):
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         found, patch = probe.probe_of(obj), probe.patch_near(obj)
         failed = "" if found is None else found.tactile_probe.message
         if failed:
@@ -161,7 +168,7 @@ class TACTILE_PT_result(_Sidebar, bpy.types.Panel):
             draw_rows(context, layout, plane_rows(record, unit), active=not is_outdated)
 
 
-def _draw_remedy(layout, record):
+def _draw_remedy(layout: bpy.types.UILayout, record: Mapping[str, Any]) -> None:
     """Draws the button that helps a probe's patch which is outdated, or felt few facets."""
     if record["status"] == "outdated":
         layout.operator(TACTILE_OT_update.bl_idname, icon="FILE_REFRESH")
@@ -173,7 +180,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_object"
     bl_label = "Whole Object"
 
-    def draw_active(self, context, layout, obj):
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         layout.operator(TACTILE_OT_touch_all_over.bl_idname, icon="MESH_UVSPHERE")
         if obj is None or patch_record.ATLAS_RECORD not in obj:
             return
@@ -196,7 +203,7 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
     bl_idname = "TACTILE_PT_map"
     bl_label = "Stability Map"
 
-    def draw_active(self, context, layout, obj):
+    def draw_active(self, context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object) -> None:
         layout.operator(TACTILE_OT_stability_map.bl_idname, icon="SHADERFX")
         if obj is None or patch_record.MAP_RECORD not in obj:
             return
@@ -216,7 +223,9 @@ class TACTILE_PT_map(_Sidebar, bpy.types.Panel):
                 draw_rows(context, body, more)
 
 
-def _draw_details(context, layout, record, unit):
+def _draw_details(
+    context: bpy.types.Context, layout: bpy.types.UILayout, record: Mapping[str, Any], unit: Unit
+) -> None:
     """Draws what the fit says of itself, and all other numbers, folded away."""
     header, body = layout.panel("TACTILE_PT_why", default_closed=True)
     header.label(text="Reasons")
@@ -228,14 +237,14 @@ def _draw_details(context, layout, record, unit):
         draw_rows(context, body, other_rows(record, unit), active=record["status"] != "outdated")
 
 
-def _draw_colors(context, layout, obj, name):
+def _draw_colors(context: bpy.types.Context, layout: bpy.types.UILayout, obj: Object, name: str) -> None:
     """Draws what the colors show, and a button if the viewport does not show them."""
     layout.prop(obj, name)
     if not shows_colors(context.space_data):
         layout.operator(TACTILE_OT_show_colors.bl_idname, icon="SHADING_SOLID")
 
 
-def _draw_range(context, layout, patch):
+def _draw_range(context: bpy.types.Context, layout: bpy.types.UILayout, patch: Object) -> None:
     """Draws where the colors end, and a button for one range on all patches."""
     row = layout.row(align=True)
     row.use_property_split = False
@@ -247,7 +256,7 @@ def _draw_range(context, layout, patch):
         row.operator(TACTILE_OT_share_range.bl_idname, text="", icon="LINKED")
 
 
-def _draw_shown(layout, found, patch):
+def _draw_shown(layout: bpy.types.UILayout, found: Object | None, patch: Object) -> None:
     """Draws the switches of what is shown with a patch and may hide it."""
     lines = patch_record.contours_of(patch)
     row = layout.row(align=True)
@@ -258,7 +267,9 @@ def _draw_shown(layout, found, patch):
         row.prop(found.tactile_probe, "show_handles", icon="GIZMO", toggle=1)
 
 
-def _draw_comparison(context, layout, record, unit):
+def _draw_comparison(
+    context: bpy.types.Context, layout: bpy.types.UILayout, record: Mapping[str, Any], unit: Unit
+) -> None:
     """Draws where the patch was put on a mesh, and how far it is off one, if these are known."""
     if "registration" in record:
         draw_sentence(context, layout, registration_summary(record["registration"]), "SNAP_ON")

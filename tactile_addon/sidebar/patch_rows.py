@@ -2,14 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The numbers that the sidebar shows of a patch: those that matter most, and all others."""
 
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import bpy
+
 from ..touch import units
+from ..touch.touch_report import TouchReport
+from ..touch.units import Unit
 
 FLAT_DEVIATIONS = 2.0  # A curvature within so many deviations of 0 has no radius.
 FLATTEST = 1e-3  # Nor has one whose radius is a thousand times the patch's.
 ZERO = 1e-6  # A number below this, in unit radius, counts as 0.
 
 
-def main_rows(record, unit):
+def main_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of what matters most, with lengths in a unit of units.py."""
     mesh = "…"
     if record["is_verified"]:
@@ -23,7 +30,7 @@ def main_rows(record, unit):
     ]
 
 
-def other_rows(record, unit):
+def other_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of everything else."""
     rows = [
         *_radii(record, unit),
@@ -40,7 +47,7 @@ def other_rows(record, unit):
     return [*rows, ("Degree", str(record["degree"])), ("Contacts", str(record["contacts"]))]
 
 
-def plane_rows(record, unit):
+def plane_rows(record: TouchReport, unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of the plane that would tell most, once it is known."""
     if not record["is_verified"]:
         return []
@@ -51,7 +58,7 @@ def plane_rows(record, unit):
     ]
 
 
-def found_values(record, scene):
+def found_values(record: Mapping[str, Any] | None, scene: bpy.types.Scene) -> dict[str, str]:
     """The values that the last touch chose for numbers left to the surface, in words and by name."""
     if record is None or record["status"] == "outdated" or "step" not in record:
         return {}
@@ -60,26 +67,26 @@ def found_values(record, scene):
     return lengths | {"degree": str(record["degree"])}
 
 
-def _said(record, key, power, unit):
+def _said(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
     return units.say(_value(record, key, power), power, unit)
 
 
-def _shape_index(record):
+def _shape_index(record: Mapping[str, Any]) -> str:
     """The shape index in words; a flat patch has none."""
     flat = not any(units.known(_value(record, key, -1), record[f"{key}_std"]) for key in ("k1", "k2"))
     return "–" if flat else f"{record['shape_index']:.2f}"
 
 
-def _measured(record, key, power, unit):
+def _measured(record: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
     return units.say(_value(record, key, power), power, unit, record[f"{key}_std"])
 
 
-def _value(record, key, power):
+def _value(record: Mapping[str, Any], key: str, power: int) -> float:
     # In single precision a little is left of 0.
     return record[key] if abs(record[key]) > ZERO * record["radius"] ** power else 0.0
 
 
-def _radii(record, unit):
+def _radii(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str]]:
     """Rows of the radii 1 / kappa, with their deviations, if the curvatures are known not to be 0."""
     for number in (1, 2):
         k, std = record[f"k{number}"], record[f"k{number}_std"]

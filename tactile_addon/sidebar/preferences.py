@@ -3,6 +3,7 @@
 """The menu entries, the manual's pages and the preferences."""
 
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.props import StringProperty
@@ -25,7 +26,8 @@ class VIEW3D_MT_tactile(bpy.types.Menu):
     bl_idname = "VIEW3D_MT_tactile"
     bl_label = "Tactile Patch"
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
+        operator: type[Any]
         for operator in (TACTILE_OT_pick, TACTILE_OT_reconstruct, TACTILE_OT_stability_map):
             self.layout.operator(operator.bl_idname)
         self.layout.separator()
@@ -36,12 +38,12 @@ class VIEW3D_MT_tactile(bpy.types.Menu):
             self.layout.operator(operator.bl_idname)
 
 
-def _draw_in_object(self, context):
+def _draw_in_object(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.menu(VIEW3D_MT_tactile.bl_idname)
 
 
-def _draw_in_add(self, context):
+def _draw_in_add(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator(TACTILE_OT_reconstruct.bl_idname, icon="SURFACE_DATA")
 
@@ -49,7 +51,7 @@ def _draw_in_add(self, context):
 MENUS = (("VIEW3D_MT_object", _draw_in_object), ("VIEW3D_MT_mesh_add", _draw_in_add))
 
 
-def manual_map():
+def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
     """The extension's manual pages, one for each section, for Online Manual in context menus."""
     folder = Path(__file__).resolve().parents[2] / "manual"
     pages = {
@@ -66,7 +68,7 @@ def manual_map():
     return f"{folder.as_uri()}/", tuple(pages.items())
 
 
-def _move_tab(preferences, context):
+def _move_tab(preferences: Any, context: bpy.types.Context) -> None:
     """Registers the panels again, because they learn their tab only then."""
     for panel in PANELS:
         bpy.utils.unregister_class(panel)
@@ -74,9 +76,9 @@ def _move_tab(preferences, context):
         bpy.utils.register_class(panel)
 
 
-def restore_tab():
+def restore_tab() -> None:
     """Puts the panels into the tab of the preferences, if the extension has preferences."""
-    addon = bpy.context.preferences.addons.get(TactilePreferences.bl_idname)
+    addon: Any = bpy.context.preferences.addons.get(TactilePreferences.bl_idname)
     if addon is not None and addon.preferences.tab != TAB:
         _move_tab(addon.preferences, bpy.context)
 
@@ -91,7 +93,7 @@ class TactilePreferences(bpy.types.AddonPreferences):
         update=_move_tab,
     )
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
         self.layout.prop(self, "tab")
         self.layout.operator(

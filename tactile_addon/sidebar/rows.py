@@ -4,11 +4,14 @@
 
 import re
 import textwrap
+from collections.abc import Sequence
+from typing import Any
 
 import blf
 import bpy
 from bpy.props import StringProperty
 
+from ..touch.types import Outcome
 from ..viewport.overlay import FONT
 
 TEXT = 11.0  # The font's size in panels.
@@ -54,7 +57,7 @@ TIPS = {
 }
 
 
-def tip_of(label):
+def tip_of(label: str) -> str:
     """What a row's label means, or "" if that goes without saying."""
     return TIPS.get(re.sub(r"(?<= )\d+", "…", label), "")
 
@@ -70,16 +73,21 @@ class TACTILE_OT_copy_value(bpy.types.Operator):
     value: StringProperty(name="Value", description="Value to copy", options={"SKIP_SAVE"})
 
     @classmethod
-    def description(cls, context, properties):
+    def description(cls, context: bpy.types.Context, properties: Any) -> str:
         """The tooltip that Blender shows for the number."""
         return ". ".join(filter(None, (tip_of(properties.label), "Click to copy it")))
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         context.window_manager.clipboard = self.value
         return {"FINISHED"}
 
 
-def draw_rows(context, layout, rows, active=True):
+def draw_rows(
+    context: bpy.types.Context,
+    layout: bpy.types.UILayout,
+    rows: Sequence[tuple[str, str]],
+    active: bool = True,
+) -> None:
     """Draws labels and values side by side, gray if they are not active; a heading has no value.
 
     A value that has no room beside its label stands below it.
@@ -106,7 +114,7 @@ def draw_rows(context, layout, rows, active=True):
         line.label(text=value, translate=False)
 
 
-def draw_sentence(context, layout, sentence, icon):
+def draw_sentence(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: Any) -> None:
     """Draws a sentence in as many lines as the sidebar's width needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8
@@ -114,6 +122,6 @@ def draw_sentence(context, layout, sentence, icon):
         column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
-def _letters(context):
+def _letters(context: bpy.types.Context) -> float:
     """About how many letters fit into a line of the sidebar."""
     return context.region.width / (LETTER * context.preferences.system.ui_scale) - 8.0

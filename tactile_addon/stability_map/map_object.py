@@ -3,20 +3,21 @@
 """A stability map as an object: a painted copy of the mesh that was touched."""
 
 import math
+from typing import Any
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
 from ..scene import colors, patch_object, patch_record
-from ..scene.mesh_data import emission
+from ..scene.attributes import HEIGHT_STD, MAP_COLOR, MEASURES, POSITION, REASON, TOUCHED
+from ..scene.mesh_data import emission, write
 from ..scene.shown import LEAST_RANGE
 from ..scene.viewports import show_colors
 from ..touch.settings import MOST_PLANES
-from .stability import MEASURES, NOTHING, REASON_KEYS, REASONS
+from ..touch.types import Array, Object
+from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
 
-MAP_COLOR = "stability_color"
-TOUCHED = "is_touched"
 SHADES = 256
 # The map is shown this share of the object's size above the mesh. With less it flickers if it is 20000 clip
 # starts away, as a scan in mm is.
@@ -24,7 +25,7 @@ SHOWN_ABOVE = 5e-3
 # What the colors can show: attribute, name, description, and the power of length in its unit.
 MAP_QUANTITIES = [
     ("error", "Error", "Mean distance in height between patch and mesh", 1),
-    ("height_std", "Standard Deviation", "How well the contacts determine the height", 1),
+    (HEIGHT_STD, "Standard Deviation", "How well the contacts determine the height", 1),
     (
         "reach",
         "Reach",
@@ -38,7 +39,7 @@ MAP_QUANTITIES = [
         0,
     ),
     ("blind_share", "Blind Share", "Share of the shape terms that the planes cannot show", 0),
-    ("reason", "Reason", "Whether there is a patch, and why there is none", 0),
+    (REASON, "Reason", "Whether there is a patch, and why there is none", 0),
 ]
 LOGARITHMIC = ("condition_number",)  # These have a logarithmic scale from 1.
 REVERSED = ("reach",)  # Of these much is good, so that red is little: red is bad on every map.
@@ -51,7 +52,7 @@ REASON_COLORS = np.array([
 ])  # fmt: skip
 
 
-def insert(context, obj, touched):
+def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Object:
     """Adds a copy of `obj`, painted by the StabilityMap `touched`, to the scene, and returns it."""
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = obj.evaluated_get(depsgraph)
@@ -63,7 +64,7 @@ def insert(context, obj, touched):
     mesh.transform(painted.matrix_basis.inverted_safe() @ obj.matrix_world)
     # It would lie in the mesh it describes, so it is shown a little above it. It is not shown in front,
     # because patches that lie in it are.
-    above = painted.modifiers.new("Above the Mesh", "DISPLACE")
+    above: Any = painted.modifiers.new("Above the Mesh", "DISPLACE")
     above.mid_level, above.strength = 0.0, SHOWN_ABOVE * math.dist(painted.bound_box[0], painted.bound_box[6])
     _paint(mesh, touched)
     mesh.materials.clear()
@@ -75,28 +76,23 @@ def insert(context, obj, touched):
     return painted
 
 
-def _paint(mesh, touched):
+def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
     """Gives each vertex the values of the nearest touch."""
-    attributes = [(name, "FLOAT", getattr(touched, name).astype(np.float32)) for name in MEASURES]
-    attributes.append(("reason", "INT", touched.reason))
-    for name in (*MEASURES, "reason", TOUCHED, MAP_COLOR):
-        if name in mesh.attributes:  # The source may have one of this name and another type.
-            mesh.attributes.remove(mesh.attributes[name])
-    for name, kind, values in attributes:
-        mesh.attributes.new(name, kind, "POINT").data.foreach_set("value", values[touched.nearest])
+    for name in (*MEASURES, REASON):
+        write(mesh, name, getattr(touched, name)[touched.nearest])
     is_touched = np.zeros(len(mesh.vertices), dtype=bool)
     is_touched[touched.chosen[: touched.done]] = True
-    mesh.attributes.new(TOUCHED, "BOOLEAN", "POINT").data.foreach_set("value", is_touched)
-    mesh.attributes.new(MAP_COLOR, "FLOAT_COLOR", "POINT")
+    write(mesh, TOUCHED, is_touched)
+    write(mesh, MAP_COLOR, np.ones((len(mesh.vertices), 4)))
     mesh.color_attributes.active_color_name = mesh.color_attributes.default_color_name = MAP_COLOR
 
 
-def recolor(painted):
+def recolor(painted: Object) -> None:
     """Colors the map by the quantity that it is set to show, and keeps the range in its record."""
     shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
-    values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == "reason" else np.float32)
+    values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == REASON else np.float32)
     mesh.attributes[shown].data.foreach_get("value", values)
-    if shown == "reason":
+    if shown == REASON:
         rgba, limit = colors.linear(REASON_COLORS)[values], len(REASON_KEYS) - 1.0
     else:
         limit = _limit(shown, values[values != NOTHING], record["spacing"])
@@ -112,7 +108,7 @@ def recolor(painted):
     record["color_limit"] = limit
 
 
-def _limit(shown, values, spacing):
+def _limit(shown: str, values: Array, spacing: float) -> float:
     """The end of the colors' range."""
     if shown == "blind_share":
         return 1.0
@@ -120,19 +116,19 @@ def _limit(shown, values, spacing):
     return colors.symmetric_range(values, floor) if len(values) else floor
 
 
-def swatches(painted):
+def swatches(painted: Object) -> list[tuple[str, tuple[float, ...]]]:
     """(name, sRGB color) of all that is not on the scale: reasons that occur, or that there is no patch."""
     record = painted[patch_record.MAP_RECORD]
     counts = {"patch": record["patches"] - record["in_doubt"], "doubt": record["in_doubt"]}
     counts |= record["refused"].to_dict()
-    if painted.tactile_map_colors != "reason":
+    if painted.tactile_map_colors != REASON:
         refused = sum(counts[key] for key in REASON_KEYS[2:])
         return [(f"No Patch: {refused}", REFUSED)] if refused else []
     names = zip(REASONS, REASON_COLORS, strict=True)
     return [(f"{name}: {counts[key]}", tuple(c)) for (key, name, _), c in names if counts[key]]
 
 
-def touched_near(painted, location):
+def touched_near(painted: Object, location: list[float]) -> list[float]:
     """The point nearest to a location at which a map was touched.
 
     It is the location itself if that point is farther away than the spacing, as where the target was moved.
@@ -142,7 +138,7 @@ def touched_near(painted, location):
         return location
     is_touched, co = np.empty(count, dtype=bool), np.empty((count, 3), dtype=np.float32)
     mesh.attributes[TOUCHED].data.foreach_get("value", is_touched)
-    mesh.attributes["position"].data.foreach_get("vector", co.ravel())
+    mesh.attributes[POSITION].data.foreach_get("vector", co.ravel())
     matrix = np.array(painted.matrix_world, dtype=float)
     places = co[is_touched] @ matrix[:3, :3].T + matrix[:3, 3]
     away = np.linalg.norm(places - np.array(location), axis=1)
@@ -151,7 +147,7 @@ def touched_near(painted, location):
     return places[nearest].tolist() if is_near else location
 
 
-def inputs_of(painted):
+def inputs_of(painted: Object) -> dict[str, Any]:
     """The settings that a map was touched with, by name: with them a probe finds what the map shows."""
     record = painted[patch_record.MAP_RECORD].to_dict()
     angles = np.radians(record["planes"] + [[0.0, 0.0]] * (MOST_PLANES - len(record["planes"])))
@@ -165,14 +161,21 @@ def inputs_of(painted):
     }
 
 
-def register():
-    bpy.types.Object.tactile_map_colors = EnumProperty(
+def _show(obj: Object, context: bpy.types.Context) -> None:
+    if patch_record.MAP_RECORD in obj:
+        recolor(obj)
+
+
+def register() -> None:
+    objects: Any = bpy.types.Object
+    objects.tactile_map_colors = EnumProperty(
         name="Colors",
         description="What the colors of the map show",
         items=[item[:3] for item in MAP_QUANTITIES],
-        update=lambda obj, _: recolor(obj) if patch_record.MAP_RECORD in obj else None,
+        update=_show,
     )
 
 
-def unregister():
-    del bpy.types.Object.tactile_map_colors
+def unregister() -> None:
+    objects: Any = bpy.types.Object
+    del objects.tactile_map_colors

@@ -5,7 +5,7 @@
 import bpy
 
 from ..probes import probe
-from ..probes.in_slices import InSlices
+from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged
 from ..probes.operators import (
     fields_of,
@@ -24,6 +24,7 @@ from ..touch.settings import (
     length_property,
     touch_arguments,
 )
+from ..touch.types import Outcome
 from ..touch.wording import sentence
 from . import map_object
 from .map_report import map_summary
@@ -49,16 +50,16 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
     meanwhile = {"PASS_THROUGH"}  # The scene may change, because a detached mesh is touched.
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return is_in_object_mode(cls, context, "Maps are made") and has_target(cls, context)
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         found = probe.probe_of(context.view_layer.objects.active)
         for name in NAMES if found is not None and not bpy.app.background else ():
             setattr(self, name, getattr(found.tactile_probe, name))
         return self._ask(context)
 
-    def _begin(self, context):
+    def _begin(self, context: bpy.types.Context) -> None:
         self._map = StabilityMap(
             target_object(context, self.target),
             context.evaluated_depsgraph_get(),
@@ -67,7 +68,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         )
         self._steps = self._map.steps()
 
-    def _stopped(self, context):
+    def _stopped(self, context: bpy.types.Context) -> Outcome:
         """Keeps the touches so far when Esc is pressed."""
         if not self._map.done:
             self._leave(context)
@@ -75,14 +76,14 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         self._steps = self._map.spread()
         return {"RUNNING_MODAL"}
 
-    def _done(self):
+    def _done(self) -> Progress:
         done, count = self._map.done, len(self._map.chosen)
         return f"Stability Map: {done} of {count} points", done / max(count, 1)
 
-    def _check(self, context):
+    def _check(self, context: bpy.types.Context) -> None:
         self._map.surface.require_source(context)
 
-    def _finish(self, context):
+    def _finish(self, context: bpy.types.Context) -> Outcome:
         target = self._map.surface.require_same(context)
         painted = map_object.insert(context, target, self._map)
         make_active(context, painted)
@@ -90,7 +91,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
         self.report({"INFO"} if record["patches"] else {"WARNING"}, map_summary(record))
         return {"FINISHED"}
 
-    def _about(self, context):
+    def _about(self, context: bpy.types.Context) -> str:
         """A sentence on what will be touched at how many points, or on why it cannot be touched."""
         try:
             target = target_object(context, self.target)
@@ -100,7 +101,7 @@ class TACTILE_OT_stability_map(InSlices, TouchSettings, bpy.types.Operator):
             return sentence(error)
         return f"{target.name}: about {count} points are touched"
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")

@@ -2,20 +2,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the panel and the shell say of a stability map."""
 
+from collections.abc import Iterator, Mapping
+from typing import Any
+
 import bpy
 
 from ..touch import units
+from ..touch.units import Unit
 from ..touch.wording import table
 from . import map_object
 from .stability import REASONS
 
 
-def map_readable(record):
+def map_readable(record: Mapping[str, Any]) -> str:
     """Lines of label and value, with lengths in the unit of the scene or file."""
     return table(map_table_rows(record))
 
 
-def map_table_rows(record):
+def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a map."""
     refused = ", ".join(f"{key} {count}" for key, count in record["refused"].items())
     unit = units.unit_of(bpy.context.scene, record["spacing"])
@@ -31,14 +35,14 @@ def map_table_rows(record):
     ]
 
 
-def map_summary(record):
+def map_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what a stability map has found."""
     words = [f"{record['patches']} patches at {record['touched']} points, {record['in_doubt']} in doubt"]
     words += [f"{count} refused by {key}" for key, count in record["refused"].items() if count]
     return "; ".join(words)
 
 
-def map_rows(record, unit):
+def map_rows(record: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """(label, value) of how many patches a stability map has, and of the reasons why there are not more."""
     names, refused = {key: name for key, name, _ in REASONS}, [*record["refused"].items()]
     return [
@@ -51,13 +55,13 @@ def map_rows(record, unit):
     ]
 
 
-def median_rows(record, unit, more=False):
+def median_rows(record: Mapping[str, Any], unit: Unit, more: bool = False) -> list[tuple[str, str]]:
     """(label, value) of the medians over the patches of a stability map: those in lengths, or all `more`."""
     powers = map_object.MAP_POWERS
     return [(title, value) for name, title, value in _medians(record, unit) if (powers[name] == 0) is more]
 
 
-def _medians(record, unit):
+def _medians(record: Mapping[str, Any], unit: Unit) -> Iterator[tuple[str, str, str]]:
     """(attribute, title, value) of each median that is known."""
     for name, title, _, power in map_object.MAP_QUANTITIES:
         if f"{name}_median" in record:

@@ -3,14 +3,19 @@
 """Touches all over an object for a stability map, step by step; nothing in the scene changes."""
 
 from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
+from typing import Any
 
+import bpy
 import numpy as np
 
 from ... import core
+from ..scene.attributes import MEASURES
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
 from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
+from ..touch.types import Array, Object
 from ..touch.units import length
 
 EXTENT_SHARE = 1.0 / 8.0  # This share of the object's size stands for an extent that touches choose.
@@ -30,10 +35,9 @@ REASONS = [
 ]
 REASON_KEYS = [key for key, _, _ in REASONS]
 STOP_CODES = {stop: code for code, (_, _, stop) in enumerate(REASONS) if stop}
-MEASURES = ("error", "height_std", "reach", "condition_number", "blind_share")
 
 
-def expected_count(obj, depsgraph, extent, spacing):
+def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, spacing: float) -> int:
     """About how many points of an object are touched; `extent` and `spacing` may be 0 as in StabilityMap.
 
     Raises ValueError, with a sentence, for an object that cannot be touched.
@@ -55,7 +59,25 @@ class StabilityMap:
     nearest : index of the touch that is nearest to each vertex of the mesh, once the steps are done
     """
 
-    def __init__(self, obj, depsgraph, planes, *, spacing, extent, step, noise, seed, **fit):
+    error: Array
+    height_std: Array
+    reach: Array
+    condition_number: Array
+    blind_share: Array
+
+    def __init__(
+        self,
+        obj: Object,
+        depsgraph: bpy.types.Depsgraph,
+        planes: Sequence[core.SamplingPlane],
+        *,
+        spacing: float,
+        extent: float,
+        step: float,
+        noise: float,
+        seed: int,
+        **fit: Any,
+    ) -> None:
         """If `spacing`, `extent` or `step` is 0, the touches choose it; `fit` is that of touch().
 
         Raises ValueError, with a sentence, if the object cannot be touched, or no touch could succeed.
@@ -71,16 +93,17 @@ class StabilityMap:
         usual = extent or EXTENT_SHARE * self.surface.size
         # Touches of one extent have one step.
         self.extent, self.step = extent, step or extent / LEAST_STEPS
-        self._glance = {"extent": usual, "step": step or usual / LEAST_STEPS}
+        self._glance: dict[str, Any] = {"extent": usual, "step": step or usual / LEAST_STEPS}
         require_lengths(obj.name, self.surface.size, **self._glance, noise=noise)
         self.spacing = spacing or SPACING_SHARE * usual
         require_fine(self.surface.spacing, self._glance["step"])
         self.planes, self.noise, self.seed, self.fit = planes, noise, seed, fit
         self._rng = np.random.default_rng(seed)
         _rehearse(planes, fit, **self._glance)
-        self.chosen, self.done = [], 0
+        self.chosen: list[int] = []
+        self.done = 0
 
-    def steps(self):
+    def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         surface = self.surface
         candidates = np.flatnonzero(surface.has_face)
@@ -100,7 +123,7 @@ class StabilityMap:
             self.done = end
         yield from self.spread()
 
-    def spread(self):
+    def spread(self) -> Iterator[None]:
         """Finds the nearest of the touches that are done for each vertex, as a generator like `steps`."""
         from scipy.spatial import cKDTree
 
@@ -113,7 +136,7 @@ class StabilityMap:
             )[1]
             yield
 
-    def _touch(self, numbers):
+    def _touch(self, numbers: Sequence[int]) -> Iterator[None]:
         """Makes the touches with these numbers, as a generator like `steps`."""
         surface, chosen = self.surface, [self.chosen[number] for number in numbers]
         options = core.ExplorationOptions(
@@ -137,7 +160,7 @@ class StabilityMap:
                 self._note(number, touch)
             yield
 
-    def _why_none(self, vertex):
+    def _why_none(self, vertex: int) -> int:
         """The code of the reason why there is no touch at a vertex."""
         surface, point = self.surface, self.surface.points[vertex]
         try:
@@ -147,7 +170,7 @@ class StabilityMap:
         shortest = min(contours, key=lambda contour: len(contour.points))
         return _reason_of(_ended(contours, point) or shortest.stops)
 
-    def _note(self, number, touch):
+    def _note(self, number: int, touch: core.Exploration) -> None:
         result, surface = touch.result, self.surface
         off = core.height_error(result, surface)
         status, _ = core.judged_by_mesh(result, off or 0.0)
@@ -158,7 +181,7 @@ class StabilityMap:
         self.condition_number[number] = result.condition_number
         self.blind_share[number] = result.blind_share
 
-    def report(self):
+    def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values; medians are over the patches."""
         reasons = Counter(self.reason[: self.done].tolist())
         counts = {key: reasons[code] for code, key in enumerate(REASON_KEYS)}
@@ -180,7 +203,7 @@ class StabilityMap:
         return report | {"planes": np.degrees(angles).tolist()}
 
 
-def _ended(contours, point):
+def _ended(contours: Sequence[core.Contour], point: Array) -> list[str]:
     """The stops of curves that end at the point already, which is then on a crease or an edge."""
     return [
         stop
@@ -190,7 +213,7 @@ def _ended(contours, point):
     ]
 
 
-def _reason_of(stops):
+def _reason_of(stops: Iterable[str]) -> int:
     """The code of the most frequent stop. Curves that go on, but have no tangent plane, are on a crease."""
     counts = Counter(stop for stop in stops if stop in STOP_CODES)
     return STOP_CODES[counts.most_common(1)[0][0] if counts else core.CREASE]
@@ -199,7 +222,9 @@ def _reason_of(stops):
 class _Plane:
     """The plane z = 0 as a surface."""
 
-    def ray_cast(self, origin, direction, distance):
+    def ray_cast(
+        self, origin: Sequence[float], direction: Sequence[float], distance: float
+    ) -> tuple[Sequence[float], Sequence[float]] | None:
         """The point and the normal where a ray meets the plane, or None, as core asks of a Surface."""
         if direction[2] == 0.0 or not 0.0 <= -origin[2] / direction[2] <= distance:
             return None
@@ -207,7 +232,9 @@ class _Plane:
         return tuple(a + gone * b for a, b in zip(origin, direction, strict=True)), (0.0, 0.0, 1.0)
 
 
-def _rehearse(planes, fit, extent, step):
+def _rehearse(
+    planes: Sequence[core.SamplingPlane], fit: Mapping[str, Any], extent: float, step: float
+) -> None:
     """Raises ValueError for settings that cannot even rebuild a plane: all touches would be refused."""
     origin, up = np.zeros(3), (0.0, 0.0, 1.0)
     core.reconstruct(

@@ -4,11 +4,14 @@
 
 import zlib
 from time import perf_counter
+from typing import Any
 
+import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object
+from .types import Array, Object, Point, Triple
 
 PAUSE = 50.0  # The shape is compared again after so many times as long as that takes.
 
@@ -27,13 +30,16 @@ class DetachedMesh(PlacedMesh):
     spacing : the largest distance of neighboring float32 numbers in the mesh
     """
 
-    def __init__(self, obj, depsgraph):
+    points: Array
+    normals: Array
+
+    def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         evaluated, linear, _ = evaluated_object(obj, depsgraph)
         co = coordinates(obj.name, evaluated)
         # It keeps no reference to the object, which somebody may delete.
         self.name, self._uid = obj.name, obj.session_uid
-        self._checksum, self.matrix = zlib.crc32(co), obj.matrix_world.copy()
+        self._checksum, self.matrix = zlib.crc32(co.data), obj.matrix_world.copy()
         self._compared_until = 0.0
         farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
         self.spacing = farthest * np.finfo(np.float32).eps
@@ -55,7 +61,7 @@ class DetachedMesh(PlacedMesh):
         rays = self._tree.ray_cast
         super().__init__(linear, np.zeros(3), lambda *ray: rays(*ray)[:2])
 
-    def require_source(self, context):
+    def require_source(self, context: bpy.types.Context) -> Object:
         """The object it was made from. Raises ValueError, with a sentence, if that is gone or was moved.
 
         Now and then it also does what `require_same` does, so that long work does not go on in vain.
@@ -70,17 +76,17 @@ class DetachedMesh(PlacedMesh):
         begin = perf_counter()
         if begin >= self._compared_until:
             evaluated, _, _ = evaluated_object(found, context.evaluated_depsgraph_get())
-            if zlib.crc32(coordinates(found.name, evaluated)) != self._checksum:
+            if zlib.crc32(coordinates(found.name, evaluated).data) != self._checksum:
                 raise ValueError(f'"{self.name}" was changed while it was touched: start again')
             self._compared_until = perf_counter() + PAUSE * (perf_counter() - begin)
         return found
 
-    def require_same(self, context):
+    def require_same(self, context: bpy.types.Context) -> Object:
         """The object that `require_source` finds. Raises ValueError if that has another shape now."""
         self._compared_until = 0.0
         return self.require_source(context)
 
-    def has_rims(self):
+    def has_rims(self) -> bool:
         """Whether edges have one face only, as around holes. Vertices in one place count as one."""
         _, same = np.unique(self.points, axis=0, return_inverse=True)
         ends = np.sort(same.ravel()[self.triangles[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2), axis=1)
@@ -89,28 +95,28 @@ class DetachedMesh(PlacedMesh):
         return bool((faces == 1).any())
 
     @property
-    def origin(self):
+    def origin(self) -> Array:
         """The origin of the points, in the world."""
         return np.array(self.matrix.translation, dtype=float)
 
-    def project(self, location):
+    def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The point of the mesh nearest to a place, the unit normal there, and the distance."""
         return self._foot(location, location)
 
-    def _nearest(self, local):
+    def _nearest(self, local: Any) -> Any:
         return self._tree.find_nearest(local)[:2]
 
-    def face_near(self, point):
+    def face_near(self, point: Point) -> int:
         """The number of the face nearest to a point."""
         return self._tree.find_nearest(self._to_local(point))[2]
 
-    def corners_of(self, number):
+    def corners_of(self, number: int) -> Array:
         """The corners (k, 3) of a face, in order."""
         start, end = self._starts[number : number + 2]
         return self.points[self._corners[start:end]]
 
 
-def _arrays_of(mesh):
+def _arrays_of(mesh: bpy.types.Mesh) -> tuple[Array, Array, Array, Array]:
     """Normals (n, 3) of a mesh's vertices, those of its corners, its faces' first corners, its triangles."""
     normals = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.vertex_normals.foreach_get("vector", normals.ravel())

@@ -4,14 +4,19 @@
 
 import math
 import zlib
+from collections.abc import Callable, Sequence
+from typing import Any
 
+import bpy
 import numpy as np
+
+from .types import Array, Object, Point, Triple
 
 SHORT_SHARE = 0.05  # In most cases the mesh is within this share of the reach.
 FARTHEST_VERTEX = 1e15  # Vertices are no farther away, so that single precision can hold squared distances.
 
 
-def checksum_of(obj, depsgraph):
+def checksum_of(obj: Object, depsgraph: bpy.types.Depsgraph) -> int:
     """A checksum of the shape of the evaluated mesh in the object's coordinates.
 
     Raises ValueError, with a sentence, if the object cannot be touched.
@@ -22,24 +27,24 @@ def checksum_of(obj, depsgraph):
         evaluated.ray_cast((1e18, 0.0, 0.0), (1.0, 0.0, 0.0), distance=1e-30, depsgraph=depsgraph)
     except RuntimeError as error:
         raise disabled(obj) from error
-    return zlib.crc32(co)
+    return zlib.crc32(co.data)
 
 
-def is_disabled(obj):
+def is_disabled(obj: Object) -> bool:
     """Whether an object is disabled in viewports. As the parent of another it may still be evaluated."""
     return obj.hide_viewport or (
         bool(obj.users_collection) and all(found.hide_viewport for found in obj.users_collection)
     )
 
 
-def disabled(obj):
+def disabled(obj: Object) -> ValueError:
     """The error to raise for an object that Blender has not evaluated."""
     return ValueError(
         f'"{obj.name}" is disabled in viewports or excluded from the view layer: enable it there'
     )
 
 
-def evaluated_object(obj, depsgraph):
+def evaluated_object(obj: Object, depsgraph: bpy.types.Depsgraph) -> tuple[Object, Array, Array]:
     """The evaluated object and its transform: linear part and origin.
 
     Raises ValueError, with a sentence, if it cannot be touched for another reason than that it is disabled.
@@ -60,7 +65,7 @@ def evaluated_object(obj, depsgraph):
     return evaluated, matrix[:3, :3], matrix[:3, 3]
 
 
-def coordinates(name, evaluated):
+def coordinates(name: str, evaluated: Object) -> Array:
     """The coordinates of all vertices in an evaluated object, (n, 3) float32.
 
     Raises ValueError, with a sentence, if any is at a place that cannot be touched.
@@ -79,16 +84,16 @@ def coordinates(name, evaluated):
     return co
 
 
-def size_of(evaluated, linear):
+def size_of(evaluated: Object, linear: Array) -> float:
     """The longest edge of the object's bounding box, in the world."""
     edges = np.ptp(np.array(evaluated.bound_box), axis=0)
     return float((edges * np.linalg.norm(linear, axis=0)).max())
 
 
-def _coordinates(mesh):
+def _coordinates(mesh: bpy.types.Mesh) -> Array:
     """The coordinates of all vertices, (n, 3) float32. If the attribute is there, it is 30 times as fast."""
     co = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    position = mesh.attributes.get("position")  # There is none in edit mode.
+    position: Any = mesh.attributes.get("position")  # There is none in edit mode.
     if position is None:
         mesh.vertices.foreach_get("co", co.ravel())
     else:
@@ -96,7 +101,7 @@ def _coordinates(mesh):
     return co
 
 
-def require_invertible(name, matrix):
+def require_invertible(name: str, matrix: Array) -> None:
     """Raises ValueError, with a sentence, if the transform (4, 4) is not finite or has no inverse."""
     if not np.isfinite(matrix).all():
         raise ValueError(f'"{name}" has a location, rotation or scale that is not finite: set it again')
@@ -117,7 +122,9 @@ class PlacedMesh:
     Subclasses have `_nearest`, which gives the (point, normal) nearest to a point, in the mesh's coordinates.
     """
 
-    def __init__(self, linear, origin, cast):
+    _nearest: Callable[[Array], Any]
+
+    def __init__(self, linear: Array, origin: Array, cast: Callable[[Point, Point, float], Any]) -> None:
         self._linear, self._origin, self._cast = linear, origin, cast
         self._inverse = np.linalg.inv(linear)
         self._rows, self._inverse_rows, self._normal_rows, self._at = (
@@ -126,7 +133,7 @@ class PlacedMesh:
         # Most scans are neither moved nor turned nor scaled.
         self._is_in_place = np.array_equal(linear, np.eye(3)) and not origin.any()
 
-    def ray_cast(self, origin, direction, distance):
+    def ray_cast(self, origin: Point, direction: Point, distance: float) -> tuple[Triple, Triple] | None:
         """(point, unit normal) where the ray first meets the mesh within `distance`, or None."""
         if self._is_in_place:
             point, normal = self._cast(origin, direction, distance)
@@ -140,7 +147,7 @@ class PlacedMesh:
             return None
         return self._to_world(point), self._normal_to_world(normal)
 
-    def deviations(self, points, normals, reach):
+    def deviations(self, points: Array, normals: Array, reach: float) -> Array:
         """Signed distances (n,) of world points to the mesh, positive outside it.
 
         They are measured along the unit normals (n, 3): from outside if the mesh is near, otherwise in both
@@ -159,7 +166,7 @@ class PlacedMesh:
             ]
         )
 
-    def _deviation(self, point, normal, reach):
+    def _deviation(self, point: Array, normal: Array, reach: float) -> float:
         """The signed distance of a point that the mesh is not near to along the normal."""
         point, normal, down = point.tolist(), normal.tolist(), (-normal).tolist()
         hits = [(sign, self.ray_cast(point, way, reach)) for sign, way in ((-1.0, normal), (1.0, down))]
@@ -169,7 +176,7 @@ class PlacedMesh:
         foot = self._to_world(self._nearest(self._to_local(point))[0])
         return math.copysign(math.dist(point, foot), np.dot(normal, np.subtract(point, foot)))
 
-    def _foot(self, near, location):
+    def _foot(self, near: Point, location: Point) -> tuple[Triple, Triple, float]:
         """The point nearest to the world point `near` as the mesh measures, its normal, its distance."""
         point, normal = self._nearest(self._to_local(near))
         if point is None:
@@ -179,21 +186,21 @@ class PlacedMesh:
         point = self._to_world(point)
         return point, self._normal_to_world(normal), math.dist(location, point)
 
-    def _to_world(self, point):
+    def _to_world(self, point: Point) -> Triple:
         x, y, z = product(self._rows, *point)
         return x + self._at[0], y + self._at[1], z + self._at[2]
 
-    def _to_local(self, point):
+    def _to_local(self, point: Point) -> Any:
         return self._inverse @ np.subtract(point, self._origin)
 
-    def _normal_to_world(self, normal):
+    def _normal_to_world(self, normal: Point) -> Triple:
         """The normal by the inverse transpose: it stays outward under any scale, even one that mirrors."""
         x, y, z = product(self._normal_rows, *normal)
         length = math.hypot(x, y, z)
         return x / length, y / length, z / length
 
 
-def product(rows, x, y, z):
+def product(rows: Sequence[Sequence[float]], x: float, y: float, z: float) -> Triple:
     """A matrix, as rows of Python floats, times a vector."""
     (a, b, c), (d, e, f), (g, h, i) = rows
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z

@@ -3,8 +3,11 @@
 """The settings of a touch, which operators and probes have in common."""
 
 import math
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import Any
 
+import bpy
 from bpy.app.translations import pgettext_iface as iface
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 from bpy.types import Object
@@ -44,12 +47,12 @@ AUTO = {  # These are literals, so that they can be translated.
 }
 MOST_PLANES = 6
 STEEPEST = math.radians(60)  # The mouse tilts planes by no more.
-OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # The override of a library's probe keeps these as its own.
+OVERRIDABLE: set[Any] = {"LIBRARY_OVERRIDABLE"}  # The override of a library's probe keeps these as its own.
 _is_silent = False  # Whether settings change within `silent`.
 
 
 @contextmanager
-def silent():
+def silent() -> Iterator[None]:
     """Within this context, no handler looks at settings that change: the caller does it."""
     global _is_silent
     _is_silent = True
@@ -59,7 +62,7 @@ def silent():
         _is_silent = False
 
 
-def is_silent():
+def is_silent() -> bool:
     """Whether settings change within `silent`."""
     return _is_silent
 
@@ -67,7 +70,7 @@ def is_silent():
 _answered = None  # These settings of a probe were looked at last, and nothing has happened since.
 
 
-def changed(settings, context):
+def changed(settings: Any, context: bpy.types.Context) -> None:
     """Makes the handler look at a probe at once, so that the patch is part of the same undo step."""
     global _answered
     if _is_silent or not isinstance(settings.id_data, Object) or not settings.is_probe:
@@ -79,14 +82,14 @@ def changed(settings, context):
         _answered = now
 
 
-def something_happened():
+def something_happened() -> None:
     """Makes the next setting be looked at even if it is as it was."""
     global _answered
     _answered = None
 
 
 KEPT = {"update": changed, "override": OVERRIDABLE}  # A probe's properties need these, an operator's do not.
-UNSAVED = {"SKIP_SAVE", "SKIP_PRESET"}
+UNSAVED: set[Any] = {"SKIP_SAVE", "SKIP_PRESET"}
 TARGET = StringProperty(
     name="Target",
     description="Name of the mesh object to touch; empty for the active object",
@@ -108,7 +111,7 @@ OUTWARD = FloatVectorProperty(
 )
 
 
-def length_property(name, description, **more):
+def length_property(name: str, description: str, **more: Any) -> Any:
     """A property for a length of 0 or more, shown in the unit of the scene."""
     return FloatProperty(name=name, description=description, subtype="DISTANCE", soft_min=0.0, **more)
 
@@ -186,7 +189,7 @@ class TouchSettings(FitSettings):
 NAMES = (*TouchSettings.__annotations__, *FitSettings.__annotations__)
 
 
-def touch_arguments(settings):
+def touch_arguments(settings: Any) -> dict[str, Any]:
     """The arguments for touch() from the settings of an operator or a probe."""
     count = settings.plane_count
     pairs = zip(settings.azimuths[:count], settings.tilts[:count], strict=True)
@@ -199,7 +202,13 @@ def touch_arguments(settings):
     }
 
 
-def draw_chosen(layout, settings, name, found=None, fields=None):
+def draw_chosen(
+    layout: bpy.types.UILayout,
+    settings: Any,
+    name: str,
+    found: Mapping[str, str] | None = None,
+    fields: Mapping[str, str] | None = None,
+) -> None:
     """Draws a number that the surface chooses if it is 0, which the label says with the value it has `found`.
 
     fields : by the name of a length, the property that shows it, with the value that was found
@@ -217,7 +226,12 @@ def draw_chosen(layout, settings, name, found=None, fields=None):
         layout.prop(settings, name, text=AUTO[name])
 
 
-def draw_sensor(layout, settings, found=None, fields=None):
+def draw_sensor(
+    layout: bpy.types.UILayout,
+    settings: Any,
+    found: Mapping[str, str] | None = None,
+    fields: Mapping[str, str] | None = None,
+) -> None:
     """Draws the rows of step and noise; `found` and `fields` as in draw_chosen."""
     draw_chosen(layout, settings, "step", found, fields)
     layout.prop(settings, (fields or {}).get("noise", "noise"))
@@ -225,7 +239,12 @@ def draw_sensor(layout, settings, found=None, fields=None):
         layout.prop(settings, "seed")
 
 
-def draw_solver(layout, settings, found=None, fields=None):
+def draw_solver(
+    layout: bpy.types.UILayout,
+    settings: Any,
+    found: Mapping[str, str] | None = None,
+    fields: Mapping[str, str] | None = None,
+) -> None:
     """Draws the rows of the method and of its options; `found` and `fields` as in draw_chosen."""
     layout.prop(settings, "method")
     draw_chosen(layout, settings, "degree", found, fields)
@@ -233,7 +252,7 @@ def draw_solver(layout, settings, found=None, fields=None):
         layout.prop(settings, "weight")
 
 
-def draw_all(layout, settings, fields=None):
+def draw_all(layout: bpy.types.UILayout, settings: Any, fields: Mapping[str, str] | None = None) -> None:
     """Draws all settings, as Adjust Last Operation has them; `fields` as in draw_chosen."""
     draw_chosen(layout, settings, "extent", fields=fields)
     layout.prop(settings, "plane_count")

@@ -4,12 +4,14 @@
 
 import numpy as np
 
+from .types import Array
+
 # The squares of lengths between these, and of their inverses, are numbers in single precision.
 LARGEST_SINGLE, SMALLEST_SINGLE = 1e15, 1e-15
 PLACE_ROUNDING = 0.1  # Far from the origin rounding may move a surface by this share of its radius.
 
 
-def require_single(what, radius, place):
+def require_single(what: str, radius: float, place: Array) -> None:
     """Raises ValueError for a surface too large, too small or too far away for Blender's numbers.
 
     what : a word for it; radius : a length; place : (3,), its middle in the world

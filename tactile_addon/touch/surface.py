@@ -4,10 +4,13 @@
 
 import math
 from functools import cached_property
+from typing import Any
 
+import bpy
 import numpy as np
 
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
+from .types import Array, Object, Point, Triple
 
 MANY = 8  # So many times as many vertices as are wanted are looked at first, before all are.
 WALK = 8  # The way to the nearest point of a stretched object has at most so many steps; mostly two or three.
@@ -22,7 +25,7 @@ class MeshSurface(PlacedMesh):
     size : the longest edge of its bounding box, in the world
     """
 
-    def __init__(self, obj, depsgraph, sound=False):
+    def __init__(self, obj: Object, depsgraph: bpy.types.Depsgraph, sound: bool = False) -> None:
         """Raises ValueError, with a sentence, if `obj` cannot be touched."""
         try:
             evaluated, linear, origin = evaluated_object(obj, depsgraph)
@@ -33,7 +36,7 @@ class MeshSurface(PlacedMesh):
             raise disabled(obj) from error
         rays = evaluated.ray_cast
 
-        def cast(start, direction, distance):
+        def cast(start: Point, direction: Point, distance: float) -> Any:
             hit, point, normal, _ = rays(start, direction, distance=distance, depsgraph=depsgraph)
             return (point, normal) if hit else (None, None)
 
@@ -42,10 +45,12 @@ class MeshSurface(PlacedMesh):
         self.size = size_of(evaluated, linear)
 
     @cached_property
-    def _co(self):
+    def _co(self) -> Array:
         return coordinates(self._object.name, self._object)
 
-    def vertices_near(self, point, radius, most=None):
+    def vertices_near(
+        self, point: Point, radius: float, most: int | None = None
+    ) -> tuple[Array, Array, Array]:
         """Indices, world coordinates and normals (any length) of vertices within `radius` of a world point.
 
         If these are more than `most`, only each second, third, ... of them is returned.
@@ -68,7 +73,7 @@ class MeshSurface(PlacedMesh):
             normals[near] @ self._inverse,
         )
 
-    def triangles(self):
+    def triangles(self) -> tuple[Array, Array]:
         """The vertices (n, 3) in the world, and triangles (m, 3), counterclockwise from outside."""
         self._mesh.calc_loop_triangles()
         faces = np.empty((len(self._mesh.loop_triangles), 3), dtype=np.int32)
@@ -76,7 +81,7 @@ class MeshSurface(PlacedMesh):
         mirrored = np.linalg.det(self._linear) < 0.0
         return self._co @ self._linear.T + self._origin, faces[:, ::-1] if mirrored else faces
 
-    def project(self, location):
+    def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance.
 
         At a vertex no face is nearer than the others, so the normal there is the vertex's, unless that is on
@@ -93,7 +98,7 @@ class MeshSurface(PlacedMesh):
         point, normal, distance = found
         return point, self._vertex_normal(point, normal), distance
 
-    def _vertex_normal(self, point, normal):
+    def _vertex_normal(self, point: Triple, normal: Triple) -> Triple:
         """The unit normal of the vertex at a world point, if that is like `normal`; else `normal`."""
         number = self.face_near(point)
         gaps = np.linalg.norm(self.corners_of(number) - point, axis=1)
@@ -102,10 +107,10 @@ class MeshSurface(PlacedMesh):
             return normal
         vertex = self._mesh.polygons[number].vertices[corner]
         mean = np.array(self._mesh.vertex_normals[vertex].vector) @ self._inverse
-        mean /= max(np.linalg.norm(mean), 1e-30)
+        mean /= max(float(np.linalg.norm(mean)), 1e-30)
         return mean.tolist() if np.dot(mean, normal) > SMOOTH else normal
 
-    def _walk(self, start, location):
+    def _walk(self, start: Point, location: Point) -> tuple[Triple, Triple, float]:
         """The nearest point, downhill from the one that is nearest to `start` as the object measures.
 
         Each step goes to the foot of the perpendicular on the face found, as long as that is nearer.
@@ -120,7 +125,7 @@ class MeshSurface(PlacedMesh):
             found = ahead
         return found
 
-    def spacing(self, point):
+    def spacing(self, point: Point) -> float:
         """The distance of neighboring float32 numbers at a world point, in the world and in the mesh."""
         scale = np.linalg.norm(self._linear, axis=0).max()
         world, local = (
@@ -128,21 +133,21 @@ class MeshSurface(PlacedMesh):
         )
         return float(max(world, scale * local))
 
-    def facet(self, point):
+    def facet(self, point: Point) -> float:
         """The longest edge of the face nearest to a world point."""
         corners = self.corners_of(self.face_near(point))
         return float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max())
 
-    def face_near(self, point):
+    def face_near(self, point: Point) -> int:
         """The number of the face nearest to a world point."""
         return self._object.closest_point_on_mesh(self._to_local(point), depsgraph=self._depsgraph)[3]
 
-    def corners_of(self, number):
+    def corners_of(self, number: int) -> Array:
         """The corners (k, 3) of a face in the world, in order; counterclockwise, unless it is mirrored."""
         co = np.array([self._mesh.vertices[i].co for i in self._mesh.polygons[number].vertices], dtype=float)
         return co @ self._linear.T + self._origin
 
-    def _nearest(self, local):
+    def _nearest(self, local: Array) -> Any:
         """The nearest (point, normal) in object coordinates."""
         found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
         if not found:

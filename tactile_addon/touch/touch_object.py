@@ -3,17 +3,22 @@
 """One touch, from an object of the scene to a reconstruction and its report; nothing in the scene changes."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Any
 
+import bpy
 import numpy as np
 
 from ... import core
 from ...core.arguments import unit_vector
+from .detached_mesh import DetachedMesh
 from .settings import MOST_PLANES, STEEPEST
 from .single_precision import require_single
 from .surface import MeshSurface
 from .touch_report import (
+    TouchReport,
     early_ends,
     ends,
     judgment,
@@ -21,6 +26,7 @@ from .touch_report import (
     reconstruction_report,
     suggestion_report,
 )
+from .types import Array, Object, Point, Triple
 from .units import length
 
 FARTHEST_SHARE = 1.0 / 2.0  # A half contour is at most this share of the object's size long.
@@ -37,26 +43,26 @@ class Touched:
 
     surface: MeshSurface | None
     result: core.Reconstruction
-    report: dict
+    report: TouchReport
 
 
 def touch(
-    obj,
-    depsgraph,
-    location,
-    planes,
+    obj: Object,
+    depsgraph: bpy.types.Depsgraph,
+    location: Point,
+    planes: Sequence[core.SamplingPlane],
     *,
-    tolerance=None,
-    outward=None,
-    toward=None,
-    tangent=None,
-    extent,
-    step,
-    noise,
-    seed,
-    sound=False,
-    **fit,
-):
+    tolerance: float | None = None,
+    outward: Point | None = None,
+    toward: Point | None = None,
+    tangent: Point | None = None,
+    extent: float,
+    step: float,
+    noise: float,
+    seed: int,
+    sound: bool = False,
+    **fit: Any,
+) -> Touched:
     """Tracks the evaluated `obj` from `location` and reconstructs the patch there.
 
     location : world coordinates, which are projected onto the object
@@ -79,13 +85,18 @@ def touch(
         outward = [-v for v in outward]
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
-    given = {"farthest": FARTHEST_SHARE * surface.size, "step": step or "auto", "noise": noise, **fit}
+    given: dict[str, Any] = {
+        "farthest": FARTHEST_SHARE * surface.size,
+        "step": step or "auto",
+        "noise": noise,
+        **fit,
+    }
     given |= {"rng": seed, "tangent": axes[:, 0], "extent": extent or "auto"}
     given |= {"tolerance": tolerance, "most_planes": MOST_PLANES}
     found = _explored(surface, point, outward, planes, **given)
     clock.append(perf_counter())
     require_single("patch", found.result.radius, found.result.frame.origin)
-    report = {
+    report: TouchReport = {
         "source": obj.name,
         "method": fit["method"],
         "noise": noise,
@@ -102,7 +113,7 @@ def touch(
     return Touched(surface, found.result, report)
 
 
-def _explored(surface, point, *where, **given):
+def _explored(surface: MeshSurface, point: Point, *where: Any, **given: Any) -> core.Exploration:
     """What core.explore finds. Where facets are longer than some steps, an error says so."""
     try:
         return core.explore(surface, point, *where, **given)
@@ -117,7 +128,7 @@ def _explored(surface, point, *where, **given):
         ) from error
 
 
-def _exploration_report(found, given, ended, few_facets):
+def _exploration_report(found: core.Exploration, given: int, ended: str, few_facets: bool) -> TouchReport:
     """The report of a touch whose first `given` planes were given; the rest as in `judgment`."""
     added = zip(found.planes[given:], found.stds, found.stds[1:], strict=False)
     return {
@@ -134,7 +145,7 @@ def _exploration_report(found, given, ended, few_facets):
     }
 
 
-def completed(touched, most=None):
+def completed(touched: Touched, most: int | None = None) -> Touched:
     """The touch with the slow parts of its report, too: where to touch next, and distances to the mesh.
 
     most : the largest number of vertices to compare; None for all
@@ -152,7 +163,7 @@ def completed(touched, most=None):
     return replace(touched, report=report | found)
 
 
-def require_lengths(name, size, extent, step, noise):
+def require_lengths(name: str, size: float, extent: float, step: float, noise: float) -> None:
     """Raises ValueError for lengths that no touch of an object can have; 0 stands for one not given."""
     if not all(length >= 0.0 for length in (extent, step, noise)):  # NaN fails every comparison.
         raise ValueError(
@@ -174,14 +185,18 @@ def require_lengths(name, size, extent, step, noise):
         )
 
 
-def _reference_point(name, surface, location, extent, step):
+def _reference_point(
+    name: str, surface: MeshSurface, location: Point, extent: float, step: float
+) -> tuple[Triple, Triple]:
     """The point of the surface nearest to the location, and its normal. Raises ValueError if that is far."""
     point, normal = nearest_point(name, surface, location, extent or AWAY * surface.size)
     require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
     return point, normal
 
 
-def nearest_point(name, surface, location, farthest):
+def nearest_point(
+    name: str, surface: MeshSurface | DetachedMesh, location: Point, farthest: float
+) -> tuple[Triple, Triple]:
     """The point of a surface nearest to a location, and the normal there.
 
     Raises ValueError, with a sentence, if it is farther than `farthest`.
@@ -197,7 +212,7 @@ def nearest_point(name, surface, location, farthest):
     return point, normal
 
 
-def require_fine(spacing, step):
+def require_fine(spacing: float, step: float) -> None:
     """Raises ValueError if coordinates that are `spacing` apart are too coarse for the step."""
     if spacing > STEP_ROUNDING * step:
         raise ValueError(
@@ -208,7 +223,7 @@ def require_fine(spacing, step):
         )
 
 
-def reference_axes(outward, tangent=None):
+def reference_axes(outward: Point, tangent: Point | None = None) -> Array:
     """Columns e1, n and e1 x n of the planes; e1 follows `tangent`, unless that is along the normal."""
     plane = core.SamplingPlane(0.0)
     try:
@@ -217,7 +232,7 @@ def reference_axes(outward, tangent=None):
         return plane.axes(outward)
 
 
-def plane_axes(matrix, settings, number):
+def plane_axes(matrix: Any, settings: Any, number: int) -> Array:
     """Columns t, u and t x u of a sampling plane, for drawing; `matrix` is the probe's world matrix.
 
     See core.SamplingPlane.axes. A tilt that is too steep to touch with is drawn as the steepest.
@@ -227,7 +242,9 @@ def plane_axes(matrix, settings, number):
     return plane.axes(matrix.col[2].xyz, matrix.col[0].xyz)
 
 
-def _verification_report(surface, result, most):
+def _verification_report(
+    surface: MeshSurface | None, result: core.Reconstruction, most: int | None
+) -> TouchReport:
     """The report of distances from the patch to the vertices over it that a finger can reach, if any."""
     _, over = reachable(surface, result, most)
     misses = core.distances(result.geometry, result.frame.to_local(over))
@@ -240,7 +257,7 @@ def _verification_report(surface, result, most):
     }
 
 
-def reachable(surface, r, most=None):
+def reachable(surface: MeshSurface, r: core.Reconstruction, most: int | None = None) -> tuple[Array, Array]:
     """The vertices over a patch that a finger can reach: indices in the evaluated mesh, world coordinates."""
     near, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius, most)
     over = core.reachable(r.geometry, surface, vertices, normals)

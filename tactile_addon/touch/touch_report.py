@@ -4,13 +4,114 @@
 
 import math
 from collections import Counter
+from collections.abc import Sequence
+from typing import Any, TypedDict
 
 from ... import core
+from .types import Array
 
-CURVATURES = ("k1", "k2", "gaussian_curvature", "mean_curvature")
+
+class FrameReport(TypedDict):
+    """The Darboux frame of a patch in the world: three numbers each."""
+
+    origin: list[float]
+    d1: list[float]
+    d2: list[float]
+    normal: list[float]
 
 
-def ends(contours):
+class SuggestedPlane(TypedDict, total=False):
+    """A plane: its azimuth in degrees, its tangent in the world, and the height's deviation with it."""
+
+    azimuth: float
+    tangent: list[float]
+    expected_height_std: float
+
+
+class AddedPlane(TypedDict):
+    """A plane that a touch has added: its azimuth in degrees, and the height's deviation before and after."""
+
+    azimuth: float
+    height_std_before: float
+    height_std: float
+
+
+class Registration(TypedDict):
+    """Where on a mesh a patch was put: the pose, from 1 on; residuals and nearest vertices of all poses."""
+
+    target: str
+    pose: int
+    residuals: list[float]
+    vertices: list[int]
+    is_ambiguous: bool
+
+
+class TouchReport(TypedDict, total=False):
+    """What is known of a patch, as plain values that JSON can hold, or as ID properties of its object.
+
+    Lengths are in units of the world, curvatures in their inverse; a `_std` is a standard deviation. Keys
+    are there once they are known: those up to `blind` after every fit, the next ones after a touch or after
+    a fit to measured contacts, the others once a gesture has ended.
+    """
+
+    status: str  # See core.Reconstruction.status; "outdated" if the patch is from an earlier touch.
+    message: str
+    few_facets: bool  # See core.has_few_facets.
+    ended: str  # A sentence on what has ended the curves, which is part of the message.
+    is_verified: bool  # Whether the keys are there that take long.
+    frame: FrameReport
+    k1: float
+    k2: float
+    gaussian_curvature: float
+    mean_curvature: float
+    k1_std: float
+    k2_std: float
+    gaussian_curvature_std: float
+    mean_curvature_std: float
+    shape_index: float
+    curvedness: float
+    residual: float  # The amplitude of the process beside the polynomial.
+    coefficients: list[float]  # Those of equation (1).
+    radius: float
+    contacts: int
+    fit_error: float  # Equation (6).
+    height_std: float  # The mean over the domain.
+    blind: int  # The number of shape terms that the planes cannot show.
+
+    source: str  # The name of the object that was touched, or of the file of the contacts.
+    method: str
+    degree: int
+    axes: list[list[float]]  # (3, 3), see core.SamplingPlane.axes.
+    seconds: dict[str, float]
+    extent: float
+    step: float
+    noise: float
+    seed: int
+    planes: list[list[float]]  # The azimuth and the tilt of each, in degrees.
+    added_planes: list[AddedPlane]
+    stops: list[list[str]]  # Why each curve ended, at its start and at its end.
+    unit: str  # This and the next four are of measured contacts.
+    curves: int
+    strokes: int
+    given_contacts: int
+    misses: list[float]  # How far the curves miss their common point.
+
+    area: float
+    total_absolute_curvature: float
+    condition_number: float
+    vertices: int  # Of the mesh, over the patch.
+    vertex_distance_mean: float
+    vertex_distance_max: float
+    suggested_plane: SuggestedPlane
+    patch: str  # The name of the patch object.
+    contours: str  # The name of the object of its contours.
+    own_limit: float  # Where the colors would end by its own values,
+    color_limit: float  # and where they end.
+    registration: Registration
+    verification: dict[str, Any]  # The name of the mesh as `target`, and what core.verify has found.
+
+
+def ends(contours: Sequence[core.Contour]) -> str:
     """A sentence on what has ended curves that were free to grow."""
     counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
     if len(counts) == 1:
@@ -18,7 +119,7 @@ def ends(contours):
     return f" {_counted(counts, 2 * len(contours))}."
 
 
-def early_ends(contours):
+def early_ends(contours: Sequence[core.Contour]) -> str:
     """A sentence on what has ended curves before the extent that was asked for, or ""."""
     counts = Counter(stop for contour in contours for stop in contour.stops)
     del counts[core.EXTENT]
@@ -27,30 +128,30 @@ def early_ends(contours):
     return f" {_counted(counts.most_common(), 2 * len(contours))}, before the extent."
 
 
-def _counted(counts, total):
+def _counted(counts: list[tuple[str, int]], total: int) -> str:
     (most, first), *others = [(count, core.WHERE[stop]) for stop, count in counts]
     return ", ".join(
         [f"{most} of {total} half curves end {first}", *(f"{count} {end}" for count, end in others)]
     )
 
 
-def judgment(result, mean, ended, few_facets=False):
+def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: bool = False) -> TouchReport:
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
     few_facets : see core.has_few_facets
     """
     status, message = core.judged_by_mesh(result, mean)
-    found = {"status": status, "message": message + (ended if message == result.message else "")}
+    message += ended if message == result.message else ""
     if not few_facets:
-        return found
+        return {"status": status, "message": message}
     return {
         "status": "uncertain" if status == "ok" else status,
         "message": "The curves lie on so few facets that the curvature is that of the facets, not of the "
-        f"shape: add a Subdivision modifier if the mesh stands for a smooth shape. {found['message']}",
+        f"shape: add a Subdivision modifier if the mesh stands for a smooth shape. {message}",
     }
 
 
-def suggestion_report(result, reference):
+def suggestion_report(result: core.Reconstruction, reference: Array) -> SuggestedPlane:
     """The plane that would tell most, with an azimuth like those of the planes, and what it would bring."""
     e1, outward = reference[:, 0], reference[:, 1]
     plane, expected = core.suggest_plane(result, outward, e1)
@@ -61,7 +162,7 @@ def suggestion_report(result, reference):
     }
 
 
-def measures(result):
+def measures(result: core.Reconstruction) -> TouchReport:
     """The parts of a report that take long or matter only once a gesture has ended."""
     return {
         "area": result.domain.area,
@@ -71,7 +172,9 @@ def measures(result):
     }
 
 
-def reconstruction_report(result, ended="", few_facets=False):
+def reconstruction_report(
+    result: core.Reconstruction, ended: str = "", few_facets: bool = False
+) -> TouchReport:
     """The report of a fit before it is compared with a mesh; arguments as in `judgment`."""
     (d1, d2, n), at_point = result.frame.axes.T.tolist(), result.patch.derivatives(0.0, 0.0)
     return {
@@ -84,7 +187,10 @@ def reconstruction_report(result, ended="", few_facets=False):
         "k2": result.patch.k2,
         "gaussian_curvature": float(at_point.gaussian_curvature),
         "mean_curvature": float(at_point.mean_curvature),
-        **{f"{name}_std": getattr(result, f"{name}_std") for name in CURVATURES},
+        "k1_std": result.k1_std,
+        "k2_std": result.k2_std,
+        "gaussian_curvature_std": result.gaussian_curvature_std,
+        "mean_curvature_std": result.mean_curvature_std,
         "shape_index": float(at_point.shape_index),
         "curvedness": float(at_point.curvedness),
         "residual": result.radius * result.posterior.amplitude,

@@ -3,11 +3,13 @@
 """Lengths and curvatures in words, in the unit in which the scene shows lengths."""
 
 import math
+from typing import TypeAlias
 
 import bpy
 
 from ... import core
 
+Unit: TypeAlias = tuple[str, float]  # A name, which may be "", and the length in units of the world.
 ADAPTIVE = {
     "METRIC": ("KILOMETERS", "METERS", "CENTIMETERS", "MILLIMETERS", "MICROMETERS"),
     "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
@@ -19,7 +21,7 @@ SUPERSCRIPTS = {1: "", 2: "²"}
 ROUNDING = 1e-3  # A value below this share of its standard deviation is rounding, and counts as 0.
 
 
-def unit_of(scene, size):
+def unit_of(scene: bpy.types.Scene, size: float) -> Unit:
     """(name, length in units of the world) of the unit for a thing of this size; the name may be "".
 
     It is the scene's own unit, unless numbers would become very long.
@@ -27,7 +29,8 @@ def unit_of(scene, size):
     settings = scene.unit_settings
     if settings.system == "NONE":
         return "", 1.0
-    name, meters = settings.length_unit, size * settings.scale_length * (1.0 + 1e-6)
+    name: str = settings.length_unit
+    meters = size * settings.scale_length * (1.0 + 1e-6)
     if name == "ADAPTIVE" or not 1e-1 <= meters / METERS[name][1] <= 1e4:
         names = ADAPTIVE[settings.system]
         name = next((n for n in names if LEAST.get(n, 1.0) * METERS[n][1] <= meters), names[-1])
@@ -35,24 +38,24 @@ def unit_of(scene, size):
     return symbol, meters / settings.scale_length
 
 
-def say(value, power, unit, std=None):
+def say(value: float, power: int, unit: Unit, std: float | None = None) -> str:
     """A value in length^power in words, such as "0.0123 mm" or "-4.2 ± 0.3 1/mm²"."""
     spread = "" if std is None else f" ± {float(f'{std / unit[1] ** power:.1g}'):g}"
     return f"{known(value, std) / unit[1] ** power:.3g}{spread} {symbol(power, unit)}".strip()
 
 
-def known(value, std):
+def known(value: float, std: float | None) -> float:
     """The value, or 0 if it is only rounding beside its standard deviation, which may be None."""
     return 0.0 if std is not None and abs(value) < ROUNDING * std else value
 
 
-def length(value, unit=None):
+def length(value: float, unit: Unit | None = None) -> str:
     """A length in words for a message, in this unit or in that of the open scene."""
     size = abs(value) if 0.0 < abs(value) < math.inf else 1.0
     return say(value, 1, unit or unit_of(bpy.context.scene, size))
 
 
-def symbol(power, unit):
+def symbol(power: int, unit: Unit) -> str:
     """The unit of length^power, such as "mm" or "1/mm²"; "" for a plain number or if lengths have no unit."""
     name = unit[0] if power else ""
     return f"1/{name}{SUPERSCRIPTS[-power]}" if name and power < 0 else name

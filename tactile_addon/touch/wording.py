@@ -3,24 +3,27 @@
 """Reports of patches as tables and sentences for people, and errors as sentences."""
 
 from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ... import core
-from .units import known, length, say, unit_of
+from .touch_report import Registration, SuggestedPlane, TouchReport
+from .units import Unit, known, length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
 EARLY = ("edge", "crease", "turns away")  # These end a curve early.
 
 
-def readable(report):
+def readable(report: TouchReport) -> str:
     """Lines of label and value, with lengths in the unit of the scene or file."""
     return table(readable_rows(report))
 
 
-def readable_rows(report):
+def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a patch."""
     seconds, unit = report["seconds"], unit_of(bpy.context.scene, report["radius"])
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
@@ -52,7 +55,7 @@ def readable_rows(report):
     ]
 
 
-def verdict(report, unit):
+def verdict(report: TouchReport, unit: Unit) -> str:
     """A sentence on whether a patch is good, and what to do if it is not."""
     if report["status"] == "outdated":
         return "Outdated: touch again"
@@ -71,17 +74,17 @@ def verdict(report, unit):
     return f"Good: heights to ± {say(report['height_std'], 1, unit)}"
 
 
-def added_planes(report, unit):
+def added_planes(report: TouchReport, unit: Unit) -> str:
     """A sentence on what added planes have brought, in the unit."""
     added = report["added_planes"]
     if not added:
         return "One more plane would not help much"
-    before, after = (say(added[i][key], 1, unit) for i, key in ((0, "height_std_before"), (-1, "height_std")))
+    before, after = (say(std, 1, unit) for std in (added[0]["height_std_before"], added[-1]["height_std"]))
     azimuths = ", ".join(f"{plane['azimuth']:.0f}°" for plane in added)
     return f"Planes added at {azimuths}: ± {before} has become ± {after}"
 
 
-def _measured_contacts(report):
+def _measured_contacts(report: TouchReport) -> str:
     numbers = [(report[kind], kind) for kind in ("curves", "strokes") if report[kind]]
     kinds = " and ".join(f"{number} {kind[:-1] if number == 1 else kind}" for number, kind in numbers)
     given, fitted = report.get("given_contacts", 0), report["contacts"]
@@ -90,13 +93,13 @@ def _measured_contacts(report):
     return f"{given} on {kinds}, fitted as {fitted}"
 
 
-def _tracked(report):
+def _tracked(report: TouchReport) -> str:
     stops = sorted({stop for pair in report["stops"] for stop in pair})
     where = ", ".join(core.WHERE.get(stop, stop) for stop in stops)
     return f"{report['contacts']} on {len(report['planes'])} curves, which end {where}"
 
 
-def _lengths(report, unit):
+def _lengths(report: Mapping[str, Any], unit: Unit) -> list[tuple[str, str]]:
     """Rows with the lengths of a touch; for measured curves, how far they miss their common point."""
     names = [name for name in ("step", "extent", "radius") if name in report]
     rows = [(", ".join(names), ", ".join(say(report[name], 1, unit) for name in names))]
@@ -105,35 +108,35 @@ def _lengths(report, unit):
     return rows
 
 
-def table(rows):
+def table(rows: Iterable[tuple[str, str]]) -> str:
     """Labels and values as aligned lines."""
     width = max(len(label) for label, _ in rows)
     return "\n".join(f"{label:<{width}}  {value}" for label, value in rows)
 
 
-def many(count, one, several):
+def many(count: int, one: str, several: str) -> str:
     """A count with its noun, as in "1 touch"."""
     return f"{count} {one if count == 1 else several}"
 
 
-def sentence(error):
+def sentence(error: Exception) -> str:
     """The message of an exception as a sentence in one line; names in it may have more lines."""
     words = " ".join(str(error).split())
     return words[:1].upper() + words[1:]
 
 
-def fit_summary(report):
+def fit_summary(report: TouchReport) -> str:
     """A sentence on a fit: the verdict on it, and the curvatures."""
     unit = unit_of(bpy.context.scene, report["radius"])
     return f"{verdict(report, unit)}. Curvatures {curvatures(report, unit)}"
 
 
-def curvatures(report, unit):
+def curvatures(report: Mapping[str, Any], unit: Unit) -> str:
     """Both principal curvatures in words, without their standard deviations."""
     return " and ".join(say(known(report[key], report[f"{key}_std"]), -1, unit) for key in ("k1", "k2"))
 
 
-def _verification(report, unit):
+def _verification(report: TouchReport, unit: Unit) -> str:
     if "curves" in report:
         return "there is none"
     if not report["vertices"]:
@@ -145,7 +148,7 @@ def _verification(report, unit):
     return f"mean {mean}; largest {farthest}; {report['vertices']} vertices"
 
 
-def _verified_rows(found, unit):
+def _verified_rows(found: Mapping[str, Any] | None, unit: Unit) -> list[tuple[str, str]]:
     """Rows on the verification against a mesh, which only some reports have."""
     if found is None:
         return []
@@ -158,7 +161,7 @@ def _verified_rows(found, unit):
     ]
 
 
-def registration_summary(found):
+def registration_summary(found: Registration) -> str:
     """A sentence on where a patch was put by registration."""
     residual = found["residuals"][found["pose"] - 1]
     words = f'The contacts are {length(residual)} off "{found["target"]}" (root mean square)'
@@ -167,30 +170,30 @@ def registration_summary(found):
     return f"{words}; others of its {len(found['residuals'])} poses are about as good"
 
 
-def _spread(found, what, unit):
+def _spread(found: Mapping[str, Any], what: str, unit: Unit) -> str:
     return ", ".join(f"{key} {say(found[f'{what}_{key}'], 1, unit)}" for key in SPREAD)
 
 
-def _suggestion(plane, unit):
+def _suggestion(plane: SuggestedPlane, unit: Unit) -> str:
     return (
         f"azimuth {plane['azimuth']:.0f} degrees, along {vector(plane['tangent'])}; "
         f"would take the standard deviation of the height to {say(plane['expected_height_std'], 1, unit)}"
     )
 
 
-def vector(v):
+def vector(v: Iterable[float]) -> str:
     return " ".join(f"{x:.5g}" for x in v)
 
 
-def _measured(report, key, power, unit):
+def _measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:
     return say(report[key], power, unit, report[f"{key}_std"])
 
 
-def _shared(report, key, unit):
+def _shared(report: Mapping[str, Any], key: str, unit: Unit) -> str:
     """A length of the report in words, with its share of the radius."""
     return f"{say(report[key], 1, unit)}, {100.0 * report[key] / report['radius']:.2f} % of the radius"
 
 
-def cell(words):
+def cell(words: str) -> str:
     """Words as a cell of a table that no spreadsheet takes for a formula."""
     return f"'{words}" if words.startswith(FORMULAS) else words

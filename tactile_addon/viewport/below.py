@@ -2,29 +2,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which mesh is below the mouse, and where."""
 
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 
 import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from ..probes import probe
 from ..scene import patch_record
 from ..touch.surface import MeshSurface
+from ..touch.types import Object, Point
 from .mouse import mouse_ray, viewport_below
 
 LAYERS = 64  # The mouse sees through at most so many patches and hidden objects.
 MANY_FACES = 200_000  # The first touch of a mesh with more faces takes a noticeable time.
 
 
-def large_meshes(context):
+def large_meshes(context: bpy.types.Context) -> set[str]:
     """Names of the visible objects whose first touch takes a noticeable time."""
     depsgraph = context.evaluated_depsgraph_get()
-    meshes = (obj for obj in context.view_layer.objects if obj.type == "MESH" and obj.visible_get())
+    meshes: Iterator[Object] = (
+        obj for obj in context.view_layer.objects if obj.type == "MESH" and obj.visible_get()
+    )
     return {obj.name for obj in meshes if len(obj.evaluated_get(depsgraph).data.polygons) > MANY_FACES}
 
 
-def names_below(context, event, names):
+def names_below(context: bpy.types.Context, event: bpy.types.Event, names: Iterable[str]) -> list[str]:
     """Those of the names whose objects may be below the mouse, judged by their boxes."""
     viewport = viewport_below(context, event)
     if viewport is None:
@@ -34,7 +38,9 @@ def names_below(context, event, names):
     return [name for name in names if name in bpy.data.objects and _is_over(name, region, view, mouse)]
 
 
-def _is_over(name, region, view, mouse):
+def _is_over(
+    name: str, region: bpy.types.Region, view: bpy.types.RegionView3D, mouse: Sequence[float]
+) -> bool:
     obj = bpy.data.objects[name]
     corners = (obj.matrix_world @ Vector(corner) for corner in obj.bound_box)
     seen = [location_3d_to_region_2d(region, view, corner) for corner in corners]
@@ -44,7 +50,7 @@ def _is_over(name, region, view, mouse):
     return all(low <= at <= high for at, (low, high) in zip(mouse, ranges, strict=True))
 
 
-def read(context, names):
+def read(context: bpy.types.Context, names: Iterable[str]) -> None:
     """Has Blender build the trees of these objects' faces, which it keeps."""
     depsgraph = context.evaluated_depsgraph_get()
     for name in names:
@@ -52,7 +58,9 @@ def read(context, names):
             MeshSurface(bpy.data.objects[name], depsgraph)
 
 
-def point_below(context, event):
+def point_below(
+    context: bpy.types.Context, event: bpy.types.Event
+) -> tuple[Object, list[float], Vector] | None:
     """(object, location, direction toward the eye) of the mesh below the mouse, or None if there is none.
 
     Raises ValueError for an object that cannot be touched.
@@ -78,8 +86,9 @@ def point_below(context, event):
             surface = MeshSurface(obj, depsgraph)
             depth = (point - eye).dot(direction) - surface.size
             start = eye + (max(depth, 0.0) if view.is_perspective else depth) * direction
-            hit = surface.ray_cast(start, direction, 2.0 * surface.size)
-            return obj, list(point) if hit is None else hit[0], -direction
+            felt = surface.ray_cast(start, direction, 2.0 * surface.size)
+            place: Point = point if felt is None else felt[0]
+            return obj, list(place), -direction
         # The ray goes on behind the object by more than rounding. From far away that would be more than a
         # small object, so the place is found again from close by.
         back = 1e-3 * (point - start).length
@@ -88,14 +97,14 @@ def point_below(context, event):
     return None
 
 
-def _touched_by_map(obj, space):
+def _touched_by_map(obj: Object, space: bpy.types.SpaceView3D) -> Object:
     """The object that a map or a whole object was made from, if that is visible; else `obj` itself."""
     record = patch_record.touched_record(obj)
     source = record and bpy.data.objects.get(record["source"])
     return obj if source is None or source.visible_in_viewport_get(space) else source
 
 
-def _require_touchable(obj, matrix):
+def _require_touchable(obj: Object, matrix: Matrix) -> None:
     """Raises ValueError if a ray has hit what cannot be touched: an instance, or another type than a mesh."""
     if obj.type != "MESH":
         raise ValueError(f'"{obj.name}" is not a mesh: convert it to one first')

@@ -3,6 +3,7 @@
 """What dragging a handle does: a plane turns or tilts, the extent grows, the point slides along."""
 
 import math
+from typing import Any
 
 import bpy
 from bpy.props import EnumProperty, IntProperty
@@ -14,6 +15,7 @@ from ..touch import units
 from ..touch.settings import MOST_PLANES, STEEPEST
 from ..touch.surface import MeshSurface
 from ..touch.touch_object import plane_axes
+from ..touch.types import Object, Outcome
 from .mouse import draw_hints, mouse_ray
 
 DRAG_TURN, DRAG_TILT, DRAG_EXTENT, POINT = "TURN", "TILT", "EXTENT", "POINT"
@@ -54,15 +56,15 @@ class TACTILE_OT_drag(bpy.types.Operator):
     plane: IntProperty(name="Plane", min=0, max=MOST_PLANES - 1)
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return shown_probe(context) is not None
 
     @classmethod
-    def description(cls, context, properties):
+    def description(cls, context: bpy.types.Context, properties: Any) -> str:
         """The tooltip of a handle."""
         return TIPS[properties.what].format(properties.plane + 1)
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         found = shown_probe(context)
         if self.what in (DRAG_TURN, DRAG_TILT):
             found.tactile_probe.active_plane = self.plane
@@ -78,7 +80,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
         self._say(context)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if event.type in {"ESC", "RIGHTMOUSE"}:
             self._set(context, self._before)
             self._end(context)
@@ -90,10 +92,10 @@ class TACTILE_OT_drag(bpy.types.Operator):
             self._follow(context, event)
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context):
+    def cancel(self, context: bpy.types.Context) -> None:
         self._end(context)
 
-    def _follow(self, context, event):
+    def _follow(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
         """Changes the value as the mouse has moved, or puts the point below the mouse."""
         if self.what == POINT:
             self._slide(context, event)
@@ -113,15 +115,16 @@ class TACTILE_OT_drag(bpy.types.Operator):
             value = min(max(value, -STEEPEST), STEEPEST)
         self._set(context, value)
 
-    def _slide(self, context, event):
+    def _slide(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
         """Puts the probe on the surface below the mouse, and turns it as the normal turns."""
         origin, direction = mouse_ray(context.region, context.region_data, event)
         depsgraph = context.evaluated_depsgraph_get()
+        space: Any = context.space_data
         try:
             surface = MeshSurface(probe.probe_of(context.object).tactile_probe.target, depsgraph, sound=True)
             if not context.region_data.is_perspective:
-                origin -= context.space_data.clip_end * direction
-            hit = surface.ray_cast(list(origin), list(direction), 4.0 * context.space_data.clip_end)
+                origin -= space.clip_end * direction
+            hit = surface.ray_cast(origin.to_tuple(), direction.to_tuple(), 4.0 * space.clip_end)
         except (ValueError, AttributeError):  # The target is gone or cannot be touched; the panel says so.
             return
         if hit is None:
@@ -130,18 +133,17 @@ class TACTILE_OT_drag(bpy.types.Operator):
         if upright.dot(direction) * normal.dot(direction) < 0.0:  # It stays on its side.
             normal.negate()
         turn = upright.rotation_difference(normal) @ self._matrix.to_quaternion()
-        self._set(context, Matrix.LocRotScale(Vector(hit[0]), turn, self._matrix.to_scale()))
+        self._set(context, Matrix.LocRotScale(list(hit[0]), turn, self._matrix.to_scale()))
 
-    def _below(self, context, event):
+    def _below(self, context: bpy.types.Context, event: bpy.types.Event) -> float | None:
         """The angle of the mouse, or its distance from the point; None if that cannot be told."""
         origin, direction = mouse_ray(context.region, context.region_data, event)
         center, normal = self._matrix.translation, self._matrix.col[2].xyz.normalized()
         e1 = self._matrix.col[0].xyz.normalized()
         right, up = e1, normal.cross(e1)
         if self.what == DRAG_TILT:
-            t = Vector(
-                plane_axes(self._matrix, probe.probe_of(context.object).tactile_probe, self.plane)[:, 0]
-            )
+            settings = probe.probe_of(context.object).tactile_probe
+            t = Vector(plane_axes(self._matrix, settings, self.plane)[:, 0].tolist())
             right, up, normal = normal, normal.cross(t), t
         if abs(direction.dot(normal)) < EDGE_ON:
             return None
@@ -152,7 +154,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
             return (at - center).length
         return math.atan2((at - center).dot(up), (at - center).dot(right))
 
-    def _get(self, context):
+    def _get(self, context: bpy.types.Context) -> Any:
         found = probe.probe_of(context.object)
         settings = found.tactile_probe
         if self.what == POINT:
@@ -161,7 +163,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
             return settings.extent or probe.record_of(found)["extent"]
         return (settings.azimuths if self.what == DRAG_TURN else settings.tilts)[self.plane]
 
-    def _set(self, context, value):
+    def _set(self, context: bpy.types.Context, value: Any) -> None:
         found = probe.probe_of(context.object)
         settings, self._value = found.tactile_probe, value
         if self.what == POINT:
@@ -172,7 +174,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
             (settings.azimuths if self.what == DRAG_TURN else settings.tilts)[self.plane] = value
         self._say(context)
 
-    def _say(self, context):
+    def _say(self, context: bpy.types.Context) -> None:
         if self.what == POINT:
             words = "Point on " + probe.probe_of(context.object).tactile_probe.target.name
         elif self.what == DRAG_EXTENT:
@@ -182,7 +184,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
             words = f"{angle} {self.plane + 1}: {math.degrees(self._value):.1f}°"
         context.area.header_text_set(words)
 
-    def _end(self, context):
+    def _end(self, context: bpy.types.Context) -> None:
         context.area.header_text_set(None)
         context.workspace.status_text_set(None)
         found = probe.probe_of(context.object)
@@ -190,7 +192,7 @@ class TACTILE_OT_drag(bpy.types.Operator):
             touch_again.refresh(found, context)
 
 
-def shown_probe(context):
+def shown_probe(context: bpy.types.Context) -> Object | None:
     """The probe whose handles are shown: the active one, or that of the active patch or contours; or None."""
     found = probe.probe_of(context.object)
     if found is None or not found.visible_get() or probe.lock_of(found) is not None:

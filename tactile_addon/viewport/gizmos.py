@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The handles of the active probe: they move its point, turn and tilt sampling planes, and set the extent."""
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
@@ -29,11 +32,11 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
     bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL"}
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         found = shown_probe(context) if context.mode == "OBJECT" else None
         return found is not None and found.tactile_probe.show_handles
 
-    def setup(self, context):
+    def setup(self, context: bpy.types.Context) -> None:
         self.extent = self._handle("GIZMO_GT_dial_3d", DRAG_EXTENT, 0, (1.0, 1.0, 1.0))
         self.extent.use_draw_scale = False
         self.extent.line_width = 2.0
@@ -42,7 +45,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         self.turns = [self._ball(DRAG_TURN, i, color) for i, color in enumerate(PLANE_COLORS)]
         self.tilts = [self._ball(DRAG_TILT, i, color) for i, color in enumerate(PLANE_COLORS)]
 
-    def _ball(self, what, plane, color):
+    def _ball(self, what: str, plane: int, color: Sequence[float]) -> Any:
         ball = self._handle("GIZMO_GT_move_3d", what, plane, color)
         ball.draw_style = "RING_2D"
         ball.draw_options = (
@@ -51,7 +54,7 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         ball.scale_basis, ball.line_width = BALL, 3.0
         return ball
 
-    def _handle(self, kind, what, plane, color):
+    def _handle(self, kind: str, what: str, plane: int, color: Sequence[float]) -> Any:
         handle = self.gizmos.new(kind)
         properties = handle.target_set_operator("tactile.drag")
         properties.what, properties.plane = what, plane
@@ -60,14 +63,14 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         handle.use_draw_modal = True
         return handle
 
-    def draw_prepare(self, context):
+    def draw_prepare(self, context: bpy.types.Context) -> None:
         obj = shown_probe(context)
         settings, matrix = obj.tactile_probe, obj.matrix_world
         reach = settings.extent or probe.record_of(obj)["extent"]
         center = np.array(matrix.translation, dtype=float)
         apart = self._shrink(context, matrix.translation, reach)
         active = min(settings.active_plane, settings.plane_count - 1)
-        self.point.matrix_basis = Matrix.Translation(center)
+        self.point.matrix_basis = Matrix.Translation(center.tolist())
         self.point.hide = settings.target is None
         ahead = _line_of_sight(context.region_data, matrix.translation)
         for i, (turn, tilt) in enumerate(zip(self.turns, self.tilts, strict=True)):
@@ -84,13 +87,13 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         self.extent.hide = not apart(matrix.translation + reach * _right(context))
         self.extent.matrix_basis = Matrix.LocRotScale(matrix.translation, matrix.to_quaternion(), [reach] * 3)
 
-    def _shrink(self, context, center, reach):
+    def _shrink(self, context: bpy.types.Context, center: Vector, reach: float) -> Callable[[Vector], bool]:
         """Makes the balls smaller if the patch is small in the view, so that they do not hide it.
 
         Returns a function that tells whether a place is apart from the center in the view.
         """
 
-        def seen(place):
+        def seen(place: Vector) -> Any:
             """Where a place is in the region, or None."""
             return location_3d_to_region_2d(context.region, context.region_data, place)
 
@@ -103,20 +106,22 @@ class TACTILE_GGT_handles(bpy.types.GizmoGroup):
         for ball in (self.point, *self.turns, *self.tilts):
             ball.scale_basis = scale
 
-        def is_apart(place):
+        def is_apart(place: Vector) -> bool:
             at = seen(place)
             return at is None or (at - here).length >= APART * ui_scale
 
         return is_apart
 
 
-def _right(context):
+def _right(context: bpy.types.Context) -> Vector:
     """The direction to the right in the view."""
-    return context.region_data.view_matrix.inverted_safe().col[0].xyz.normalized()
+    to_world: Any = context.region_data.view_matrix.inverted_safe()
+    return to_world.col[0].xyz.normalized()
 
 
-def _line_of_sight(view, point):
+def _line_of_sight(view: bpy.types.RegionView3D, point: Vector) -> Vector:
     """The direction from the eye to a point of the world."""
+    to_world: Any = view.view_matrix.inverted_safe()
     if view.is_perspective:
-        return (point - view.view_matrix.inverted_safe().translation).normalized()
-    return -view.view_matrix.inverted_safe().col[2].xyz.normalized()
+        return (point - to_world.translation).normalized()
+    return -to_world.col[2].xyz.normalized()

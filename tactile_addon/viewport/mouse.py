@@ -2,12 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The 3D viewport below the mouse, the line from there into the scene, and hints on what its buttons do."""
 
+from collections.abc import Iterable
+from typing import Any
+
+import bpy
 from mathutils import Vector
 
 WIDE = ("EVENT_ESC", "EVENT_CTRL")  # These icons reach into the text beside them.
 
 
-def draw_hints(layout, hints):
+def draw_hints(layout: bpy.types.UILayout, hints: Iterable[tuple[Any, str]]) -> None:
     """Draws hints, (icon, text) each, on mouse and keys in the status bar."""
     for icon, text in hints:
         if icon in WIDE:
@@ -18,7 +22,9 @@ def draw_hints(layout, hints):
             layout.label(text=text, icon=icon)
 
 
-def viewport_below(context, event):
+def viewport_below(
+    context: bpy.types.Context, event: bpy.types.Event
+) -> tuple[Any, bpy.types.Region, Any] | None:
     """(space, region, view) of the 3D viewport below the mouse, or None if it is over anything else."""
     x, y = event.mouse_x, event.mouse_y
     for area in context.screen.areas:
@@ -28,7 +34,9 @@ def viewport_below(context, event):
     return None
 
 
-def mouse_ray(region, view, event):
+def mouse_ray(
+    region: bpy.types.Region, view: bpy.types.RegionView3D, event: bpy.types.Event
+) -> tuple[Vector, Vector]:
     """(origin, direction) of the line below the mouse in a viewport, in the world.
 
     The functions of view3d_utils invert the whole projection. This does not, because it would be off by many
@@ -36,7 +44,8 @@ def mouse_ray(region, view, event):
     """
     x = 2.0 * (event.mouse_x - region.x) / region.width - 1.0
     y = 2.0 * (event.mouse_y - region.y) / region.height - 1.0
-    window, to_world = view.window_matrix, view.view_matrix.inverted()
+    window: Any = view.window_matrix
+    to_world: Any = view.view_matrix.inverted()
     if view.is_perspective:
         ahead = Vector(((x + window[0][2]) / window[0][0], (y + window[1][2]) / window[1][1], -1.0))
         return to_world.translation, (to_world.to_3x3() @ ahead).normalized()

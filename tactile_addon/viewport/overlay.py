@@ -3,6 +3,8 @@
 """What is drawn over the viewport: the preview of a pick, the active sampling plane, and the legend."""
 
 import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import blf
 import bpy
@@ -12,11 +14,13 @@ from gpu_extras.batch import batch_for_shader
 
 from ..probes import probe
 from ..scene import colors, patch_record
+from ..scene.attributes import CURVATURES, REASON
 from ..scene.contour_mesh import RIM_CORNERS
 from ..scene.viewports import shows_colors
 from ..stability_map import map_object
 from ..touch import units
-from ..touch.touch_object import plane_axes
+from ..touch.touch_object import Touched, plane_axes
+from ..touch.types import Array, Object
 
 # Each sampling plane has one of Okabe and Ito's colors, which color-blind readers can tell apart.
 PLANE_COLORS = [
@@ -31,7 +35,7 @@ LETTERS, BESIDE = 48, 16  # Words beside the mouse have lines of so many letters
 BAR, NAVIGATION_GIZMO = (150, 12), (50, 290)
 
 
-def preview_lines(touched):
+def preview_lines(touched: Touched) -> list[tuple[Array, tuple[float, ...]]]:
     """(points, color) of each line of a pick's preview: the rim of the patch, the normal and the contours."""
     r = touched.result
     edge = r.domain.boundary(RIM_CORNERS)
@@ -42,7 +46,7 @@ def preview_lines(touched):
     return [(np.vstack([edge, edge[:1]]), WHITE), (normal, WHITE), *curves]
 
 
-def draw_pick(seen):
+def draw_pick(seen: dict[str, Any]) -> list[Any]:
     """Draws what a pick has in `seen` from now on; returns the handles of the drawings.
 
     touched : the touch whose preview is drawn, or None
@@ -56,7 +60,7 @@ def draw_pick(seen):
     ]
 
 
-def draw_key(seen):
+def draw_key(seen: dict[str, Any]) -> None:
     """Draws what the lines of the preview are, or beside the mouse why there is none."""
     context = bpy.context
     if not _is_over(context.region, seen["mouse"]):
@@ -70,18 +74,19 @@ def draw_key(seen):
         _draw_words(context, textwrap.wrap(seen["refusal"], LETTERS), seen["mouse"])
 
 
-def _is_over(region, mouse):
+def _is_over(region: bpy.types.Region, mouse: Sequence[float]) -> bool:
     """Whether a place of the window is in a region."""
     return 0 <= mouse[0] - region.x < region.width and 0 <= mouse[1] - region.y < region.height
 
 
-def _draw_words(context, lines, mouse):
+def _draw_words(context: bpy.types.Context, lines: Sequence[str], mouse: Sequence[float]) -> None:
     """Draws lines of text in a box beside a place of the window, in the region that has it."""
     region, scale = context.region, context.preferences.system.ui_scale
     x, y = mouse[0] - region.x, mouse[1] - region.y
-    theme = context.preferences.themes[0].user_interface.wcol_tooltip
+    theme: Any = context.preferences.themes[0].user_interface.wcol_tooltip
     blf.size(FONT, 11.0 * scale)
-    blf.color(FONT, *theme.text, 1.0)
+    red, green, blue = theme.text
+    blf.color(FONT, red, green, blue, 1.0)
     gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
     wide = max(blf.dimensions(FONT, text)[0] for text in lines) + 2.0 * gap
     high = len(lines) * (line + gap) + gap
@@ -93,7 +98,7 @@ def _draw_words(context, lines, mouse):
         _write(text, x + gap, y + high - (number + 1) * (line + gap))
 
 
-def draw_preview(seen):
+def draw_preview(seen: dict[str, Any]) -> None:
     """Draws the preview of seen["touched"], a touch or None."""
     if seen["touched"] is None:
         return
@@ -105,7 +110,7 @@ def draw_preview(seen):
     gpu.state.blend_set("NONE")
 
 
-def _line(points, color, width):
+def _line(points: Array, color: Sequence[float], width: float) -> None:
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
     shader.uniform_float("lineWidth", width)
@@ -113,13 +118,13 @@ def _line(points, color, width):
     batch_for_shader(shader, "LINE_STRIP", {"pos": points.tolist()}).draw(shader)
 
 
-def _active(context):
+def _active(context: bpy.types.Context) -> Object | None:
     """The active object if the viewport shows overlays, or None."""
-    space = context.space_data
+    space: Any = context.space_data
     return context.view_layer.objects.active if space and space.overlay.show_overlays else None
 
 
-def draw_plane():
+def draw_plane() -> None:
     """Draws the active sampling plane while a handle is dragged, as far as its contour may reach."""
     context = bpy.context
     if not any(operator.bl_idname == "TACTILE_OT_drag" for operator in context.window.modal_operators):
@@ -137,12 +142,12 @@ def draw_plane():
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
     shader.uniform_float("color", (*PLANE_COLORS[number], 0.18))
-    positions = {"pos": [corner.tolist() for corner in corners]}
+    positions: dict[str, Any] = {"pos": [corner.tolist() for corner in corners]}
     batch_for_shader(shader, "TRIS", positions, indices=[(0, 1, 2), (0, 2, 3)]).draw(shader)
     gpu.state.blend_set("NONE")
 
 
-def draw_legend():
+def draw_legend() -> None:
     """Draws the legend of the active patch, whole object or map: quantity, unit and range."""
     context = bpy.context
     if not shows_colors(context.space_data) or _is_picking(context) or not _is_last_view(context):
@@ -156,13 +161,13 @@ def draw_legend():
         low = 0.0 if shown in patch_record.POSITIVE else -1.0
         title = patch.bl_rna.properties["tactile_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["radius"], patch_record.POWERS[shown], low)
-        unknown = record.get("unknown_curvatures") if shown in patch_record.CURVATURES else None
+        unknown = record.get("unknown_curvatures") if shown in CURVATURES else None
         _draw_box(context, *bar, [("Unknown", colors.UNKNOWN)] if unknown else ())
     elif obj is not None and patch_record.MAP_RECORD in obj and obj.visible_get():
         record, shown = obj[patch_record.MAP_RECORD], obj.tactile_map_colors
         title = obj.bl_rna.properties["tactile_map_colors"].enum_items[shown].name
         bar = _scale(context, title, record, record["spacing"], map_object.MAP_POWERS[shown], 0.0)
-        if shown == "reason":
+        if shown == REASON:
             bar = title, 0.0, []
         elif shown in map_object.REVERSED:
             bar = bar[0], bar[1], [(1.0 - at, text) for at, text in reversed(bar[2])]
@@ -171,18 +176,20 @@ def draw_legend():
         _draw_box(context, *bar, map_object.swatches(obj))
 
 
-def _is_picking(context):
+def _is_picking(context: bpy.types.Context) -> bool:
     """Whether a pick draws the key of its preview where the legend is."""
     return any(operator.bl_idname == "TACTILE_OT_pick" for operator in context.window.modal_operators)
 
 
-def _is_last_view(context):
+def _is_last_view(context: bpy.types.Context) -> bool:
     """Whether the region is the only view of its area, or the one at the bottom right in a quad view."""
     views = [region for region in context.area.regions if region.type == "WINDOW"]
     return context.region == max(views, key=lambda region: (region.x, -region.y))
 
 
-def _scale(context, title, record, size, power, low):
+def _scale(
+    context: bpy.types.Context, title: str, record: Mapping[str, Any], size: float, power: int, low: float
+) -> tuple[str, float, list[tuple[float, str]]]:
     """The title with its unit, the share at which colors begin, and the (share, text) labels of a scale."""
     unit = units.unit_of(context.scene, size)
     symbol = units.symbol(power, unit)
@@ -191,14 +198,19 @@ def _scale(context, title, record, size, power, low):
     return f"{title} ({symbol})" if symbol else title, low, labels
 
 
-def _draw_box(context, title, low, labels, swatches=()):
+def _draw_box(
+    context: bpy.types.Context,
+    title: str,
+    low: float,
+    labels: Sequence[tuple[float, str]],
+    swatches: Sequence[tuple[str, Sequence[float]]] = (),
+) -> None:
     """Draws a title, a bar of colors from `low` to 1 if there are labels, and swatches, if there is room."""
-    theme, scale = (
-        context.preferences.themes[0].user_interface.wcol_tooltip,
-        context.preferences.system.ui_scale,
-    )
+    theme: Any = context.preferences.themes[0].user_interface.wcol_tooltip
+    scale = context.preferences.system.ui_scale
     blf.size(FONT, 11.0 * scale)
-    blf.color(FONT, *theme.text, 1.0)
+    red, green, blue = theme.text
+    blf.color(FONT, red, green, blue, 1.0)
     gap, line = 6.0 * scale, blf.dimensions(FONT, "0")[1]
     bar = BAR[1] * scale + line + 2.0 * gap if labels else 0.0
     high = line + 2.0 * gap + bar + len(swatches) * (line + gap)
@@ -222,7 +234,9 @@ def _draw_box(context, title, low, labels, swatches=()):
     _write(title, x, y)
 
 
-def _draw_bar(x, y, wide, high, gap, low, labels):
+def _draw_bar(
+    x: float, y: float, wide: float, high: float, gap: float, low: float, labels: Sequence[tuple[float, str]]
+) -> None:
     """Draws the colors from `low` to 1, and the (share, text) labels below them."""
     at = np.linspace(x, x + wide, LEGEND_STEPS)
     shades = colors.shades(np.repeat(np.linspace(low, 1.0, LEGEND_STEPS), 2), 1.0)
@@ -238,16 +252,16 @@ def _draw_bar(x, y, wide, high, gap, low, labels):
         _write(text, min(max(middle - 0.5 * length, x - gap), x + wide + gap - length), y - gap - line)
 
 
-def _fill_box(x, y, wide, high, color):
+def _fill_box(x: float, y: float, wide: float, high: float, color: Sequence[float]) -> None:
     _fill([(x, y), (x + wide, y), (x, y + high), (x + wide, y + high)], [color] * 4)
 
 
-def _write(text, x, y):
+def _write(text: str, x: float, y: float) -> None:
     blf.position(FONT, x, y, 0.0)
     blf.draw(FONT, text)
 
 
-def _fill(points, shades):
+def _fill(points: Sequence[Sequence[float]], shades: Sequence[Sequence[float]]) -> None:
     """Draws a strip of triangles, each point (x, y) of which has a color of its own."""
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     gpu.state.blend_set("ALPHA")
@@ -255,10 +269,10 @@ def _fill(points, shades):
     gpu.state.blend_set("NONE")
 
 
-def _free_strip(context, high):
+def _free_strip(context: bpy.types.Context, high: float) -> tuple[float, float, float]:
     """(left, right, bottom) of the lowest strip of this height that no sidebar, shelf or button covers."""
     region, scale = context.region, context.preferences.system.ui_scale
-    left, right, bottom = 0.0, region.width, 0.0
+    left, right, bottom = 0.0, float(region.width), 0.0
     hud = 0.0
     for other in context.area.regions:
         if other.type == "WINDOW" or min(other.width, other.height) <= 1:
@@ -279,7 +293,7 @@ def _free_strip(context, high):
     return left, right, bottom
 
 
-def draw_handlers():
+def draw_handlers() -> list[Any]:
     """Adds the drawings that are always there, and returns the handles by which to remove them."""
     add = bpy.types.SpaceView3D.draw_handler_add
     kinds = ((draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))

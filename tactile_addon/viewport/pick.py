@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pick Reference Point: hover to see how the surface lies, click to have a probe and a patch there."""
 
+from typing import Any
+
 import bpy
 from bpy.props import BoolProperty
 
@@ -27,7 +29,8 @@ from ..touch.settings import (
     draw_all,
     touch_arguments,
 )
-from ..touch.touch_object import touch
+from ..touch.touch_object import Touched, touch
+from ..touch.types import Object, Outcome
 from ..touch.wording import curvatures, sentence, verdict
 from . import overlay
 from .below import large_meshes, names_below, point_below, read
@@ -69,10 +72,10 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return is_in_object_mode(cls, context, "Points are picked") and has_mesh(cls, context)
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if context.area is None or context.area.type != "VIEW_3D":
             self.report({"ERROR"}, "Points are picked in a 3D viewport: start the pick there")
             return {"CANCELLED"}
@@ -86,7 +89,11 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         if self.at_once:
             return self._click(context, event)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
-        self._seen = {"touched": None, "refusal": None, "mouse": (event.mouse_x, event.mouse_y)}
+        self._seen: dict[str, Any] = {
+            "touched": None,
+            "refusal": None,
+            "mouse": (event.mouse_x, event.mouse_y),
+        }
         self._drawings = overlay.draw_pick(self._seen)
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
@@ -94,7 +101,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         self._hover(context, event)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if event.type in {"ESC", "RIGHTMOUSE"}:
             self.cancel(context)
             return {"CANCELLED"}
@@ -110,7 +117,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             self._seen["refusal"] = words
         return {"RUNNING_MODAL"}
 
-    def _click(self, context, event):
+    def _click(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         """Touches below the mouse at once, as the tool in the toolbar does."""
         self._seen = {"touched": None}
         words = self._hover(context, event)
@@ -121,13 +128,13 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
             return {"CANCELLED"}
         return self._take(context)
 
-    def _take(self, context):
+    def _take(self, context: bpy.types.Context) -> Outcome:
         touched = self._seen["touched"]
         self.target, self.location = touched.report["source"], touched.result.frame.origin
         self.outward = touched.result.frame.axes[:, 2]
         return self.execute(context)
 
-    def cancel(self, context):
+    def cancel(self, context: bpy.types.Context) -> None:
         """Removes everything that shows that a pick is going on."""
         for drawing in self._drawings:
             bpy.types.SpaceView3D.draw_handler_remove(drawing, "WINDOW")
@@ -136,7 +143,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         self._area.header_text_set(None)
         _redraw(context)
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         depsgraph = context.evaluated_depsgraph_get()
         try:
             moved = self._inherit(context)
@@ -157,27 +164,27 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         settings.is_probe = True
         make_active(context, found)
         show_colors(context.space_data)
-        report = probe.record_of(found).to_dict()
+        report = probe.record_of(found)
         unit = units.unit_of(context.scene, report["radius"])
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, verdict(report, unit))
         return {"FINISHED"}
 
-    def _target(self, context, moved):
+    def _target(self, context: bpy.types.Context, moved: Object | None) -> Object:
         if moved is not None and not self.target and moved.tactile_probe.target is not None:
             return moved.tactile_probe.target
         return target_object(context, self.target)
 
-    def _touch(self, context, target, depsgraph):
+    def _touch(self, context: bpy.types.Context, target: Object, depsgraph: bpy.types.Depsgraph) -> Touched:
         given = self.properties.is_property_set
         return touch(
             target,
             depsgraph,
-            list(self.location) if given("location") else list(context.scene.cursor.location),
+            list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
             toward=list(self.outward) if given("outward") else None,
             **touch_arguments(self),
         )
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "target")
@@ -185,12 +192,12 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         layout.prop(self, "parent")
         draw_all(layout, self)
 
-    def _inherit(self, context):
+    def _inherit(self, context: bpy.types.Context) -> Object | None:
         """The probe to be moved, or None. Settings that are not set are taken from it or from the active map.
 
         Raises ValueError if the probe cannot be changed.
         """
-        active = context.view_layer.objects.active
+        active: Object = context.view_layer.objects.active
         moved, given = None if self.new else probe.probe_of(active), {}
         if moved is not None:
             probe.require_unlocked(moved)
@@ -202,7 +209,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
                 setattr(self, name, value)
         return moved
 
-    def _hover(self, context, event):
+    def _hover(self, context: bpy.types.Context, event: bpy.types.Event) -> str:
         """Touches below the mouse for the preview, and returns what there is to say of it.
 
         The header has no room for a sentence, so a refusal is drawn beside the mouse.
@@ -221,8 +228,8 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
                 touched = touch(obj, depsgraph, location, toward=eye, **touch_arguments(self))
                 self._seen["touched"] = touched
                 unit = units.unit_of(context.scene, touched.result.radius)
-                found = curvatures(touched.report, unit)
-                words = short = f"{touched.report['source']}: principal curvatures {found}"
+                bends = curvatures(touched.report, unit)
+                words = short = f"{touched.report['source']}: principal curvatures {bends}"
         except ValueError as error:
             words = self._seen["refusal"] = sentence(error)
             short = "No touch is possible here"
@@ -230,7 +237,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         _redraw(context)
         return words
 
-    def _read(self, context, names):
+    def _read(self, context: bpy.types.Context, names: list[str]) -> None:
         """Prepares large meshes for their first touch, and says so, because it takes a while."""
         if not names:
             return
@@ -242,7 +249,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         context.window.cursor_modal_set("EYEDROPPER")
 
 
-def _redraw(context):
+def _redraw(context: bpy.types.Context) -> None:
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             area.tag_redraw()

@@ -22,11 +22,11 @@ class TactileTool(bpy.types.WorkSpaceTool):
     )
 
 
-def register():
+def register() -> None:
     bpy.utils.register_tool(TactileTool, after={"builtin.measure"})
 
 
-def unregister():
+def unregister() -> None:
     bpy.utils.unregister_tool(TactileTool)
     # Blender itself leaves the tool's keys among the user's keys.
     user = bpy.context.window_manager.keyconfigs.user

@@ -3,12 +3,15 @@
 """How far a surface is off the mesh that was touched, and that mesh off the surface, all over their faces."""
 
 import math
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from ... import core
+from ..touch.detached_mesh import DetachedMesh
+from ..touch.types import Array
 
 WITHIN = 0.05  # The mesh is looked for along the normal within this share of its size.
 PLACES, SEED = 10_000, 0  # So many places of the mesh's faces are compared, and at most as many vertices.
@@ -29,13 +32,13 @@ class BothWays:
     Places of the mesh that no finger could reach, because the mesh hides them, do not count.
     """
 
-    def __init__(self, target, mesh, tolerance):
+    def __init__(self, target: DetachedMesh, mesh: core.Mesh, tolerance: float) -> None:
         """`target` is the DetachedMesh that was touched, and `mesh` the core.Mesh of what was felt."""
         self._target, self._mesh, self._tolerance = target, mesh, tolerance
         self.deviation = np.zeros(len(mesh.vertices))
         self.mean, self.largest, self.place = 0.0, 0.0, mesh.vertices[0]
 
-    def steps(self):
+    def steps(self) -> Iterator[float]:
         """Does everything, as a generator that yields the share that is done."""
         corners, triangles = self._mesh.vertices, self._mesh.triangles
         normals = self._mesh.normals
@@ -59,7 +62,7 @@ class BothWays:
             back.append(off.mean() if len(off) else 0.0)
         self.mean = 0.5 * float(there + back[0])
 
-    def _off_target(self, points, normals, off):
+    def _off_target(self, points: Array, normals: Array, off: Array) -> Iterator[float]:
         """Fills in the signed distances (n,) of points (n, 3) of the surface; yields the share done."""
         for start in range(0, len(points), AT_ONCE):
             some = slice(start, start + AT_ONCE)
@@ -73,7 +76,7 @@ class BothWays:
             self._note(points[some], np.abs(found))
             yield start / len(points)
 
-    def _places(self):
+    def _places(self) -> tuple[Array, Array]:
         """Places of the mesh, (n, 3) each: such that are spread by area over its faces, and vertices."""
         target, rng = self._target, np.random.default_rng(SEED)
         corners = np.flatnonzero(target.has_face)
@@ -81,7 +84,7 @@ class BothWays:
             corners = rng.choice(corners, PLACES, replace=False)
         return core.scattered(target.points, target.triangles, PLACES, rng)[0], target.points[corners]
 
-    def _trees(self):
+    def _trees(self) -> Generator[float, None, list[BVHTree]]:
         """Trees of the surface's faces, some in each; yields the share that is done."""
         trees = []
         for start in range(0, len(self._mesh.triangles), FACES_AT_ONCE):
@@ -91,7 +94,7 @@ class BothWays:
             yield 0.7
         return trees
 
-    def _off_surface(self, points, trees):
+    def _off_surface(self, points: Array, trees: list[BVHTree]) -> Generator[float, None, Array]:
         """The distances of those points (n, 3) of the mesh that are not hidden; yields the share done."""
         found = [np.zeros(0)]
         for start in range(0, len(points), BACK_AT_ONCE):
@@ -105,20 +108,20 @@ class BothWays:
             yield 0.8
         return np.concatenate(found)
 
-    def _is_hidden(self, point):
+    def _is_hidden(self, point: Array) -> bool:
         """Whether rays from a place of the mesh meet it again in all directions."""
         size = self._target.size
         starts = (point + LIFT * size * DIRECTIONS).tolist()
         rays = zip(starts, DIRECTIONS.tolist(), strict=True)
         return all(self._target.ray_cast(start, way, 2.0 * size) is not None for start, way in rays)
 
-    def _note(self, points, off):
+    def _note(self, points: Array, off: Array) -> None:
         """Keeps the largest of the distances (n,) of points (n, 3)."""
         if len(off) and off.max() > self.largest:
             self.largest, self.place = float(off.max()), points[np.argmax(off)]
 
 
-def _nearest(trees, point):
+def _nearest(trees: list[BVHTree], point: Sequence[float]) -> float:
     """The distance of a point from the nearest face in trees."""
     best = math.inf
     for tree in trees:
@@ -128,7 +131,7 @@ def _nearest(trees, point):
     return best
 
 
-def _directions():
+def _directions() -> Array:
     """Unit vectors (WAYS, 3) all round."""
     z = 1.0 - (2.0 * np.arange(WAYS) + 1.0) / WAYS
     turn, out = GOLDEN * np.arange(WAYS), np.sqrt(1.0 - z**2)

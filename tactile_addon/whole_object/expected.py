@@ -3,12 +3,15 @@
 """How many touches a whole object will take, and how long, as a few touches of it show."""
 
 from time import perf_counter
+from typing import Any
 
+import bpy
 import numpy as np
 
 from ... import core
 from ..touch import units
 from ..touch.detached_mesh import DetachedMesh
+from ..touch.types import Object
 from ..touch.wording import many
 from .object_report import LEAST_NUMBER
 from .object_touches import tolerance_of
@@ -22,10 +25,14 @@ JOINING, MESHING = 3.3, 60.0
 class Expected:
     """What is expected of an object, kept until it or a number changes, because a dialog draws it often."""
 
-    def __init__(self):
-        self._given, self._words, self._mesh = None, "", None
+    def __init__(self) -> None:
+        self._given: tuple[Any, ...] | None = None
+        self._mesh: DetachedMesh | None = None
+        self._words = ""
 
-    def words(self, target, context, tolerance, accuracy, noise):
+    def words(
+        self, target: Object, context: bpy.types.Context, tolerance: float, accuracy: str, noise: float
+    ) -> str:
         """A sentence on the tolerance, the touches and the seconds of an object that will be touched.
 
         Raises ValueError, with a sentence, for an object that cannot be touched.
@@ -43,7 +50,7 @@ class Expected:
         return self._words
 
 
-def expected(mesh, tolerance, noise):
+def expected(mesh: DetachedMesh, tolerance: float, noise: float) -> tuple[int, float]:
     """About how many touches a DetachedMesh takes, and seconds. Raises ValueError if none is possible."""
     begin = perf_counter()
     a, b, c = mesh.points[mesh.triangles].transpose(1, 0, 2)
@@ -54,10 +61,10 @@ def expected(mesh, tolerance, noise):
     return _rounded(touches), (MESHING + JOINING * touches) * each
 
 
-def _rounded(number):
+def _rounded(number: float) -> int:
     """A number with one significant digit, as an estimate has it."""
     return int(float(f"{number:.0e}"))
 
 
-def _time(seconds):
+def _time(seconds: float) -> str:
     return f"{_rounded(max(seconds, 1.0))} s" if seconds < 60.0 else f"{_rounded(seconds / 60.0)} min"

@@ -2,20 +2,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The touches of the last whole object, kept in memory, so that its mesh can be made again without them."""
 
-_kept = {}  # ObjectTouches by the session_uid of the object that they made; one at most.
+from ..touch.types import Object
+from .object_touches import ObjectTouches
+
+_kept: dict[
+    int, ObjectTouches
+] = {}  # ObjectTouches by the session_uid of the object that they made; one at most.
 
 
-def keep(obj, touches):
+def keep(obj: Object, touches: ObjectTouches) -> None:
     """Keeps the touches that made an object, in place of those that were kept before."""
     _kept.clear()
     _kept[obj.session_uid] = touches
 
 
-def touches_of(obj):
+def touches_of(obj: Object | None) -> ObjectTouches | None:
     """The ObjectTouches that made an object, or None if they are no longer there."""
     return None if obj is None else _kept.get(obj.session_uid)
 
 
-def forget():
+def forget() -> None:
     """Forgets the touches that are kept."""
     _kept.clear()

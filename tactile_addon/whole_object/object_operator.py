@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touch All Over: touches that grow over an object by themselves; in slices if there is a window."""
 
+from collections.abc import Iterator
+
 import bpy
 from bpy.props import EnumProperty, FloatVectorProperty, IntProperty
 
 from ..probes import probe
-from ..probes.in_slices import InSlices
+from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged
 from ..probes.operators import (
     fields_of,
@@ -17,6 +19,7 @@ from ..probes.operators import (
 )
 from ..scene import patch_record
 from ..touch.settings import NOISE, TARGET, UNSAVED, draw_chosen, length_property
+from ..touch.types import Outcome
 from ..touch.wording import sentence
 from . import kept, whole_mesh
 from .expected import Expected
@@ -75,17 +78,17 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
     _growing = _expected = None
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         return is_in_object_mode(cls, context, "Objects are touched") and has_target(cls, context)
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         return self._ask(context)
 
-    def _go_on(self, context):
+    def _go_on(self, context: bpy.types.Context) -> Outcome:
         self._growing = whole_mesh.GrowingPatches(context.scene, self._touches.surface)
         return super()._go_on(context)
 
-    def _begin(self, context):
+    def _begin(self, context: bpy.types.Context) -> None:
         target, found = target_object(context, self.target), probe.probe_of(context.view_layer.objects.active)
         location = list(self.location) if self.properties.is_property_set("location") else None
         if location is None and found is not None and found.tactile_probe.target == target:
@@ -101,7 +104,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         )
         self._steps = self._shown()
 
-    def _shown(self):
+    def _shown(self) -> Iterator[None]:
         """The steps of the touches. In a window, patches appear between them."""
         shown = 0
         for _ in self._touches.steps():
@@ -110,16 +113,16 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
             shown = len(self._touches.found)
             yield
 
-    def _done(self):
+    def _done(self) -> Progress:
         if self._touches.is_stopped:
             self.stop = "Drop It"
         share = self._touches.share
         return f"{self._touches.words}: {share:.0%}", share
 
-    def _check(self, context):
+    def _check(self, context: bpy.types.Context) -> None:
         self._touches.surface.require_source(context)
 
-    def _stopped(self, context):
+    def _stopped(self, context: bpy.types.Context) -> Outcome:
         """Has the patches so far joined. If Esc is pressed again, or during meshing, nothing is kept."""
         if self._touches.is_stopped or not self._touches.found:
             self._leave(context)
@@ -127,13 +130,13 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         self._touches.stop()
         return {"RUNNING_MODAL"}
 
-    def _leave(self, context):
+    def _leave(self, context: bpy.types.Context) -> None:
         super()._leave(context)
         if self._growing is not None:
             self._growing.remove()
             self._growing = None
 
-    def _finish(self, context):
+    def _finish(self, context: bpy.types.Context) -> Outcome:
         target = self._touches.surface.require_same(context)
         made = whole_mesh.insert(context.scene, target.name, self._touches.whole, self._touches.report())
         kept.keep(made, self._touches)
@@ -142,7 +145,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         self.report({"INFO"} if record["status"] == "ok" else {"WARNING"}, object_summary(record))
         return {"FINISHED"}
 
-    def _about(self, context):
+    def _about(self, context: bpy.types.Context) -> str:
         """What it will take, in a sentence, or why the object cannot be touched."""
         if self._expected is None:
             self._expected = Expected()
@@ -152,7 +155,7 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         except ValueError as error:
             return sentence(error)
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop_search(self, "target", context.scene, "objects")

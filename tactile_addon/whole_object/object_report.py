@@ -2,27 +2,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the panel and the shell say of a whole object."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import bpy
 import numpy as np
 
 from ..touch import units
+from ..touch.units import Unit
 from ..touch.wording import many, table, vector
 
 LEAST_NUMBER = 10.0  # Lengths are in a unit that suits so many tolerances.
 ZERO = 1e-6  # A distance below this share of the size counts as 0.
 
 
-def unit_of(record):
+def unit_of(record: Mapping[str, Any]) -> Unit:
     """The unit of a report, which has lengths from below the tolerance to far above it."""
     return units.unit_of(bpy.context.scene, LEAST_NUMBER * (record["tolerance"] or record["height_std"]))
 
 
-def object_readable(record):
+def object_readable(record: Mapping[str, Any]) -> str:
     """Lines of label and value, with lengths in the unit of the scene or file."""
     return table(object_table_rows(record))
 
 
-def object_table_rows(record):
+def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a whole object."""
     unit, off = unit_of(record), _off(record, "mean")
     how = (
@@ -44,19 +48,19 @@ def object_table_rows(record):
     )
 
 
-def verdict_of(record):
+def verdict_of(record: Mapping[str, Any]) -> str:
     """The verdict on a whole object in a word: "Good", "Doubtful" or "Incomplete"."""
     if record["status"] == "ok":
         return "Good"
     return "Incomplete" if record.get("uncovered") else "Doubtful"
 
 
-def object_verdict(record):
+def object_verdict(record: Mapping[str, Any]) -> str:
     """The verdict and what it rests on, for the panel."""
     return f"{verdict_of(record)}. {record['message']}"
 
 
-def object_summary(record):
+def object_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what was found of a whole object."""
     std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
@@ -66,7 +70,7 @@ def object_summary(record):
     return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {std}"
 
 
-def object_rows(record):
+def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of each row in the panel."""
     return _known(
         ("Touches", record.get("touches")),
@@ -82,17 +86,17 @@ def object_rows(record):
     )
 
 
-def farthest(record):
+def farthest(record: Mapping[str, Any]) -> str | None:
     """The largest distance between surface and mesh in words, or None if there was no mesh."""
     return _off(record, "max")
 
 
-def _known(*rows):
+def _known(*rows: tuple[str, Any]) -> list[tuple[str, str]]:
     """The rows whose value is not None, in words."""
     return [(label, str(value)) for label, value in rows if value is not None]
 
 
-def _surface(record):
+def _surface(record: Mapping[str, Any]) -> str:
     if record["is_closed"]:
         return "closed all round"
     if record.get("uncovered"):
@@ -100,23 +104,23 @@ def _surface(record):
     return "open where nothing was felt"
 
 
-def _ends(record):
+def _ends(record: Mapping[str, Any]) -> str:
     """In a word, whether the surface that is shown has no rim; never "Closed" where touches could go on."""
     return "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"
 
 
-def _unknown(record):
+def _unknown(record: Mapping[str, Any]) -> str | None:
     """Where the curvatures are unknown, in words, or None if they are known all over."""
     count = record.get("unknown_curvatures")
     return f"unknown at {many(count, 'vertex', 'vertices')} beside edges and rims" if count else None
 
 
-def _tolerance(record):
+def _tolerance(record: Mapping[str, Any]) -> str | None:
     """The tolerance in words, or None if measured contacts have chosen it."""
     return units.say(record["tolerance"], 1, unit_of(record)) if record["tolerance"] else None
 
 
-def _off(record, what):
+def _off(record: Mapping[str, Any], what: str) -> str | None:
     """The mean or largest deviation from the mesh in words, or None if there was no mesh."""
     off = record.get(f"deviation_{what}")
     if off is None:
@@ -125,7 +129,7 @@ def _off(record, what):
     return units.say(off if off > ZERO * record["size"] else 0.0, 1, unit_of(record))
 
 
-def _place(record):
+def _place(record: Mapping[str, Any]) -> str | None:
     """Where in the world the surface and the mesh are farthest apart, or None if that is unknown."""
     if "deviation_place" not in record:
         return None

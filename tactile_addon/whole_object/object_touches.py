@@ -2,14 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Touches that grow over an object, step by step, with nothing changed in the scene."""
 
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
+from typing import Any
 
+import bpy
 import numpy as np
 
 from ... import core
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_object import AWAY, nearest_point
+from ..touch.types import Array, Object
 from ..touch.units import length
 from ..touch.wording import many
 from .both_ways import BothWays
@@ -37,7 +41,19 @@ class ObjectTouches:
     whole, compared : the WholeSurface, and its BothWays from the mesh, once the steps are done
     """
 
-    def __init__(self, obj, depsgraph, *, location, tolerance, accuracy, noise, seed, most, edge):
+    def __init__(
+        self,
+        obj: Object,
+        depsgraph: bpy.types.Depsgraph,
+        *,
+        location: Sequence[float] | None,
+        tolerance: float,
+        accuracy: str,
+        noise: float,
+        seed: Any,
+        most: int,
+        edge: float,
+    ) -> None:
         """The object chooses the `location` if it is None, and lengths if they are 0.
 
         accuracy : one of TOLERANCE_SHARES, for a tolerance of 0
@@ -54,7 +70,9 @@ class ObjectTouches:
         self.tolerance = tolerance or tolerance_of(self.surface.size, accuracy, noise)
         self._require_lengths(noise, edge)
         self.noise, self.seed, self.most, self.edge = noise, seed, most, edge
-        self.found, self.rims, self.done, self.uncovered = [], [], 0, 0
+        self.found: list[core.Reconstruction] = []
+        self.rims: list[Array] = []
+        self.done, self.uncovered = 0, 0
         self.words, self.share = "Looking for a place to begin", 0.0
         self.is_stopped = self._is_cut_short = False
         self._left = self._spread()
@@ -64,7 +82,7 @@ class ObjectTouches:
             at = np.subtract(location, self.surface.origin)
             self._start = nearest_point(obj.name, self.surface, at, AWAY * self.surface.size)
 
-    def _require_lengths(self, noise, edge):
+    def _require_lengths(self, noise: float, edge: float) -> None:
         """Raises ValueError, with a sentence, for lengths that are too large or too small for this object."""
         name, size, tolerance = self.surface.name, self.surface.size, self.tolerance
         if tolerance < noise:
@@ -93,7 +111,7 @@ class ObjectTouches:
                 f'"{name}" takes 2 GB of memory: use a larger one'
             )
 
-    def steps(self):
+    def steps(self) -> Iterator[None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         steps, state = self._started()
         while True:
@@ -106,9 +124,9 @@ class ObjectTouches:
                 break
         yield from self.meshing(JOINED)
 
-    def _started(self):
+    def _started(self) -> tuple[Generator[core.Progress, bool | None, core.Atlas], core.Progress]:
         """The steps of core, and the Progress of the first. Raises ValueError if touches cannot begin."""
-        why = "no face has an area"
+        why: Exception | str = "no face has an area"
         for point, outward in self._places():
             steps = core.touch_all_over(
                 self.surface,
@@ -125,7 +143,7 @@ class ObjectTouches:
                 why = error
         raise ValueError(f"Touching could not begin: choose another location or tolerance ({why})")
 
-    def _places(self):
+    def _places(self) -> Iterator[tuple[Any, Any]]:
         """Places where the touches may begin, with their normals."""
         if self._start is not None:
             yield self._start
@@ -135,14 +153,14 @@ class ObjectTouches:
             with suppress(ValueError):  # The face has no area.
                 yield self.surface.project(middle)[:2]
 
-    def _spread(self):
+    def _spread(self) -> Array:
         """Places all over the mesh, (PLACES, 3), of which patches will cover more and more."""
         with suppress(ValueError):  # No face has an area, so touches cannot begin.
             rng = np.random.default_rng(SEED)
             return core.scattered(self.surface.points, self.surface.triangles, PLACES, rng)[0]
         return np.zeros((0, 3))
 
-    def _note(self, state):
+    def _note(self, state: core.Progress) -> None:
         for exploration, rim in zip(state.found, state.rims, strict=True):
             self.found.append(exploration.result)
             self.rims.append(rim)
@@ -163,7 +181,7 @@ class ObjectTouches:
         left = 0.5**self._rounds
         self.share = max(self.share, TOUCHED + (JOINED - TOUCHED) * (1.0 - (2.0 - state.joining) * left))
 
-    def meshing(self, start=0.0):
+    def meshing(self, start: float = 0.0) -> Iterator[None]:
         """Makes the mesh and compares it in steps, from the share `start` of all on."""
         self.words, self.is_stopped = "Meshing", True
         for share in self.whole.steps(self.edge):
@@ -176,7 +194,7 @@ class ObjectTouches:
             yield
         self.whole.deviation = self.compared.deviation
 
-    def again(self, edge):
+    def again(self, edge: float) -> "ObjectTouches":
         """These touches, whose `meshing` makes the surface with edges of another length, or 0.
 
         Raises ValueError, with a sentence, for a length that does not suit the object.
@@ -186,11 +204,11 @@ class ObjectTouches:
         again.edge, again.share, again.whole = edge, 0.0, WholeSurface(self.whole.atlas, self.surface.origin)
         return again
 
-    def stop(self):
+    def stop(self) -> None:
         """Makes the steps touch no more, and join the patches so far."""
         self.is_stopped = self._is_cut_short = True
 
-    def report(self):
+    def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
         found = {
             "touches": self.done,
@@ -213,7 +231,7 @@ class ObjectTouches:
             found["status"], found["message"] = self._verdict(found)
         return found
 
-    def _verdict(self, found):
+    def _verdict(self, found: Mapping[str, Any]) -> tuple[str, str]:
         """The status and the message of a surface that its atlas says is ok."""
         unit = unit_of(found)
         if self.compared.largest > OFF_TOLERANCES * self.tolerance:
@@ -234,6 +252,6 @@ class ObjectTouches:
         return found["status"], found["message"]
 
 
-def tolerance_of(size, accuracy, noise):
+def tolerance_of(size: float, accuracy: str, noise: float) -> float:
     """The tolerance for an object of this size; it is not below the noise."""
     return max(TOLERANCE_SHARES[accuracy] * size, noise)

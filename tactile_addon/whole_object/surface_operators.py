@@ -2,25 +2,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel's buttons for the surface of a whole object: where it is farthest off, and another mesh of it."""
 
+from typing import Any
+
 import bpy
 import numpy as np
 from mathutils import Vector
 
-from ..probes.in_slices import InSlices
+from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged, fields
 from ..probes.operators import is_in_object_mode, make_active, report_error
 from ..scene import patch_record
 from ..scene.mesh_data import own_mesh
 from ..touch.settings import draw_chosen, length_property
+from ..touch.types import Object, Outcome, Point
 from . import kept, whole_mesh
 from .object_report import object_summary
 
 SEEN = 0.4  # The view is as wide as this share of the object's size.
 
 
-def surface_of(context):
+def surface_of(context: bpy.types.Context) -> Object | None:
     """The active object if it is a whole object, or None."""
-    obj = context.view_layer.objects.active
+    obj: Object = context.view_layer.objects.active
     return obj if obj is not None and patch_record.ATLAS_RECORD in obj else None
 
 
@@ -32,14 +35,14 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         obj = surface_of(context)
         if obj is None or "deviation_place" not in obj[patch_record.ATLAS_RECORD]:
             cls.poll_message_set("Select the surface of a whole object that was touched")
             return False
         return is_in_object_mode(cls, context, "Surfaces are looked at")
 
-    def execute(self, context):
+    def execute(self, context: bpy.types.Context) -> Outcome:
         obj = surface_of(context)
         try:
             patch_record.require_colored(obj)
@@ -61,7 +64,7 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _select_nearest(mesh, place):
+def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     """Selects the vertex nearest to a place, and nothing else, and returns it."""
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.vertices.foreach_get("co", points.ravel())
@@ -88,26 +91,26 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     stop = "Keep It as It Was"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: bpy.types.Context) -> bool:
         if kept.touches_of(surface_of(context)) is None:
             cls.poll_message_set("Only the last surface that was touched has its touches in memory")
             return False
         return is_in_object_mode(cls, context, "Surfaces are made")
 
-    def invoke(self, context, event):
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if bpy.app.background:
             return self.execute(context)
         self._in_window = True
         return context.window_manager.invoke_props_dialog(self, confirm_text="Mesh Again")
 
-    def _begin(self, context):
+    def _begin(self, context: bpy.types.Context) -> None:
         obj = surface_of(context)
         patch_record.require_colored(obj)
         self._uid, self._name = obj.session_uid, obj.name
         self._touches = kept.touches_of(obj).again(self.edge)
         self._steps = self._touches.meshing()
 
-    def _object(self, context):
+    def _object(self, context: bpy.types.Context) -> Object:
         """The object of the surface. Raises ValueError, with a sentence, if it is gone or may be edited."""
         found = next((obj for obj in context.view_layer.objects if obj.session_uid == self._uid), None)
         if found is None:
@@ -116,19 +119,19 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
             raise ValueError("Meshing was stopped because Object Mode was left: start it again")
         return found
 
-    def _check(self, context):
+    def _check(self, context: bpy.types.Context) -> None:
         self._object(context)
 
-    def _done(self):
+    def _done(self) -> Progress:
         share = self._touches.share
         return f"{self._touches.words}: {share:.0%}", share
 
-    def _stopped(self, context):
+    def _stopped(self, context: bpy.types.Context) -> Outcome:
         self._leave(context)
         self.report({"INFO"}, "Stopped: the surface stays as it was")
         return {"CANCELLED"}
 
-    def _finish(self, context):
+    def _finish(self, context: bpy.types.Context) -> Outcome:
         obj = self._object(context)
         source = obj[patch_record.ATLAS_RECORD]["source"]
         whole_mesh.rewrite(obj, self._touches.whole, self._touches.report() | {"source": source})
@@ -136,7 +139,7 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         self.report({"INFO"}, object_summary(obj[patch_record.ATLAS_RECORD].to_dict()))
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         size = surface_of(context)[patch_record.ATLAS_RECORD]["size"]

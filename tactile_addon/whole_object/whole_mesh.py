@@ -3,16 +3,23 @@
 """What touches all over an object put into the scene: patches while they grow, then one surface."""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ... import core
 from ..scene import colors, patch_object, patch_record, undo
+from ..scene.attributes import COLOR, DEVIATION, HEIGHT_STD, NODE
 from ..scene.mesh_data import ABOVE, emission, fill, own_mesh
 from ..scene.shown import recolor
 from ..scene.viewports import show_colors
+from ..touch.detached_mesh import DetachedMesh
+from ..touch.types import Array, Object
+from .whole_surface import WholeSurface
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
 # While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
@@ -24,20 +31,21 @@ DRAWN_ABOVE = 5e-3  # It is drawn this share of the object's size above the mesh
 class GrowingPatches:
     """An object that shows the patches found so far, until it is removed."""
 
-    def __init__(self, scene, surface):
+    def __init__(self, scene: bpy.types.Scene, surface: DetachedMesh) -> None:
         """`surface` is the DetachedMesh that is touched."""
         mesh = bpy.data.meshes.new(f"{surface.name} Touches")
-        obj = bpy.data.objects.new(mesh.name, mesh)
+        obj: Object = bpy.data.objects.new(mesh.name, mesh)
         # It is not drawn in front: patches on the far side would show through.
-        obj.matrix_world = Matrix.Translation(surface.origin)
+        obj.matrix_world = Matrix.Translation(surface.origin.tolist())
         scene.collection.objects.link(obj)  # A collection of its own might be left empty.
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
-        obj.data.materials.append(emission("Tactile Surface", attribute=patch_record.COLOR))
-        self._uid, self._patches, self._above = obj.session_uid, [], DRAWN_ABOVE * surface.size
+        obj.data.materials.append(emission("Tactile Surface", attribute=COLOR))
+        self._patches: list[tuple[Array, Array]] = []
+        self._uid, self._above = obj.session_uid, DRAWN_ABOVE * surface.size
         show_colors()
 
-    def add(self, found, rims):
+    def add(self, found: Sequence[core.Reconstruction], rims: Sequence[Array]) -> None:
         """Shows these core.Reconstructions, too, up to their rims, unless somebody has deleted the object."""
         obj = self._object()
         if obj is None or not found:
@@ -48,19 +56,19 @@ class GrowingPatches:
         triangles = np.concatenate([_fan() + count * i for i in range(len(self._patches))])
         shades = colors.diverging(curvatures, colors.symmetric_range(curvatures, 1e-30))
         shades.reshape(-1, count, 4)[:, -SPOKES:] = RIM_COLOR
-        fill(obj.data, points, triangles, [(patch_record.COLOR, "FLOAT_COLOR", shades)])
+        fill(obj.data, points, triangles, [(COLOR, shades)])
 
-    def remove(self):
+    def remove(self) -> None:
         """Deletes the object, if it is still there."""
         obj = self._object()
         if obj is not None:
             patch_object.remove_objects([obj])
 
-    def _object(self):
+    def _object(self) -> Object | None:
         return next((obj for obj in bpy.data.objects if obj.session_uid == self._uid), None)
 
 
-def _disk(r, rim, above):
+def _disk(r: core.Reconstruction, rim: Array, above: float) -> tuple[Array, Array]:
     """Points (n, 3) of a patch, on rings around its middle, and their Gaussian curvatures (n,).
 
     rim : (k SPOKES,), the radii of the patch all round, where the finger felt it end
@@ -74,7 +82,7 @@ def _disk(r, rim, above):
     return r.frame.to_world(points), r.patch.gaussian_curvature(x, y)
 
 
-def _fan():
+def _fan() -> Array:
     """The triangles (m, 3) between the points of a disk."""
     a, b = np.arange(SPOKES), np.roll(np.arange(SPOKES), -1)
     rings = [(1 + SPOKES * i + a, 1 + SPOKES * i + b) for i in range(len(RINGS))]
@@ -87,28 +95,28 @@ def _fan():
     return np.vstack(parts)
 
 
-def insert(scene, name, whole, report):
+def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[str, Any]) -> Object:
     """Adds a WholeSurface of the object with this name to the scene, and returns the new object."""
     mesh = bpy.data.meshes.new(f"{name} Surface")
     obj = bpy.data.objects.new(mesh.name, mesh)
-    obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin), True
+    obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin.tolist()), True
     patch_object.collection(scene).objects.link(obj)
-    mesh.materials.append(emission("Tactile Surface", attribute=patch_record.COLOR))
+    mesh.materials.append(emission("Tactile Surface", attribute=COLOR))
     rewrite(obj, whole, report | {"source": name})
     show_colors()
     return obj
 
 
-def rewrite(obj, whole, report):
+def rewrite(obj: Object, whole: WholeSurface, report: dict[str, Any]) -> None:
     """Gives the object of a whole surface the mesh, the report and the graph of a WholeSurface."""
     own_mesh(obj)
     mesh, found = obj.data, whole.mesh
     attributes = [
-        *((key, "FLOAT", values) for key, values in whole.curvatures.items()),
-        ("height_std", "FLOAT", found.std),
-        ("deviation", "FLOAT", whole.deviation),
-        ("patch", "INT", found.patch.astype(np.int32)),
-        (patch_record.COLOR, "FLOAT_COLOR", np.ones((len(found.vertices), 4))),
+        *whole.curvatures.items(),
+        (HEIGHT_STD, found.std),
+        (DEVIATION, whole.deviation),
+        (NODE, found.patch.astype(np.int32)),
+        (COLOR, np.ones((len(found.vertices), 4))),
     ]
     fill(mesh, found.vertices, found.triangles, attributes)
     mesh.shade_smooth()

@@ -3,8 +3,13 @@
 """The surface of an atlas, step by step, whether it was touched or measured; nothing in the scene changes."""
 
 import json
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+
+from ... import core
+from ..touch.types import Array
 
 CURVED_AT_ONCE = 1000  # A step computes the curvatures at so many vertices.
 
@@ -20,11 +25,11 @@ class WholeSurface:
     Only the atlas is there before the steps are done.
     """
 
-    def __init__(self, atlas, origin):
+    def __init__(self, atlas: core.Atlas, origin: Array) -> None:
         self.atlas, self.origin = atlas, np.array(origin, dtype=float)
         self._in_doubt = 0
 
-    def steps(self, edge):
+    def steps(self, edge: float) -> Iterator[float]:
         """Does everything, as a generator that yields the share that is done; `edge` is a length or 0."""
         if edge:
             yield from self._meshed(edge)
@@ -49,7 +54,7 @@ class WholeSurface:
         self.graph = json.dumps(graph, allow_nan=False)
         yield 0.9
 
-    def _meshed(self, edge):
+    def _meshed(self, edge: float) -> Iterator[float]:
         """Makes the mesh with edges of this length; yields the share of everything that is done."""
         steps = self.atlas.meshing(edge)
         while True:
@@ -59,7 +64,7 @@ class WholeSurface:
                 self.mesh = end.value
                 return
 
-    def _graph(self):
+    def _graph(self) -> dict[str, Any]:
         """The graph of Atlas.to_dict, moved to the world."""
         found = self.atlas.to_dict()
         frames, touch = [node["frame"] for node in found["nodes"]], found["next_touch"]
@@ -71,7 +76,7 @@ class WholeSurface:
             place[key] = (np.array(place[key]) + self.origin).tolist()
         return found
 
-    def report(self):
+    def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
         atlas, mesh = self.atlas, self.mesh
         status, message = self._verdict()
@@ -89,14 +94,14 @@ class WholeSurface:
             "radius": float(np.median([r.radius for r in atlas.patches])),
         }
 
-    def _verdict(self):
+    def _verdict(self) -> tuple[str, str]:
         """The status and the message of the atlas, unless its surface has holes only as it is shown."""
         if self.atlas.status == "ok" and _rims(self.mesh) > _rims(self.atlas.reference.mesh):
             return "uncertain", "Triangles of this edge length leave holes: use a shorter edge length."
         return self.atlas.status, self.atlas.message
 
 
-def _rims(mesh):
+def _rims(mesh: core.Mesh) -> int:
     """The number of rims of a mesh: where its object ends, and around holes."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
