@@ -12,7 +12,7 @@ from mathutils import Matrix
 from ..scene import colors, patch_object, patch_record, undo
 from ..scene.mesh_data import ABOVE, emission, fill, own_mesh
 from ..scene.shown import recolor
-from ..scene.viewports import show_colors
+from ..scene.viewports import show_colors, show_size
 
 SHARP = math.radians(30.0)  # Edges at which faces are turned by more are creases.
 # While a patch is one of many, it is drawn with these rings, the last of which is its dark rim, and spokes.
@@ -36,6 +36,7 @@ class GrowingPatches:
         obj.data.materials.append(emission("Tactile Surface", attribute=patch_record.COLOR))
         self._uid, self._patches, self._above = obj.session_uid, [], DRAWN_ABOVE * surface.size
         show_colors()
+        show_size(surface.size)
 
     def add(self, found, rims):
         """Shows these core.Reconstructions, too, up to their rims, unless somebody has deleted the object."""
