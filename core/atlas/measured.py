@@ -20,7 +20,7 @@ from .charts import AZIMUTHS, Charts
 from .join import stacked, table_of
 from .meshing import BETWEEN, Contacts
 from .object_atlas import Atlas, surfaced
-from .orientation import doubt_of, middle, oriented, planes_of
+from .orientation import doubt_of, middle, oriented, planes_of, sharpened
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -122,7 +122,9 @@ def _contacts(
         normals[~known] = found[~known]
     else:
         _require_one_side(points, normals)
-    return Contacts(points, normals, planes.reach, planes.links), noise, doubt_of(points, normals, planes)
+    doubt = doubt_of(points, normals, planes)
+    normals[~known] = sharpened(points, normals, planes)[~known]
+    return Contacts(points, normals, planes.reach, planes.links), noise, doubt
 
 
 def _require_one_side(points: Array, normals: Array) -> None:
