@@ -204,18 +204,20 @@ class _Cloud(NamedTuple):
     def rim(self, i: int, r: Reconstruction) -> Array:
         """The radii (AZIMUTHS,) of a patch, in unit radius, as far as it has contacts beside it.
 
-        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole.
+        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole, and where
+        its heights may run away from the surface.
         """
         from scipy.spatial import cKDTree
 
         domain = r.domain.radii(AZIMUTHS) / r.radius
         near = self.alike(i, 2.0 * r.radius)
-        local = (self.contacts.points[near] - r.frame.origin) @ r.frame.axes[:, :2] / r.radius
         shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
         turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        away, beside = cKDTree(local).query((shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2))
-        empty = (away * r.radius > BETWEEN * self.contacts.reach[near[beside]]).reshape(RAY_PLACES, AZIMUTHS)
+        x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
+        places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T
+        away, beside = cKDTree(self.contacts.points[near]).query(places)
+        empty = (away > BETWEEN * self.contacts.reach[near[beside]]).reshape(RAY_PLACES, AZIMUTHS)
         ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
         return domain * np.maximum(ended, 1) / RAY_PLACES
 

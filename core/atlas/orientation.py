@@ -97,8 +97,9 @@ def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
     plane that passes through both.
     """
     links, rms = planes.links, planes.rms
-    off = np.abs(np.einsum("nki,nki->nk", normals[links], points[:, None] - points[links])) / rms[links]
-    off[(rms[links] > FLATTER * rms[:, None]) | (off > THROUGH)] = np.inf
+    off = np.abs(np.einsum("nki,nki->nk", normals[links], points[:, None] - points[links]))
+    is_none = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
+    off = np.where(is_none, np.inf, np.hypot(off, rms[links]))
     best = np.argmin(off, axis=1)
     every = np.arange(len(points))
     other = normals[links[every, best]]
