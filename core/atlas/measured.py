@@ -50,6 +50,8 @@ def atlas_of(
 ) -> Atlas:
     """The atlas (paper, VI) of measured contacts: contours, with normals or without, and strokes (n, 3).
 
+    Contours of the centers of a ball count as the contacts below them, along their normals.
+
     outward : (3,), a hint, a direction to the outer side on average; required where contacts without normals
         do not close around the object, because these do not show their outer side
     tolerance : mean deviation of the height up to which patches grow; None for 1.2 % of their radius
@@ -96,8 +98,8 @@ def cover_contacts(
 
 def _contacts(
     given: Sequence[ArrayLike | Contour], outward: ArrayLike | None, noise: float | None
-) -> tuple[Contacts, float, str]:
-    """Contacts with outward normals, the noise, and why the normals are in doubt, or ""."""
+) -> tuple[Contacts, float, tuple[str, str] | None]:
+    """Contacts with outward normals, the noise, and why the normals are in doubt, if they are."""
     strokes = [
         stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
         for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
@@ -124,6 +126,10 @@ def _contacts(
         _require_one_side(points, normals)
     doubt = doubt_of(points, normals, planes)
     normals[~known] = sharpened(points, normals, planes)[~known]
+    balls = np.repeat([stroke.ball or 0.0 for stroke in strokes], [len(some) for some in own])
+    if balls.any():
+        points = points - balls[:, None] * normals
+        planes = planes_of(points, noise)
     return Contacts(points, normals, planes.reach, planes.links), noise, doubt
 
 
@@ -150,8 +156,8 @@ def _require_one_side(points: Array, normals: Array) -> None:
         )
 
 
-def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> str:
-    """Why the surface is in doubt, by contacts that are off it or face the other way, or "" if few are."""
+def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> tuple[str, str] | None:
+    """The status and a sentence, if many contacts are off the surface or face the other way."""
     some = np.unique(np.linspace(0, len(contacts.points) - 1, CHECKED).astype(np.intp))
     points, normals = contacts.points[some], contacts.normals[some]
     distance, std = atlas.distance(points)
@@ -160,8 +166,8 @@ def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> str:
     off = np.abs(distance) > np.maximum(explained, OFF_CELLS * atlas.reference.indicator.cell)
     off |= np.einsum("ni,ni->n", atlas.reference.normals[triangle], normals) < 0.0
     if off.mean() <= OFF:
-        return ""
-    return (
+        return None
+    return "uncertain", (
         f"{100.0 * off.mean():.0f} % of the contacts are off the surface or face the other way, as around "
         f"{middle(points[off])}: their normals contradict each other, or they are too far apart there."
     )
@@ -204,8 +210,8 @@ class _Cloud(NamedTuple):
     def rim(self, i: int, r: Reconstruction) -> Array:
         """The radii (AZIMUTHS,) of a patch, in unit radius, as far as it has contacts beside it.
 
-        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole, and where
-        its heights may run away from the surface.
+        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole, and
+        where its heights may run away from the surface.
         """
         from scipy.spatial import cKDTree
 

@@ -281,25 +281,25 @@ def _side(normals: Array, known: Array | None, up: Array | None, number: float) 
     return float(np.copysign(1.0, mean))
 
 
-def doubt_of(points: Array, normals: Array, planes: Planes) -> str:
-    """Why outward normals (n, 3) of contacts are in doubt, in a sentence that names a place, or ""."""
+def doubt_of(points: Array, normals: Array, planes: Planes) -> tuple[str, str] | None:
+    """The status and a sentence that names a place, if outward normals (n, 3) of contacts are in doubt."""
     i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
     cosine, bend = mirrored(points, normals, i, j)
     against = np.bincount(i, cosine < OPPOSED) * 2 > LINKS
     if against.mean() > DOUBTED:
-        return (
+        return "uncertain", (
             f"Normals contradict each other around {middle(points[against])}: strokes are too far apart "
             "there, or normals are wrong."
         )
     facing = np.einsum("mi,mi->m", normals[i], normals[j]) < -FACING
     walls = np.bincount(i, facing & (bend > FACING)) > 0
     if walls.mean() > CONFUSED:
-        return (
+        return "uncertain", (
             f"Strokes around {middle(points[walls])} are farther apart than half the thickness of the wall "
-            "or gap there, so its sides may be confused: strokes that are nearer to each other, or measured "
-            "normals, tell."
+            "or gap there, so its sides may be confused: make strokes nearer to each other, or measure "
+            "normals."
         )
-    return ""
+    return None
 
 
 def middle(points: Array) -> str:
