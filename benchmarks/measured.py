@@ -266,7 +266,14 @@ def print_orientation(only):
         seconds = process_time() - start
         right = np.einsum("ni,ni->n", found, normals) > 0.0
         rows.append(
-            [name, f"{wall:g}", str(len(points)), f"{100 * right.mean():.2f}", doubt, f"{seconds:.1f}"]
+            [
+                name,
+                f"{wall:g}",
+                str(len(points)),
+                f"{100 * right.mean():.2f}",
+                (doubt or ("", ""))[1],
+                f"{seconds:.1f}",
+            ]
         )
         print(rows[-1], file=sys.stderr, flush=True)
     table(["object", "wall", "contacts", "% outward", "doubt", "s"], rows)

@@ -20,7 +20,7 @@ from .finger import FACING
 from .join import stacked, table_of
 from .meshing import BETWEEN, Contacts
 from .object_atlas import Atlas, surfaced
-from .orientation import doubt_of, middle, oriented, planes_of
+from .orientation import doubt_of, middle, oriented, planes_of, sharpened
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -49,6 +49,8 @@ def atlas_of(
     noise: float | None = None,
 ) -> Atlas:
     """The atlas (paper, VI) of measured contacts: contours, with normals or without, and strokes (n, 3).
+
+    Contours of the centers of a ball count as the contacts below them, along their normals.
 
     outward : (3,), a hint, a direction to the outer side on average; required where contacts without normals
         do not close around the object, because these do not show their outer side
@@ -96,8 +98,8 @@ def cover_contacts(
 
 def _contacts(
     given: Sequence[ArrayLike | Contour], outward: ArrayLike | None, noise: float | None
-) -> tuple[Contacts, float, str]:
-    """Contacts with outward normals, the noise, and why the normals are in doubt, or ""."""
+) -> tuple[Contacts, float, tuple[str, str] | None]:
+    """Contacts with outward normals, the noise, and why the normals are in doubt, if they are."""
     strokes = [
         stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
         for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
@@ -122,7 +124,13 @@ def _contacts(
         normals[~known] = found[~known]
     else:
         _require_one_side(points, normals)
-    return Contacts(points, normals, planes.reach, planes.links), noise, doubt_of(points, normals, planes)
+    doubt = doubt_of(points, normals, planes)
+    normals[~known] = sharpened(points, normals, planes)[~known]
+    balls = np.repeat([stroke.ball or 0.0 for stroke in strokes], [len(some) for some in own])
+    if balls.any():
+        points = points - balls[:, None] * normals
+        planes = planes_of(points, noise)
+    return Contacts(points, normals, planes.reach, planes.links), noise, doubt
 
 
 def _require_one_side(points: Array, normals: Array) -> None:
@@ -148,8 +156,8 @@ def _require_one_side(points: Array, normals: Array) -> None:
         )
 
 
-def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> str:
-    """Why the surface is in doubt, by contacts that are off it or face the other way, or "" if few are."""
+def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> tuple[str, str] | None:
+    """The status and a sentence, if many contacts are off the surface or face the other way."""
     some = np.unique(np.linspace(0, len(contacts.points) - 1, CHECKED).astype(np.intp))
     points, normals = contacts.points[some], contacts.normals[some]
     distance, std = atlas.distance(points)
@@ -158,8 +166,8 @@ def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> str:
     off = np.abs(distance) > np.maximum(explained, OFF_CELLS * atlas.reference.indicator.cell)
     off |= np.einsum("ni,ni->n", atlas.reference.normals[triangle], normals) < 0.0
     if off.mean() <= OFF:
-        return ""
-    return (
+        return None
+    return "uncertain", (
         f"{100.0 * off.mean():.0f} % of the contacts are off the surface or face the other way, as around "
         f"{middle(points[off])}: their normals contradict each other, or they are too far apart there."
     )
@@ -202,18 +210,20 @@ class _Cloud(NamedTuple):
     def rim(self, i: int, r: Reconstruction) -> Array:
         """The radii (AZIMUTHS,) of a patch, in unit radius, as far as it has contacts beside it.
 
-        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole.
+        Its domain is a hull of contacts, which may span what was not felt, such as a notch or a hole, and
+        where its heights may run away from the surface.
         """
         from scipy.spatial import cKDTree
 
         domain = r.domain.radii(AZIMUTHS) / r.radius
         near = self.alike(i, 2.0 * r.radius)
-        local = (self.contacts.points[near] - r.frame.origin) @ r.frame.axes[:, :2] / r.radius
         shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
         turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        away, beside = cKDTree(local).query((shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2))
-        empty = (away * r.radius > BETWEEN * self.contacts.reach[near[beside]]).reshape(RAY_PLACES, AZIMUTHS)
+        x, y = r.radius * (shares[:, None, None] * domain[:, None] * ways).reshape(-1, 2).T
+        places = r.frame.origin + np.stack([x, y, r.height(x, y)], axis=1) @ r.frame.axes.T
+        away, beside = cKDTree(self.contacts.points[near]).query(places)
+        empty = (away > BETWEEN * self.contacts.reach[near[beside]]).reshape(RAY_PLACES, AZIMUTHS)
         ended = np.where(empty.any(axis=0), empty.argmax(axis=0), RAY_PLACES)
         return domain * np.maximum(ended, 1) / RAY_PLACES
 

@@ -26,7 +26,7 @@ CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends 
 SMOOTHINGS = 3  # This often vertices move toward their neighbors' mean.
 BESIDE = 8  # A place is felt if it is beside one of this many contacts that are nearest:
 BETWEEN = 1.5  # up to this many times as far from it as its neighbors are,
-ONE_SIDED = 0.75  # if the mean of the directions to these is shorter; it is 2 / pi on a straight border.
+ONE_SIDED = 0.82  # if the mean of the directions to these is shorter; it is 2 / pi on a straight border.
 BRIDGED = 4.0  # Holes that are not larger than this many cells of the indicator are bridged.
 # Vertices that were off by more cells, or are of folded triangles, are moved again, this often.
 FAR, STEPS = 0.05, 4

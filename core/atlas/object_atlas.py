@@ -119,7 +119,7 @@ class Atlas:
     border : where a finger felt the surface end; None if there was none
     is_cut_short : whether touches ended because no more were allowed, or were stopped
     contacts : those that were measured before; None if they were felt for this atlas
-    doubt : why these contradict the surface, or ""
+    doubt : the status and a sentence if these contradict each other or the surface
     """
 
     patches: tuple[Reconstruction, ...]
@@ -132,7 +132,7 @@ class Atlas:
     border: Border | None = None
     is_cut_short: bool = False
     contacts: Contacts | None = None
-    doubt: str = ""
+    doubt: tuple[str, str] | None = None
 
     def __repr__(self) -> str:
         mesh, size = self.reference.mesh, self.reference.indicator.size
@@ -178,7 +178,7 @@ class Atlas:
     @cached_property
     def _verdict(self) -> tuple[str, str]:
         if self.doubt:
-            return "uncertain", self.doubt
+            return self.doubt
         count = len(self.uncovered)
         if count and self.contacts is not None:
             places = "one place" if count == 1 else f"{count} places"

@@ -20,6 +20,7 @@ FEWEST, MOST, MORE = 8, 600, 1.5  # A plane has so many neighbors, by this facto
 ACROSS = 0.15  # they do not lie in a line if this share of the larger variance is across,
 FLAT = 0.05  # and lie in a plane if at most this share of the smaller one is off it,
 NOISES = 8.0  # and they reach so many deviations of a contact far.
+FLATTER, THROUGH = 0.5, 2.0  # A neighbor's plane is so much flatter, and passes by within so many deviations.
 LINKS = 12  # A contact is linked with so many of its neighbors.
 AT_ONCE = 20_000  # So many contacts are taken at once.
 BEND = 0.1  # Links along which the surface goes on come before those around edges and across gaps,
@@ -47,12 +48,14 @@ class Planes(NamedTuple):
     normals : (n, 3), unit vectors to either side
     reach : (n,), how far these neighbors reach
     areas : (n,), the area of each contact
+    rms : (n,), how far neighbors are off the plane, at least the noise
     links : (n, LINKS), some of them
     """
 
     normals: Array
     reach: Array
     areas: Array
+    rms: Array
     links: Indices
 
 
@@ -61,7 +64,7 @@ def planes_of(points: Array, noise: float) -> Planes:
     from scipy.spatial import cKDTree
 
     tree, n = cKDTree(points), len(points)
-    normals, (reach, areas), best = np.zeros((n, 3)), np.zeros((2, n)), np.full(n, np.inf)
+    normals, (reach, areas, rms), best = np.zeros((n, 3)), np.zeros((3, n)), np.full(n, np.inf)
     links = np.zeros((n, LINKS), dtype=np.intp)
     left, count = np.arange(n), FEWEST
     while len(left):
@@ -78,12 +81,30 @@ def planes_of(points: Array, noise: float) -> Planes:
             best[which], normals[which] = off_plane[better], vectors[better][..., 0]
             reach[which] = away[better, -1]
             areas[which] = np.pi * reach[which] ** 2 / count
+            rms[which] = np.sqrt(np.maximum(values[better, 0], 0.0) / count)
             links[which] = near[better][:, np.linspace(1, count - 1, LINKS).astype(np.intp)]
         left = (
             left[(best[left] > FLAT) | (reach[left] < NOISES * noise)] if count < min(n, MOST) else left[:0]
         )
         count = int(MORE * count)
-    return Planes(normals, reach, areas, links)
+    return Planes(normals, reach, areas, np.maximum(rms, noise), links)
+
+
+def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
+    """Outward normals (n, 3) of the planes of contacts or, where these bend around an edge, of a neighbor's.
+
+    Beside an edge the neighbors of a contact are on two walls. Those of a contact farther from it lie in a
+    plane that passes through both.
+    """
+    links, rms = planes.links, planes.rms
+    off = np.abs(np.einsum("nki,nki->nk", normals[links], points[:, None] - points[links]))
+    is_none = (rms[links] > FLATTER * rms[:, None]) | (off > THROUGH * rms[links])
+    off = np.where(is_none, np.inf, np.hypot(off, rms[links]))
+    best = np.argmin(off, axis=1)
+    every = np.arange(len(points))
+    other = normals[links[every, best]]
+    other = other * np.copysign(1.0, np.einsum("ni,ni->n", other, normals))[:, None]
+    return np.where(np.isfinite(off[every, best])[:, None], other, normals)
 
 
 def mirrored(points: Array, normals: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
@@ -260,25 +281,25 @@ def _side(normals: Array, known: Array | None, up: Array | None, number: float) 
     return float(np.copysign(1.0, mean))
 
 
-def doubt_of(points: Array, normals: Array, planes: Planes) -> str:
-    """Why outward normals (n, 3) of contacts are in doubt, in a sentence that names a place, or ""."""
+def doubt_of(points: Array, normals: Array, planes: Planes) -> tuple[str, str] | None:
+    """The status and a sentence that names a place, if outward normals (n, 3) of contacts are in doubt."""
     i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
     cosine, bend = mirrored(points, normals, i, j)
     against = np.bincount(i, cosine < OPPOSED) * 2 > LINKS
     if against.mean() > DOUBTED:
-        return (
+        return "uncertain", (
             f"Normals contradict each other around {middle(points[against])}: strokes are too far apart "
             "there, or normals are wrong."
         )
     facing = np.einsum("mi,mi->m", normals[i], normals[j]) < -FACING
     walls = np.bincount(i, facing & (bend > FACING)) > 0
     if walls.mean() > CONFUSED:
-        return (
+        return "uncertain", (
             f"Strokes around {middle(points[walls])} are farther apart than half the thickness of the wall "
-            "or gap there, so its sides may be confused: strokes that are nearer to each other, or measured "
-            "normals, tell."
+            "or gap there, so its sides may be confused: make strokes nearer to each other, or measure "
+            "normals."
         )
-    return ""
+    return None
 
 
 def middle(points: Array) -> str:

@@ -27,6 +27,9 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[Place, .
     if unfelt is None or not reference.is_open.any():
         return tuple(found)
     rim, patch = mesh.vertices[reference.is_open], mesh.patch[reference.is_open]
+    patched = np.flatnonzero(mesh.patch >= 0)
+    missing = patch < 0
+    patch[missing] = mesh.patch[patched[cKDTree(mesh.vertices[patched]).query(rim[missing])[1]]]
     radii, areas = charts.radii[patch], _areas(unfelt)
     around = cKDTree(unfelt.vertices).query_ball_point(rim, radii)
     gains = np.minimum([areas[some].sum() for some in around], np.pi * radii**2)

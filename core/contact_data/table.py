@@ -13,7 +13,8 @@ from ..contours.contour import Contour
 from . import rows
 from .rows import NORMAL_COLUMNS, POINT_COLUMNS, Contacts
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
+WITHOUT_BALL = 2  # Files without a ball have the version that earlier releases read, too.
 TITLE = "# Tactile Patch contacts, version "
 # The length of each unit in meters.
 UNIT_METERS = {
@@ -27,7 +28,7 @@ UNIT_METERS = {
     "in": 0.0254,
     "thou": 2.54e-5,
 }
-VECTOR_KEYS, DEVIATION_KEYS = ("point", "outward"), ("noise", "normal_std")  # Keys of the comments.
+VECTOR_KEYS, CURVE_KEYS = ("point", "outward"), ("noise", "normal_std", "ball")  # Keys of the comments.
 COLUMNS = ("curve", "time", *POINT_COLUMNS, *NORMAL_COLUMNS)
 STROKE = "stroke"  # The names of curves that run beside the reference point begin with this.
 
@@ -46,7 +47,7 @@ def contacts_from_csv(text: str, name: str = "the table") -> Contacts:
     said = _said(name, text)
     table = _table(name, text)
     contours = table.contours()
-    for key in DEVIATION_KEYS:
+    for key in CURVE_KEYS:
         stds = said.pop(key, [None])
         stds = stds * len(contours) if len(stds) == 1 else stds
         if len(stds) != len(contours):
@@ -62,7 +63,8 @@ def contacts_to_csv(contacts: Contacts) -> str:
     """Contacts as the text of a CSV file, such that `contacts_from_csv` finds the same numbers.
 
     Contours that have normals are written with them. Comments have what else a fit takes: the reference
-    point, the outward direction, and the deviations of contacts and of normals, for all contours or for each.
+    point, the outward direction, and the deviations of contacts and of normals and the radius of a ball whose
+    centers were recorded, for all contours or for each.
     """
     contours, unit, point, outward, strokes = contacts
     labels = [str(number) for number in range(1, len(contours) + 1)]
@@ -70,8 +72,9 @@ def contacts_to_csv(contacts: Contacts) -> str:
     contours = [*contours, *strokes]
     names = POINT_COLUMNS + (NORMAL_COLUMNS if any(c.normals is not None for c in contours) else ())
     text = io.StringIO()
-    print(f"{TITLE}{FORMAT_VERSION}, lengths in {unit or 'no unit'}", file=text)
-    for key, values in {"point": point, "outward": outward, **_deviations(contours)}.items():
+    version = WITHOUT_BALL if all(contour.ball is None for contour in contours) else FORMAT_VERSION
+    print(f"{TITLE}{version}, lengths in {unit or 'no unit'}", file=text)
+    for key, values in {"point": point, "outward": outward, **_of_curves(contours)}.items():
         if values is not None:
             print("#", key, *("-" if value is None else repr(value) for value in values), file=text)
     table = csv.writer(text, lineterminator="\n")
@@ -97,9 +100,9 @@ def _table(name: str, text: str) -> rows.Rows:
     return table
 
 
-def _deviations(contours: list[Contour]) -> dict[str, list[float | None]]:
-    """The known deviations by key: one for all contours, or one for each."""
-    found = {key: [getattr(contour, key) for contour in contours] for key in DEVIATION_KEYS}
+def _of_curves(contours: list[Contour]) -> dict[str, list[float | None]]:
+    """What is known of contours by key: one number for all of them, or one for each."""
+    found = {key: [getattr(contour, key) for contour in contours] for key in CURVE_KEYS}
     return {
         key: stds[:1] if len(set(stds)) == 1 else stds
         for key, stds in found.items()
@@ -121,8 +124,9 @@ def _with(name: str, contour: Contour, key: str, std: float | None) -> Contour:
     """The contour with this deviation; with one of normals only if it has normals."""
     if key == "normal_std" and contour.normals is None:
         return contour
+    known: dict[str, Any] = {key: std}
     try:
-        return replace(contour, noise=std) if key == "noise" else replace(contour, normal_std=std)
+        return replace(contour, **known)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
 
@@ -132,18 +136,22 @@ def _said(name: str, text: str) -> dict[str, Any]:
     if not text.startswith(TITLE):
         return {}
     said: dict[str, Any] = {}
-    start, number = 0, 1
+    start, number, version = 0, 1, 0
     while text.startswith("#", start):
         end = text.find("\n", start) + 1 or len(text)
         at, line = f"{name}, line {number}", text[start:end]
         if number == 1:
-            _require_version(at, line.removeprefix(TITLE).partition(",")[0].strip())
+            version = _version(at, line.removeprefix(TITLE).partition(",")[0].strip())
         key, *words = line[1:].rstrip(",;\t\n ").split() or [""]  # A spreadsheet may leave separators behind.
+        if key == "ball" and version <= WITHOUT_BALL:
+            raise ValueError(
+                f"{at}: expected no ball in a file of version {version}: make it {FORMAT_VERSION}"
+            )
         if key in VECTOR_KEYS and len(words) != 3:
             raise ValueError(f"{at}: expected 3 numbers for {key}, got {len(words)}")
         if key in VECTOR_KEYS:
             said[key] = [rows.number_of(f'{at}, "{key}"', word, LARGEST) for word in words]
-        elif key in DEVIATION_KEYS:
+        elif key in CURVE_KEYS:
             said[key] = [_deviation(f'{at}, "{key}"', word) for word in words]
         start, number = end, number + 1
     return said
@@ -157,12 +165,14 @@ def _deviation(at: str, word: str) -> float | None:
     return std
 
 
-def _require_version(at: str, version: str) -> None:
+def _version(at: str, version: str) -> int:
+    """The version of the format. Raises ValueError for one that is not known."""
     if not version.isdecimal() or int(version) > FORMAT_VERSION:
         raise ValueError(
             f"{at}: expected version {FORMAT_VERSION} or less, got {version[:40]}: this was written by a "
             "later release"
         )
+    return int(version)
 
 
 def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:

@@ -79,6 +79,8 @@ class Contour:
     stops : why tracking ended at the first and at the last point, or None
     normal_std : standard deviation of measured normals, in radians, with which "bayes" fits them as slopes;
       None leaves them out. The paper's methods never use them
+    ball : radius of a ball whose centers the points are, and so the reference point of their touch; None if
+      they are contacts
 
     Repeated contacts, as of a sensor at rest, are there once, with the mean of their normals, because they
     tell no more.
@@ -93,6 +95,7 @@ class Contour:
     noise: float | None = None
     stops: tuple[str, str] | None = None
     normal_std: float | None = None
+    ball: float | None = None
 
     def __post_init__(self) -> None:
         points = finite_array("points", self.points, (None, 3), LARGEST)
@@ -122,6 +125,8 @@ class Contour:
                 raise ValueError("normal_std: expected the measured normals that it belongs to, got none")
             if not np.abs(self.normals).max(axis=1, initial=0.0).all():
                 raise ValueError("normals: expected directions where normal_std is given, got (0, 0, 0)")
+        if self.ball is not None:
+            object.__setattr__(self, "ball", number("ball", self.ball, above=0.0))
         self._keep_each_once()
 
     def _keep_each_once(self) -> None:
@@ -160,6 +165,7 @@ class Contour:
             plane_normal=None if self.plane_normal is None else turn @ self.plane_normal,
             normals=None if self.normals is None else self.normals @ turn.T,
             noise=None if self.noise is None else scale * self.noise,
+            ball=None if self.ball is None else scale * self.ball,
         )
 
 

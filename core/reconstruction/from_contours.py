@@ -3,6 +3,7 @@
 """The way from contacts to a patch: the paper's sections III and IV, or the Bayesian fit, in one call."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..arguments import (
 from ..contours.contour import Contour
 from ..contours.curves import has_measured_normals
 from ..contours.local_geometry import DegenerateCurvesError
+from .ball import ball_of, contacts_below
 from .options import FitOptions
 from .result import Reconstruction
 from .stacks import fitted_stack
@@ -42,7 +44,8 @@ def reconstruct(
 ) -> Reconstruction:
     """The surface patch around `point` from three or more contours through it, from strokes, or from both.
 
-    point : (3,), exact; outward : (3,), on the outer side of the surface
+    point : (3,), exact; outward : (3,), on the outer side of the surface. If the contours are those of a
+        ball's center, the point is a center, too, and the patch is that of the contacts
     strokes : contacts beside the point, (n, 3) each or Contours, in the order in which they were felt, either
       way; their normals are not fitted. Only "bayes" fits them. With contours, those beyond the domain are
       ignored. Without contours the point is only a place: the origin is its projection onto the polynomial,
@@ -66,11 +69,8 @@ def reconstruct(
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     options = FitOptions(method, degree, noise, weight, solver, radius)
-    touch = _given(list_of("contours", contours, Contour), strokes, options)
-    (result,) = fitted_stack(p[None], [touch], up[None], options)
-    if isinstance(result, DegenerateCurvesError):
-        raise result
-    return result
+    p, touch = _felt(p, list_of("contours", contours, Contour), strokes, up, options)
+    return _alone(p, touch, up, options)
 
 
 def reconstruct_many(
@@ -98,8 +98,16 @@ def reconstruct_many(
             raise ValueError(f"{name}: expected {len(p)} lists of {name[:-5]}, got {len(given)}")
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
-    touches = [_given(list_of("contours", c, Contour), s, fit) for c, s in zip(lists, beside, strict=True)]
-    return fitted(p, touches, up, fit)
+    found: dict[int, Reconstruction | DegenerateCurvesError] = {}
+    touches, places = {}, p.copy()
+    for i, (c, s) in enumerate(zip(lists, beside, strict=True)):
+        try:
+            places[i], touches[i] = _felt(p[i], list_of("contours", c, Contour), s, up[i], fit)
+        except DegenerateCurvesError as error:
+            found[i] = error
+    each = list(touches)
+    found.update(zip(each, fitted(places[each], list(touches.values()), up[each], fit), strict=True))
+    return [found[i] for i in range(len(p))]
 
 
 def fitted(
@@ -120,6 +128,31 @@ def fitted(
             found = fitted_stack(points[chosen], [touches[i] for i in chosen], outward[chosen], options)
             results.update(zip(chosen, found, strict=True))
     return [results[i] for i in range(len(touches))]
+
+
+def _felt(
+    p: Array, contours: list[Contour], strokes: Sequence[ArrayLike | Contour], up: Array, options: FitOptions
+) -> tuple[Array, Given]:
+    """The reference point (3,) and the contacts of a touch, below the centers of a ball if these are given.
+
+    Raises DegenerateCurvesError if such centers carry no surface, or the ball is too large for it.
+    """
+    touch, ball = _given(contours, strokes, options), ball_of(contours, strokes)
+    if not ball:
+        return p, touch
+    by_default = replace(options, method="bayes", degree="auto")
+    centers = _alone(p, touch, up, by_default)
+    beside = [stroke for stroke in strokes if isinstance(stroke, Contour)]
+    p, contours, beside = contacts_below(centers, contours, beside, ball)
+    return p, _given(contours, beside, options)
+
+
+def _alone(p: Array, touch: Given, up: Array, options: FitOptions) -> Reconstruction:
+    """The result of one touch. Raises DegenerateCurvesError if it cannot carry the method."""
+    (result,) = fitted_stack(p[None], [touch], up[None], options)
+    if isinstance(result, DegenerateCurvesError):
+        raise result
+    return result
 
 
 def _given(contours: list[Contour], strokes: Sequence[ArrayLike | Contour], options: FitOptions) -> Given:

@@ -120,8 +120,10 @@ class MeasuredObject:
 
 
 def _scaled(curve: core.Contour, factor: float) -> core.Contour:
-    noise = None if curve.noise is None else factor * curve.noise
-    return replace(curve, points=factor * curve.points, noise=noise)
+    lengths = {key: getattr(curve, key) for key in ("noise", "ball") if getattr(curve, key) is not None}
+    return replace(
+        curve, points=factor * curve.points, **{key: factor * length for key, length in lengths.items()}
+    )
 
 
 def fit(

@@ -40,3 +40,18 @@ def test_a_fit_of_contacts_that_went_through_text_is_the_same():
     assert (found.unit, found.point, found.outward) == ("cm", given.point, given.outward)
     r, again = (core.reconstruct(c.point, c.contours, outward=c.outward) for c in (given, found))
     assert np.array_equal(r.patch.coefficients, again.patch.coefficients)
+
+
+def test_a_ball_makes_a_file_of_version_3_and_contacts_do_not():
+    contours = [core.Contour(np.eye(3) + i, ball=ball) for i, ball in enumerate((3.15, 3.15))]
+    text = core.contacts_to_csv(core.Contacts(contours, "mm"))
+    assert text.startswith("# Tactile Patch contacts, version 3, lengths in mm\n# ball 3.15\n")
+    assert [c.ball for c in core.contacts_from_csv(text).contours] == [3.15, 3.15]
+    text = core.contacts_to_csv(core.Contacts([core.Contour(np.eye(3))], "mm"))
+    assert text.startswith("# Tactile Patch contacts, version 2,")
+    with pytest.raises(ValueError, match="line 2: expected no ball in a file of version 2: make it 3"):
+        core.contacts_from_csv("# Tactile Patch contacts, version 2,\n# ball 3.15\n" + CURVES)
+    with pytest.raises(ValueError, match="line 1: expected version 3 or less, got 4"):
+        core.contacts_from_csv("# Tactile Patch contacts, version 4,\n" + CURVES)
+    with pytest.raises(ValueError, match="ball: expected a finite number above 0"):
+        core.contacts_from_csv("# Tactile Patch contacts, version 3,\n# ball 0\n" + CURVES)
