@@ -17,7 +17,8 @@ from .indicator import LAYERS, Indicator, solved
 PITCH = 1.2  # Samples of a patch are this many cells apart.
 # Weights of other patches are those of one sample for at most PARTS^2 around, ACROSS^2 or more a patch.
 ACROSS, PARTS = 12, 8
-FINEST, COARSEST = 1.0 / 200.0, 1.0 / 80.0  # Cells are between these shares of the size.
+DENSER = 0.5  # Where walls need cells finer than this share, samples are taken again.
+FINEST, COARSEST = 1.0 / 400.0, 1.0 / 80.0  # Cells are between these shares of the size.
 TOLERANCES = 5.0  # A cell is at most this many tolerances.
 OPPOSITE = -0.9  # Two patches are the sides of a wall if the cosine between their normals is less.
 THIN_SHARE = 0.01  # Walls are at least as thick as all but this share of the area is.
@@ -30,9 +31,12 @@ def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None,
     reach = charts.radii[:, None] * charts.rims.max(axis=1)[:, None]
     size = float(((charts.origins + reach).max(axis=0) - (charts.origins - reach).min(axis=0)).max())
     cell = min(COARSEST * size, np.inf if tolerance is None else TOLERANCES * tolerance)
-    samples = yield from samples_of(charts, PITCH * max(cell, FINEST * size))
+    pitch = PITCH * max(cell, FINEST * size)
+    samples = yield from samples_of(charts, pitch)
     size, thinnest = float(np.ptp(samples.points, axis=0).max()), samples.thinnest
     cell = max(min(cell, COARSEST * size, thinnest / LAYERS), FINEST * size)
+    if PITCH * cell < DENSER * pitch:  # Between samples that are too far apart the indicator has bubbles.
+        samples = yield from samples_of(charts, PITCH * cell)
     return (yield from solved(samples.points, samples.areas[:, None] * samples.normals, cell, thinnest))
 
 
