@@ -96,8 +96,8 @@ def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Arra
     """
     x, y, _ = ((points - r.frame.origin) @ r.frame.axes).T
     by = np.swapaxes(derived_monomials(x / r.radius, y / r.radius, TERMS, SLOPES_AND_BENDS), 1, 2)
-    told, covariance = by @ r.posterior.polynomial, r.posterior.covariance
-    zx, zy, zxx, zxy, zyy = told[:, :, None]
+    derivatives, covariance = by @ r.posterior.polynomial, r.posterior.covariance
+    zx, zy, zxx, zxy, zyy = derivatives[:, :, None]
     steep = 1.0 + zx**2 + zy**2
     k = (zxx * zyy - zxy**2) / steep**2
     gradient = (zyy * by[2] + zxx * by[4] - 2.0 * zxy * by[3]) / steep**2

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many patches as tables, so that all of them can be asked about many places in one pass over arrays.
+"""Many patches as tables, so that all of them are evaluated at many places in one pass over arrays.
 
 The height of a patch with a residual is a sum over its contacts. In a table it is a sum of 16 coefficients of
 a cubic B-spline, which is C2 and off the patch by less than a tenth of its deviation.
@@ -20,7 +20,7 @@ from .cubic_spline import CUBIC, SIDE, cubics, weights_at
 # python -m benchmarks.atlas judges these.
 MARGIN = 1.12  # A patch counts to this share of its domain's radius: beside a crease it ends a step early.
 AZIMUTHS = 96  # The radius of a domain is stored in this many directions.
-REACH = 0.5  # A patch is asked about places up to this share of its radius above or below it.
+REACH = 0.5  # A patch is evaluated at places up to this share of its radius above or below it.
 # Weights of four neighbors (Catmull and Rom 1974), by the share of the way between the middle two.
 CATMULL_ROM = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2.0
 ASIDE = 0.3  # What is farther than this share of the radius beside the normal at its foot has no foot.

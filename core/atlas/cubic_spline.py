@@ -26,7 +26,7 @@ def between(some: Array) -> Array:
 
 
 def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
-    """The 16 knots (n, 16) that tell of n places, and their shares (3, n, 16) in height and slopes there."""
+    """The 16 knots (n, 16) around n places, and their shares (3, n, 16) in height and slopes there."""
     pitch = 2.0 * half / (SIDE - 1)
     (column, *by_x), (row, *by_y) = (weights_at(along / pitch) for along in (x, y))
     steps = np.arange(-1, 3)

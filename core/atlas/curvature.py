@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curvatures of the joined surface, by quadrics that are as wide as its deviation asks for.
+"""Curvatures of the joined surface, by quadrics that are as wide as its deviation requires.
 
 Beside the paper. The gradient of a quadric is linear, so its normals are n0 - W x along the tangent plane
 near a place, where W is the Weingarten map. It is fitted to the normals of the mesh there by weighted least
@@ -105,9 +105,9 @@ def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
     largest = np.abs(first.mean) + np.sqrt(np.maximum(first.mean**2 - first.gauss, 0.0))
     radius = np.sqrt(2.0 * SAGITTA * std / np.maximum(largest, LEAST_DIVISOR)).clip(least, most)
     fit = _fitted(distance, local, radius)
-    known = (ends >= least) & ((distance < near[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
-    gauss, mean, misfit = (np.where(known, values, 0.0) for values in fit)
-    mean_std = np.where(known, np.hypot(BY_STD * std / radius, BY_MISFIT * misfit) / radius, np.inf)
+    determined = (ends >= least) & ((distance < near[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
+    gauss, mean, misfit = (np.where(determined, values, 0.0) for values in fit)
+    mean_std = np.where(determined, np.hypot(BY_STD * std / radius, BY_MISFIT * misfit) / radius, np.inf)
     # For errors of heights that are alike in all directions, the variances of z_xx, z_yy and z_xy are as
     # 3 : 3 : 1 and the covariance of the first two as 1, so that of H is as 2.
     gauss_std = mean_std * np.sqrt(6.0 * mean**2 - 2.0 * gauss + 3.0 * mean_std**2)

@@ -149,21 +149,21 @@ class Frontier:
         yield from self._forget_covered()
         found: list[Next] = []
         aside: list[tuple[float, int, Place]] = []
-        known: dict[Place, Next | None] = {}
+        touches: dict[Place, Next | None] = {}
         while self.queue and len(found) < count:
             _, _, place = entry = heapq.heappop(self.queue)
-            rooms = ((other, TOUCHES_APART * max(place.radius, other.place.radius)) for other in found)
-            if any(math.dist(place.point, other.point) < room for other, room in rooms):
+            distances = ((other, TOUCHES_APART * max(place.radius, other.place.radius)) for other in found)
+            if any(math.dist(place.point, other.point) < apart for other, apart in distances):
                 aside.append(entry)
                 continue
             if len(place.tried) >= TRIES:
                 continue
-            if place not in known:
+            if place not in touches:
                 yield
-                others = (other for _, _, other in heapq.nsmallest(LOOK, self.queue) if other not in known)
+                others = (other for _, _, other in heapq.nsmallest(LOOK, self.queue) if other not in touches)
                 some = [place, *others]
-                known.update(zip(some, self.beyond(some), strict=True))
-            touch = known[place]
+                touches.update(zip(some, self.beyond(some), strict=True))
+            touch = touches[place]
             if touch is not None and self.queue and touch.gain < -self.queue[0][0]:
                 self.push(place, touch.gain)
             elif touch is not None:
@@ -226,18 +226,18 @@ class Frontier:
 
         These are uncovered contacts, by place and share.
         """
-        asked, middles = {}, {}
+        disks, middles = {}, {}
         for place in places:
             for share in REACHES:
                 if share in place.felt:
-                    asked[place, share] = place.felt[share]
+                    disks[place, share] = place.felt[share]
                 elif contact := self.finger.ahead(
                     place.point, place.normal, place.ahead, place.radius, share * place.radius
                 ):
-                    middles[place, share], asked[place, share] = contact, np.array([contact])
+                    middles[place, share], disks[place, share] = contact, np.array([contact])
                 else:
                     place.felt[share] = np.zeros((0, 2, 3))
-        for (place, share), disk in zip(asked, self._uncovered(list(asked.values())), strict=True):
+        for (place, share), disk in zip(disks, self._uncovered(list(disks.values())), strict=True):
             if not len(disk) or (place, share) not in middles:
                 place.felt[share] = disk
                 middles.pop((place, share), None)

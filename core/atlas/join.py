@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Patches of one object as tables, and joined: each becomes a spline through the contacts of all patches.
 
-A patch alone knows only its own few curves. Where patches overlap, they are moved until they agree.
+A patch alone has only its own few curves. Where patches overlap, they are moved until they agree.
 """
 
 from collections.abc import Generator, Sequence
@@ -28,7 +28,7 @@ FARTHEST = 3.0  # A contact that is off by more times UNDOUBTED is on another sh
 LEAST_NOISE = 5e-4  # Contacts have at least this noise, as a share of the radius.
 PATCHES_AT_ONCE, PLACES_AT_ONCE = 2, 1500  # A step takes this many patches, or this many places.
 FARTHEST_RIM = 1.25  # A patch that is not flat counts up to this many radii of its domain.
-KNOTS_WITHIN = 1.3  # A patch is asked for heights at knots up to this many times its domain's radius.
+KNOTS_WITHIN = 1.3  # Heights at knots are taken up to this many times the domain's radius.
 ROUNDS = 2  # Patches are moved this often.
 MOVED = 0.03  # A place of a patch is moved by less than this share of the radius.
 
@@ -41,12 +41,12 @@ def joined(
     results: Sequence[Reconstruction],
     charts: Charts,
     noise: float,
-    known: dict[int, tuple[int, Table]],
+    earlier: dict[int, tuple[int, Table]],
 ) -> Joining:
     """The tables of patches fitted to all contacts on them. Yields the share that is done.
 
     charts : the tables of the same patches, fitted to their own contacts alone
-    known : number of contacts and table of each patch that was joined before; changed in place
+    earlier : number of contacts and table of each patch that was joined before; changed in place
     """
     points, normals, owner = _contacts(contours)
     parts = []
@@ -67,10 +67,10 @@ def joined(
     tables: list[Table] = []
     for i, r in enumerate(results):
         some = pairs.chosen(each[bounds[i] : bounds[i + 1]])
-        if i not in known or known[i][0] != len(some.place):
+        if i not in earlier or earlier[i][0] != len(some.place):
             table = _joined_table(r, charts.rims[i], some, points, normals, owner == i, noise)
-            known[i] = len(some.place), table
-        tables.append(known[i][1])
+            earlier[i] = len(some.place), table
+        tables.append(earlier[i][1])
         if len(tables) % PATCHES_AT_ONCE == 0:
             yield len(tables) / len(results)
     return stacked(results, tables)
@@ -105,12 +105,12 @@ def agreed(charts: Charts) -> Joining:
     from scipy.ndimage import spline_filter1d
 
     x, y = charts.knots().reshape(2, -1)
-    asked = np.flatnonzero(charts.inside(KNOTS_WITHIN))
+    knots = np.flatnonzero(charts.inside(KNOTS_WITHIN))
     yield 1.0
     for _ in range(ROUNDS):
         moves = np.zeros(charts.heights.shape)
-        for start in range(0, len(asked), PLACES_AT_ONCE):
-            some = asked[start : start + PLACES_AT_ONCE]
+        for start in range(0, len(knots), PLACES_AT_ONCE):
+            some = knots[start : start + PLACES_AT_ONCE]
             moves.ravel()[some] = _move(charts, some // SIDE**2, x[some], y[some])
             yield 1.0
         # The outermost knots are beyond the spline, without a height: they move like those beside them.

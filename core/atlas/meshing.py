@@ -209,7 +209,7 @@ def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Ar
         a, b = points[few].transpose(1, 0, 2)
         low, high = np.zeros(len(few)), np.ones(len(few))
         is_inside = indicator.at(a) > 0.0
-        for _ in range(HALVINGS):  # The indicator is a step, so its values do not tell how far the level is.
+        for _ in range(HALVINGS):  # The indicator is a step, so its values do not show how far the level is.
             middle = 0.5 * (low + high)
             same = (indicator.at(a + middle[:, None] * (b - a)) > 0.0) == is_inside
             low, high = np.where(same, middle, low), np.where(same, high, middle)

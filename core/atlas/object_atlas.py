@@ -326,7 +326,7 @@ class Atlas:
         return distance, std
 
     def mesh(self, edge: float) -> Mesh:
-        """The surface as triangles whose edges are about as long as asked.
+        """The surface as triangles whose edges are about of this length.
 
         It is closed if the object was felt all round, and open where it was not.
         """
@@ -391,7 +391,7 @@ class Atlas:
         edges : indices of two nodes, their boundary curve, and the angle of their normals along it
         uncovered, next_touch : where the object goes on, and where a touch would bring most, or None
 
-        The `to_dict` of each patch tells all about it, and is thirty times as large.
+        The `to_dict` of each patch has all of it, and is thirty times as large.
         """
         touch, stds = self.next_touch(), self.charts.mean_stds
         return {

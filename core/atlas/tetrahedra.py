@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Marching tetrahedra on a body-centered lattice. Beside the paper.
 
-Each tetrahedron is cut as its signs say (Doi and Koide 1991), so what comes out is a manifold. The lattice is
+Each tetrahedron is cut by its signs (Doi and Koide 1991), so what comes out is a manifold. The lattice is
 that of Labelle and Shewchuk 2007: its tetrahedra are all alike.
 """
 
@@ -48,20 +48,20 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
     strides = np.array([shape[1] * shape[2], shape[2], 1])
     # A lattice point is a number, so all corners of a tetrahedron are at fixed offsets from a center.
     centers = (2 * cells + 1 - low) @ strides
-    order, keys, known = np.sort(centers), [], np.zeros(0, dtype=np.intp)
+    order, keys, distinct = np.sort(centers), [], np.zeros(0, dtype=np.intp)
     for ahead, e1, e2 in (np.roll(strides, -axis) for axis in range(3)):
         at = np.minimum(np.searchsorted(order, centers + 2 * ahead), len(order) - 1)
         some = centers[order[at] == centers + 2 * ahead, None]
         face = ahead + FACE_CORNERS @ (e1, e2)
         for k in range(4):
             keys.append(some + np.array([0, 2 * ahead, face[k], face[(k + 1) % 4]]))
-            known = _different(np.concatenate([known, _different(keys[-1])]))
+            distinct = _different(np.concatenate([distinct, _different(keys[-1])]))
             yield 0.0
     index = []
     for each in keys:
-        index.append(np.searchsorted(known, each))
+        index.append(np.searchsorted(distinct, each))
         yield 0.0
-    points: Indices = np.stack(np.unravel_index(known, shape), axis=1) + low
+    points: Indices = np.stack(np.unravel_index(distinct, shape), axis=1) + low
     return points, np.concatenate(index)
 
 
@@ -76,9 +76,9 @@ def cut(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
     corners = [tetrahedra[case == code][:, table[code]].reshape(-1, 2) for code in range(1, 15)]
     ends = np.sort(np.concatenate(corners), axis=1)
     keys = ends[:, 0] * len(values) + ends[:, 1]
-    known = _different(keys)
-    crossed: Indices = np.stack(np.divmod(known, len(values)), axis=1)
-    return crossed, np.searchsorted(known, keys).reshape(-1, 3)
+    distinct = _different(keys)
+    crossed: Indices = np.stack(np.divmod(distinct, len(values)), axis=1)
+    return crossed, np.searchsorted(distinct, keys).reshape(-1, 3)
 
 
 @cache

@@ -54,7 +54,7 @@ class Progress(NamedTuple):
     """How far the touches of an object are.
 
     done : number of touches
-    uncovered : number of places that are known to be uncovered
+    uncovered : number of places that are uncovered, as far as was felt
     found : the touches since the last Progress
     rims : how far the finger feels each of their patches all round, (AZIMUTHS,), a length
     joining : share of joining the patches to one surface that is done; None while the object is touched
@@ -217,13 +217,13 @@ class _Run:
         self.done += len(contacts)
         return new
 
-    def joining(self, known: dict[int, tuple[int, Table]]) -> Generator[float, None, Charts]:
+    def joining(self, earlier: dict[int, tuple[int, Table]]) -> Generator[float, None, Charts]:
         """The joined patches; yields the share that is done."""
         assert self.frontier.charts is not None
         contours = [[*e.contours, taps] for e, taps in zip(self.found, self.frontier.taps, strict=True)]
         results = [e.result for e in self.found]
         yield 0.0
-        return (yield from joined(contours, results, self.frontier.charts, self.options.noise, known))
+        return (yield from joined(contours, results, self.frontier.charts, self.options.noise, earlier))
 
     def going_on(self, contacts: Sequence[Contact], farthest: float) -> Generator[Progress, object, None]:
         """Touches at contacts, and all over from there."""
@@ -257,14 +257,14 @@ class _Run:
         return met(vector_of(start), way, length) or met(aside, way, length)
 
     def atlas(
-        self, known: dict[int, tuple[int, Table]]
+        self, earlier: dict[int, tuple[int, Table]]
     ) -> Generator[float, None, tuple[Atlas, list[Contact]]]:
         """The atlas of what was found so far, and contacts where something is missing or less certain.
 
         These are where the joined surface ends though the object goes on, where a finger from outside meets
         something else, and where the surface is less certain than the tolerance.
         """
-        charts = yield from part_of(self.joining(known), 0.0, JOINED)
+        charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
         charts = yield from part_of(agreed(charts), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
         reference = yield from part_of(surfaced(patches, charts, self.tolerance), JOINED, 1.0)
@@ -335,9 +335,9 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
 
 def _joined(run: _Run) -> Steps:
     """The atlas of what was found, after more touches where something is missing or less certain."""
-    known: dict[int, tuple[int, Table]] = {}
+    earlier: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):
-        atlas, contacts = yield from run.showing(run.atlas(known))
+        atlas, contacts = yield from run.showing(run.atlas(earlier))
         before = len(run.found)
         if not again or run.is_stopped or not contacts:
             break
@@ -365,7 +365,7 @@ def explore_object(
         possible
     noise, rng : as in `explore`
     most : the largest number of touches
-    progress : called with the numbers of touches and of places known to be uncovered; what it returns stops
+    progress : called with the numbers of touches and of uncovered places; what it returns stops
         the touches if it is false, as False and 0 are, except None
 
     The surface only has to answer rays. Raises ValueError for bad arguments, for a tolerance below the noise,
@@ -373,11 +373,11 @@ def explore_object(
     """
     steps = touch_all_over(surface, point, outward, tolerance=tolerance, noise=noise, most=most, rng=rng)
     try:
-        state, told = next(steps), 0
+        state, shown = next(steps), 0
         while True:
             more = None
-            if progress and state.joining is None and state.done > told:
-                more, told = progress(state.done, state.uncovered), state.done
+            if progress and state.joining is None and state.done > shown:
+                more, shown = progress(state.done, state.uncovered), state.done
             state = steps.send(more)
     except StopIteration as end:
         atlas: Atlas = end.value

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The point where measured curves meet, if nobody has said where that is. Beside the paper."""
+"""The point where measured curves meet, if it is not given. Beside the paper."""
 
 import math
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ CONTACTS_AROUND = 4 * WINDOW  # This many contacts of a curve are looked at arou
 def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     """The point (3,) with the least sum of squared distances to two or more curves, and the distances (c,).
 
-    Curves that were measured one by one do not meet exactly: the distances tell by how much each misses the
+    Curves that were measured one by one do not meet exactly: the distances are by how much each misses the
     point. If curves meet twice, as sections of a body do, it is the better of the two points.
 
     Raises ValueError for bad arguments, DegenerateCurvesError for curves with fewer than four contacts,
@@ -122,7 +122,7 @@ def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, A
 
 
 def _near(point: Array, points: Array) -> Array:
-    """The contacts of a curve that tell how it passes the point, and some more, in their order."""
+    """The contacts of a curve that show how it passes the point, and some more, in their order."""
     if len(points) <= CONTACTS_AROUND:
         return points
     return points[

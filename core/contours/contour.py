@@ -19,7 +19,7 @@ from ..arguments import (
     unit_vector,
 )
 
-# Coordinates that are rounded by more than this share of a curve's size say nothing about curvature.
+# Coordinates that are rounded by more than this share of a curve's size do not show curvature.
 CURVE_ROUNDING = 0.01
 EXTENT, NO_CONTACT, CREASE, NOT_MONGE = "extent", "no contact", "crease", "Monge assumption lost"
 UNEXPLAINED = "fit no longer matched"
@@ -41,7 +41,7 @@ class SamplingPlane:
 
     Both angles are in radians. Other planes are equal if both are.
 
-    direction : the tangent in the world, which does not depend on where azimuths begin, if it is known
+    direction : the tangent in the world, which does not depend on where azimuths begin; None if not given
     """
 
     azimuth: float

@@ -124,7 +124,7 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     """r = r0 + r1 s + r2 s^2 for the curves of b touches, with s along the tangent, and the deviation of r0.
 
     The rows r0, r1 and r2 are fitted to the nearest contacts, (b, c, 3, 3); deviations are (b, c). All are 0
-    for curves with too few contacts to tell.
+    for curves with too few contacts.
     """
     shape = curves.present.shape
     present = curves.present.reshape(-1, shape[-1])
@@ -136,10 +136,10 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     r *= near[..., None]
     s = (r @ curves.tangents.reshape(-1, 3, 1))[..., 0]
     count, longest = near.sum(axis=1), np.abs(s).max(axis=1)
-    told = (count > LEAST_CONTACTS) & (longest > 0.0)
-    scale = np.where(told, longest, 1.0)[:, None]
+    determined = (count > LEAST_CONTACTS) & (longest > 0.0)
+    scale = np.where(determined, longest, 1.0)[:, None]
     basis = np.empty((3, *s.shape))
-    basis[0], s = near & told[:, None], s / scale
+    basis[0], s = near & determined[:, None], s / scale
     np.multiply(basis[0], s, out=basis[1])
     np.multiply(basis[1], s, out=basis[2])
     turned = basis.transpose(1, 0, 2)
@@ -147,16 +147,16 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     solution = inverse @ (turned @ r)
     off = r - basis.transpose(1, 2, 0) @ solution
     variance = np.einsum("cni,cni->c", off, off) / np.maximum(count - 3, 1)
-    stds = np.where(told, np.sqrt(variance * inverse[:, 0, 0]), 0.0)
+    stds = np.where(determined, np.sqrt(variance * inverse[:, 0, 0]), 0.0)
     solution /= (scale ** np.arange(3))[..., None]
-    solution *= told[:, None, None]
+    solution *= determined[:, None, None]
     return solution.reshape(*shape[:-1], 3, 3), stds.reshape(shape[:-1])
 
 
 def misses(curves: Curves) -> Array:
     """The distances at which the curves of b touches pass the reference points, and their deviations.
 
-    They are (b, c, 2), the length of r0 across the tangent first; 0 for curves with too few contacts to tell.
+    They are (b, c, 2), the length of r0 across the tangent first; 0 for curves with too few contacts.
     """
     local, stds = local_curves(curves)
     foot = local[..., 0, :]
@@ -171,7 +171,7 @@ def misses(curves: Curves) -> Array:
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:
     """t and r'' of r = t s + r'' s^2 / 2 by least squares, (c, 3) each, from (c, k) and (c, k, 3).
 
-    If all s are the same, the two cannot be told apart, and it is the shortest solution.
+    If all s are the same, the two cannot be separated, and it is the shortest solution.
     """
     powers = np.empty((len(s), 2, s.shape[1]))
     powers[:, 0] = s

@@ -51,7 +51,8 @@ def first_contact(
             side = math.copysign(1.0, dot(up, n))
             return found, scaled(up, side), side
     raise ValueError(
-        f"point: expected one on the surface, got one with no surface within {reach:g} along the normal"
+        f"point: expected one on the surface, got one with no surface within {reach:.3g} along the normal: "
+        "move it onto the surface, or away from a corner"
     )
 
 

@@ -20,7 +20,7 @@ UMBILIC = 1e-9  # Curvatures that differ by less, in unit radius, count as the s
 
 
 class DegenerateCurvesError(ValueError):
-    """The contours cannot carry the method; the message says what to move."""
+    """The contours cannot carry the method; the message names what to move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ def darboux_frames(curves: Curves, n: Array) -> tuple[Array, Array, Array, Array
 def degeneracy(
     contours: Sequence[Contour], present: NDArray[np.bool_], tangents: Array, normal: Array
 ) -> DegenerateCurvesError | None:
-    """The error that says why one touch of Curves carries no frame, and what to move; or None."""
+    """The error why one touch of Curves carries no frame, with what to move; or None."""
     for i, (contour, count) in enumerate(zip(contours, present.sum(axis=1), strict=False), 1):
         if count < LEAST_CONTACTS:
             ends = dict.fromkeys(WHERE.get(stop, stop) for stop in contour.stops or ())

@@ -3,8 +3,8 @@
 """Contours of very many contacts as fewer, each the mean of neighbors along the curve.
 
 The fit takes the places of contacts in the tangent plane for exact. Noise in all directions also scatters
-contacts sideways, off their sampling plane, and many of them would then seem to tell the shape beside it. The
-mean of k neighbors has a kth of their variance, and tells as much of the heights.
+contacts sideways, off their sampling plane, and many of them would then seem to show the shape next to it.
+The mean of k neighbors has a kth of their variance, and determines heights as well.
 """
 
 import math

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a surface is from a patch all over it, even without vertices, and what that says of the patch."""
+"""How far a surface is from a patch all over it, even without vertices, and the patch's verdict from that."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from ..contours.finger import Surface, contact_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING
 
-# benchmarks.refusals counts the patches that are off and do not say so.
+# benchmarks.refusals counts the patches that are off, but ok.
 MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh,
 HAIR = 1e-4  # and rays go on this share of their reach beyond each.
 

@@ -44,7 +44,7 @@ class Exploration:
 
 
 class Ask(NamedTuple):
-    """Contours to be fitted: with the options that the caller asked for or, while `growing`, the defaults."""
+    """Contours to be fitted: with the caller's options or, while `growing`, the defaults."""
 
     contours: list[Contour]
     growing: bool = False

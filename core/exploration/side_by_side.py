@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many touches side by side that choose their size, in steps; the fits that they ask for come in stacks."""
+"""Many touches side by side that choose their size, in steps; their fits come in stacks."""
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ from .one_touch import Answer, Ask, Exploration, Steps, Touch
 from .options import ExplorationOptions
 from .taps import tapped
 
-GLANCE_CONTACTS = 8  # A half curve has this many contacts where it is only asked whether it ends.
+GLANCE_CONTACTS = 8  # A half curve has this many contacts where it only has to show whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
 # Touches with a given deviation, as those of a whole object, end where normals are not ALIKE from one
 # contact to the next; all others go on whatever the cosine between these.
@@ -103,10 +103,10 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
     found: dict[int, Exploration | ValueError] = {}
     answers: dict[int, Answer | None] = dict.fromkeys(range(len(steps)))
     while answers:
-        asked: dict[int, Ask] = {}
+        requests: dict[int, Ask] = {}
         for i, answer in answers.items():
             try:
-                asked[i] = steps[i].send(answer)  # type: ignore[arg-type]
+                requests[i] = steps[i].send(answer)  # type: ignore[arg-type]
             except StopIteration as end:
                 found[i] = end.value
             except ValueError as error:
@@ -114,9 +114,9 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
             yield
         answers = {}
         for growing in (True, False):
-            which = [i for i, ask in asked.items() if ask.growing is growing]
+            which = [i for i, ask in requests.items() if ask.growing is growing]
             options = replace(fit, method="bayes") if growing else fit
-            touches = [Given(asked[i].contours, *gathered(())) for i in which]
+            touches = [Given(requests[i].contours, *gathered(())) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)
                 answers.update(zip(which, _with_stds(results), strict=True))

@@ -40,7 +40,7 @@ def places(domain: Domain) -> Array:
 def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     """Taps along the fit's normal, from as high above it as its deviation and the noise explain.
 
-    The taps have no noise: it would not change what they say.
+    The taps have no noise: it would not change the verdict.
     """
     where = places(r.domain)
     noise = max((contour.noise or 0.0 for contour in r.contours), default=0.0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A touch that chooses its own size: curves as long as a patch can be trusted, contacts as many as tell.
+"""A touch that chooses its own size: curves as long as a patch can be trusted, as many contacts as help.
 
 Beside the paper. Half curves grow outward from the reference point like the regions of a segmentation
 by surface fitting: fit, go on where the fit explains the contacts, fit again (growth.py).
@@ -48,14 +48,14 @@ def explore(
     largest_std : mean deviation of the height up to which half curves grow, and up to which they count as
       explained; they also end where the surface bends by 40 degrees. None for shares of the radius.
       Then, if the extent is "auto", the finger also taps between the curves (taps.py): where the surface is
-      not that of the fit, they become shorter, or it says so
-    tolerance : mean deviation of the height to reach: until then the plane that tells most is added, up to
+      not that of the fit, they become shorter, or it is in doubt
+    tolerance : mean deviation of the height to reach: until then the plane that helps most is added, up to
         `most_planes`, as long as one takes a tenth off. None adds no planes
     extent : length of each half curve, as in `track`; with "auto" each grows until the default fit no
         longer explains its contacts by their noise, or the patch could no longer be trusted
     step : as in `track`; "auto" chooses the number of contacts such that twice as many would not lower the
         deviation of the height noticeably
-    noise, rng, tangent : as in `track`; the contours tell the fit of the noise
+    noise, rng, tangent : as in `track`; the contours pass the noise on to the fit
     method, degree, weight, solver : as in `reconstruct`
 
     If a contour was not followed any farther, its `stops` are UNEXPLAINED. Raises what `track` and

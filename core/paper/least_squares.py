@@ -46,20 +46,20 @@ def least_squares(data: Problem) -> Array:
 
 def quadratic_variation(data: Problem, domain: Domain, weight: float) -> Array:
     """The minimum of the integral of z_xx^2 + 2 z_xy^2 + z_yy^2 plus lambda f(a) (V), a linear solve."""
-    bends, known, h = on_grid(data, domain, [(2, 0), (1, 1), (0, 2)])
+    bends, quadric_bends, h = on_grid(data, domain, [(2, 0), (1, 1), (0, 2)])
     factors = h * np.sqrt([1.0, 2.0, 1.0])
     share = np.sqrt(weight / len(data.basis))
     rows = [share * data.basis, *(f * bend.T for f, bend in zip(factors, bends, strict=True))]
-    wanted = np.concatenate([share * data.remainder, (-factors[:, None] * known).ravel()])
-    return np.linalg.lstsq(np.vstack(rows), wanted, rcond=None)[0]
+    target = np.concatenate([share * data.remainder, (-factors[:, None] * quadric_bends).ravel()])
+    return np.linalg.lstsq(np.vstack(rows), target, rcond=None)[0]
 
 
 def on_grid(data: Problem, domain: Domain, orders: list[tuple[int, int]]) -> tuple[Array, Array, float]:
     """k derivatives of the terms, (k, terms, m), and the quadric, (k, m), on the m points of (8); and h."""
     points, h = domain.grid(GRID)
     terms = derived_monomials(points[:, 0], points[:, 1], exponents(2, data.degree), orders)
-    known = 0.5 * (data.quadric.k1 * terms[:, 0] + data.quadric.k2 * terms[:, 2])
-    return terms[:, 3:], known, h
+    quadric_bends = 0.5 * (data.quadric.k1 * terms[:, 0] + data.quadric.k2 * terms[:, 2])
+    return terms[:, 3:], quadric_bends, h
 
 
 def tagc_start(data: Problem, half_curves: Sequence[Array]) -> Array:

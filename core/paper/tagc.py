@@ -42,7 +42,7 @@ class Objective:
 
     def __init__(self, data: Problem, domain: Domain, weight: float) -> None:
         orders = [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
-        basis, self._known, h = on_grid(data, domain, orders)
+        basis, self._quadric_bends, h = on_grid(data, domain, orders)
         self._basis, self._area, self._data = basis, h**2, data
         self._flat = np.concatenate(list(basis), axis=1)  # (terms, 5 m)
         self._scale = weight / len(data.basis)
@@ -53,7 +53,7 @@ class Objective:
 
     def fields(self, a: Array) -> _Fields:
         """The surface at coefficients (terms,), from which all else is computed."""
-        z = (a @ self._flat).reshape(5, -1) + self._known
+        z = (a @ self._flat).reshape(5, -1) + self._quadric_bends
         (zx, zy), (zxx, zxy, zyy) = z[:2], z[2:]
         w = 1.0 + zx * zx + zy * zy
         miss = self._data.basis @ a - self._data.remainder

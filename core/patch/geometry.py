@@ -106,7 +106,7 @@ def overlapped(geometry: Geometry, vertices: ArrayLike, normals: ArrayLike) -> N
     """The indices (m,) of those world vertices (n, 3) that lie over the domain; normals are (n, 3).
 
     A closed object has another side over the same domain. So a vertex counts only if its normal points to the
-    side of the patch's normal, and it is within the radius of the tangent plane. `reachable` tells whether
+    side of the patch's normal, and it is within the radius of the tangent plane. `reachable` has whether
     another layer of the object hides it from a finger.
     """
     local, radius = geometry.frame.to_local(vertices), geometry.radius

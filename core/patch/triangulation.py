@@ -4,7 +4,7 @@
 
 A flat triangle is off a surface with second derivatives H by |e' H e| / 8 at the middle of an edge e, and by
 a third more inside it on a bowl. So the distance of neighbors that is wanted falls with the curvature. The
-boundary is followed by short edges, which ask for more points near themselves, and only there. Rows of the
+boundary is followed by short edges, which need more points near themselves, and only there. Rows of the
 lattices are parallel to x and have a point at the origin, so they are symmetric about both axes, as patches
 are.
 """
@@ -92,7 +92,7 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
 
 
 def _lattice(domain: Domain, size: Size, rim: Array, finest: float) -> Array:
-    """Points (n, 2) inside and clear of the rim, from the origin outward, as dense as size and rim ask."""
+    """Points (n, 2) inside and clear of the rim, from the origin outward, as dense as size and rim need."""
     from scipy.spatial import cKDTree
 
     edge = float(np.mean(np.hypot(*(rim - np.roll(rim, 1, 0)).T)))

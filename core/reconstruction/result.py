@@ -295,7 +295,7 @@ class Reconstruction:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
-        return contradicted(self.taps) or doubt(self) or ("ok", "The patch describes its contacts.")
+        return contradicted(self) or doubt(self) or ("ok", "The patch describes its contacts.")
 
     @cached_property
     def curve_contradiction(self) -> tuple[float, float]:

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..bayes.posterior import CONFIDENCE, terms_to
+from ..contours.contour import OPEN_STOPS
+from ..patch.domain import AT_POINT
 
 # benchmarks.stability chose these, and benchmarks.real LIKELY and what taps say. A fit is in doubt beyond
 # them.
@@ -64,8 +66,9 @@ def doubt(r: Judged) -> tuple[str, str] | None:
     return None if message is None else ("uncertain", message)
 
 
-def contradicted(taps: Taps | None) -> tuple[str, str] | None:
+def contradicted(r: Judged) -> tuple[str, str] | None:
     """The status and a sentence of advice if taps contradict a fit, or None."""
+    taps: Taps | None = r.taps
     if taps is None:
         return None
     if taps.off:
@@ -75,11 +78,26 @@ def contradicted(taps: Taps | None) -> tuple[str, str] | None:
             "sampling planes."
         )
     if taps.missed > DOUBTFUL_GAP * taps.number:
+        if _is_at_edge(r):
+            return "uncertain", (
+                "The point is so near an edge that taps beside it feel no surface: move the point away "
+                "from that edge."
+            )
         return "uncertain", (
             "Between the curves the surface ends, or has a hole that no curve crosses: use a shorter "
             "extent or add sampling planes."
         )
     return None
+
+
+def _is_at_edge(r: Judged) -> bool:
+    """Whether the surface ends at the point, as a half curve shows."""
+    for contour in r.contours:
+        reaches = np.linalg.norm(contour.points[[0, -1]] - r.frame.origin, axis=1) / r.radius
+        for reach, stop in zip(reaches, contour.stops or (), strict=False):
+            if reach <= AT_POINT and stop in OPEN_STOPS:
+                return True
+    return False
 
 
 def notes(r: Judged) -> str:

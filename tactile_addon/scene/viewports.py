@@ -1,12 +1,16 @@
 # SPDX-FileCopyrightText: 2026 Tactile Patch contributors
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether viewports show the colors of vertices, how to make them do so, and whether anything is dragged."""
+"""Whether viewports show vertices' colors and objects of a size, how to make them, and whether one drags."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import bpy
 
+NEAREST, FARTHEST = 0.02, 20.0  # An object is shown from so many of its sizes away.
+# If a view is clipped nearer than at this share of the size, which Blender itself does not do below 1 cm, its
+# depths are so coarse that a patch and its contours run through each other.
+COARSE, OWN = 5e-4, 0.01
 GESTURES = ("TRANSFORM_OT_", "TACTILE_OT_")
 
 
@@ -36,3 +40,14 @@ def show_colors(chosen: Any = None) -> None:
             shading.color_type = "VERTEX"
     if chosen is not None and chosen.type == "VIEW_3D":
         chosen.shading.color_type = "VERTEX"
+
+
+def show_size(size: float) -> None:
+    """Makes all viewports show an object of this size from near by and from afar, if they do not yet."""
+    if not size > 0.0:
+        return
+    areas = (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    for area in areas:
+        space: Any = area.spaces.active
+        space.clip_start = min(max(space.clip_start, min(COARSE * size, OWN)), NEAREST * size)
+        space.clip_end = max(space.clip_end, FARTHEST * size)

@@ -47,6 +47,7 @@ TIPS = {
     "Rims Left": "Number of places from which touches could go on",
     "Tolerance": "Standard deviation to reach for the height of each patch",
     "Off the Mesh": "Mean distance of the surface from the mesh and of the mesh from the surface",
+    "Edge Length": "Typical length of the surface's edges, at most about a quarter of the thinnest wall",
     "Vertices": "Number of vertices of the surface",
     "Points": "Number of points of the mesh that were touched",
     "Spacing": "Distance between the points that were touched",

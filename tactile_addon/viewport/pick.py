@@ -16,7 +16,7 @@ from ..probes.operators import (
     target_object,
 )
 from ..scene import patch_record
-from ..scene.viewports import show_colors
+from ..scene.viewports import show_colors, show_size
 from ..stability_map.map_object import inputs_of, touched_near
 from ..touch import units
 from ..touch.settings import (
@@ -79,6 +79,9 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         if context.area is None or context.area.type != "VIEW_3D":
             self.report({"ERROR"}, "Points are picked in a 3D viewport: start the pick there")
             return {"CANCELLED"}
+        active = context.view_layer.objects.active
+        if active is not None and active.type == "MESH":
+            show_size(max(active.dimensions[:]))
         self._area, self._unread = context.area, large_meshes(context)
         for name in NAMES:  # Blender remembers those of the last pick, which suited another object.
             self.properties.property_unset(name)
@@ -164,6 +167,7 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         settings.is_probe = True
         make_active(context, found)
         show_colors(context.space_data)
+        show_size(touched.surface.size)
         report = probe.record_of(found)
         unit = units.unit_of(context.scene, report["radius"])
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, verdict(report, unit))

@@ -70,7 +70,9 @@ class TACTILE_OT_touch_all_over(InSlices, bpy.types.Operator):
         soft_max=10_000,
     )
     edge: length_property(
-        "Edge Length", "Length of the edges of the surface's triangles; 0 chooses it by the curvature"
+        "Edge Length",
+        "Length of the edges of the surface's triangles, at most about a quarter of the thinnest wall; 0 "
+        "chooses it by the curvature",
     )
 
     stop = "Stop Touching and Keep"

@@ -43,7 +43,10 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
         ("distance from the mesh", off and f"mean {off}; largest {_off(record, 'max')}"),
         ("largest distance at", _place(record)),
-        ("surface's mesh", f"{record['vertices']} vertices, {record['triangles']} triangles"),
+        (
+            "surface's mesh",
+            f"{record['vertices']} vertices, {record['triangles']} triangles, edges {_edge(record)}",
+        ),
         ("curvatures", _unknown(record)),
     )
 
@@ -81,6 +84,7 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
         ("Off the Mesh", _off(record, "mean")),
         ("Patches", record["patches"]),
+        ("Edge Length", _edge(record)),
         ("Vertices", record["vertices"]),
         ("… without K", record.get("unknown_curvatures") or None),
     )
@@ -107,6 +111,10 @@ def _surface(record: Mapping[str, Any]) -> str:
 def _ends(record: Mapping[str, Any]) -> str:
     """In a word, whether the surface that is shown has no rim; never "Closed" where touches could go on."""
     return "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"
+
+
+def _edge(record: Mapping[str, Any]) -> str | None:
+    return units.say(record["edge"], 1, unit_of(record)) if "edge" in record else None
 
 
 def _unknown(record: Mapping[str, Any]) -> str | None:

@@ -224,32 +224,32 @@ class ObjectTouches:
             "seed": self.seed,
             "most": self.most,
         }
-        if found["uncovered"] and self._is_cut_short:
-            places = many(found["uncovered"], "place", "places")
-            found["message"] = f"Touching was stopped, and the object goes on at {places}: touch it again."
-        elif found["status"] == "ok":
-            found["status"], found["message"] = self._verdict(found)
-        return found
+        return found | dict(zip(("status", "message"), self._verdict(found), strict=True))
 
     def _verdict(self, found: Mapping[str, Any]) -> tuple[str, str]:
-        """The status and the message of a surface that its atlas says is ok."""
-        unit = unit_of(found)
-        if self.compared.largest > OFF_TOLERANCES * self.tolerance:
-            advice = "use a smaller tolerance"
-            if self.edge:
-                advice = "use a shorter edge length"
+        """The status and the message of what was found: those of its atlas, unless the mesh explains more."""
+        status, message, unit = found["status"], found["message"], unit_of(found)
+        if found["uncovered"]:
+            if self._is_cut_short:
+                places = many(found["uncovered"], "place", "places")
+                message = f"Touching was stopped, and the object goes on at {places}: touch it again."
+        elif self.compared.largest > OFF_TOLERANCES * self.tolerance:
+            off = f"The surface is up to {length(self.compared.largest, unit)} off the object"
+            if self.edge and status == "ok":
+                message = f"{off}, which the tolerance does not explain: use a shorter edge length."
             elif self.surface.has_rims():
-                advice += ", or close the holes of its mesh"
-            return "uncertain", (
-                f"The surface is up to {length(self.compared.largest, unit)} off the object, which the "
-                f"tolerance does not explain: {advice}."
-            )
-        if found["height_std"] > self.tolerance:
-            return "uncertain", (
+                advice = "close them, or use a smaller tolerance"
+                message = f"{off}, whose mesh has open edges, as around holes: {advice}."
+            elif status == "ok":
+                message = f"{off}, which the tolerance does not explain: use a smaller tolerance."
+            status = "uncertain"
+        elif status == "ok" and found["height_std"] > self.tolerance:
+            message = (
                 f"Heights are accurate to {length(found['height_std'], unit)} on average, and the tolerance "
                 f"is {length(self.tolerance, unit)}: use a larger tolerance."
             )
-        return found["status"], found["message"]
+            status = "uncertain"
+        return status, message
 
 
 def tolerance_of(size: float, accuracy: str, noise: float) -> float:

@@ -85,7 +85,9 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     bl_options = {"UNDO"}
 
     edge: length_property(
-        "Edge Length", "Length of the edges of the surface's triangles; 0 chooses it by the curvature"
+        "Edge Length",
+        "Length of the edges of the surface's triangles, at most about a quarter of the thinnest wall; 0 "
+        "chooses it by the curvature",
     )
 
     stop = "Keep It as It Was"

@@ -16,7 +16,7 @@ from ..scene import colors, patch_object, patch_record, undo
 from ..scene.attributes import COLOR, DEVIATION, HEIGHT_STD, NODE
 from ..scene.mesh_data import ABOVE, emission, fill, own_mesh
 from ..scene.shown import recolor
-from ..scene.viewports import show_colors
+from ..scene.viewports import show_colors, show_size
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array, Object
 from .whole_surface import WholeSurface
@@ -44,6 +44,7 @@ class GrowingPatches:
         self._patches: list[tuple[Array, Array]] = []
         self._uid, self._above = obj.session_uid, DRAWN_ABOVE * surface.size
         show_colors()
+        show_size(surface.size)
 
     def add(self, found: Sequence[core.Reconstruction], rims: Sequence[Array]) -> None:
         """Shows these core.Reconstructions, too, up to their rims, unless somebody has deleted the object."""

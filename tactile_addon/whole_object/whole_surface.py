@@ -89,6 +89,7 @@ class WholeSurface:
             "is_closed": mesh.is_closed and not atlas.uncovered,
             "vertices": len(mesh.vertices),
             "triangles": len(mesh.triangles),
+            "edge": _edge(mesh),
             "unknown_curvatures": int(np.isinf(self.curvatures["mean_curvature_std"]).sum()),
             "height_std": float(mesh.std[np.isfinite(mesh.std)].mean()),  # It is inf where nothing was felt.
             "radius": float(np.median([r.radius for r in atlas.patches])),
@@ -99,6 +100,12 @@ class WholeSurface:
         if self.atlas.status == "ok" and _rims(self.mesh) > _rims(self.atlas.reference.mesh):
             return "uncertain", "Triangles of this edge length leave holes: use a shorter edge length."
         return self.atlas.status, self.atlas.message
+
+
+def _edge(mesh: core.Mesh) -> float:
+    """The typical length of a mesh's edges."""
+    ends = mesh.vertices[mesh.triangles]
+    return float(np.median(np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2)))
 
 
 def _rims(mesh: core.Mesh) -> int:

@@ -27,6 +27,7 @@ def test_another_edge_length_needs_no_touches(empty, surface):
     assert len(empty.data.objects) == objects
     record = surface["tactile_object"].to_dict()
     assert np.median(edges(surface.data)) == pytest.approx(0.2, rel=0.3)
+    assert record["edge"] == pytest.approx(np.median(edges(surface.data)), rel=0.02)
     assert record["vertices"] == len(surface.data.vertices) < 0.5 * before["vertices"]
     for name in ("touches", "tolerance", "source", "patches", "is_closed"):
         assert record[name] == before[name]
@@ -35,6 +36,17 @@ def test_another_edge_length_needs_no_touches(empty, surface):
     assert record["deviation_max"] >= np.abs(values(surface.data, "deviation")).max() * (1.0 - 1e-6) > 0.0
     assert empty.ops.tactile.mesh_again() == {"FINISHED"}
     assert surface["tactile_object"]["vertices"] == before["vertices"]
+
+
+def test_where_a_wall_is_thin_the_report_has_the_length_of_edges_that_were_made(empty, extension):
+    empty.ops.mesh.primitive_cube_add()
+    empty.context.object.scale.z = 0.05
+    surface, before = made(empty.ops.tactile.touch_all_over, "tactile_object")
+    assert empty.ops.tactile.mesh_again(edge=0.5) == {"FINISHED"}
+    record = surface["tactile_object"].to_dict()
+    assert record["edge"] == before["edge"] == pytest.approx(0.25 * 0.1, rel=0.1)
+    rows = dict(extension.tactile_addon.whole_object.object_report.object_rows(record))
+    assert rows["Edge Length"].endswith(" cm")
 
 
 def test_an_edge_length_that_does_not_suit_the_object_changes_nothing(empty, surface):

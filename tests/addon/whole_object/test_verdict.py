@@ -88,16 +88,17 @@ def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
     assert report["deviation_max"] == pytest.approx(0.5, abs=0.1)
     assert report["deviation_place"][2] > 1.4
     assert report["status"] == "uncertain"
-    told = "off the object, which the tolerance does not explain: use a smaller tolerance"
-    assert report["message"].endswith(f"{told}.")
+    told = "off the object, which the tolerance does not explain: use"
+    assert report["message"].endswith(f"{told} a smaller tolerance.")
     corners = [tuple(polygon.vertices) for polygon in ball.data.polygons[1:]]
     points = [tuple(vertex.co) for vertex in ball.data.vertices]
     ball.data.clear_geometry()
     ball.data.from_pydata(points, [], corners)
     touches.surface = touches_of(ball).surface
-    assert touches.report()["message"].endswith(f"{told}, or close the holes of its mesh.")
+    open_edges = "whose mesh has open edges, as around holes: close them, or use a smaller tolerance."
+    assert touches.report()["message"].endswith(open_edges)
     touches.edge = 0.5
-    assert touches.report()["message"].endswith("does not explain: use a shorter edge length.")
+    assert touches.report()["message"].endswith(f"{told} a shorter edge length.")
 
 
 def test_without_an_edge_length_the_mesh_is_that_of_the_distances(ball, touches_of):

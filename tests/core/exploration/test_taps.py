@@ -91,6 +91,17 @@ def test_a_hole_that_no_curve_crosses_leaves_the_touch_in_doubt():
     assert f" {r.taps.missed} of {r.taps.number} taps between the curves feel no surface." in r.message
 
 
+def test_a_point_on_an_edge_is_told_to_move_away():
+    half = Sector(None, nearest=0.0, azimuths=(0.0, 180.0))
+    r = explore(half).result
+    assert r.status == "uncertain"
+    assert r.message.startswith(
+        "The point is so near an edge that taps beside it feel no surface: move the point away from that "
+        "edge. "
+    )
+    assert explore(half, (0.0, -1.0, 0.0)).result.status == "ok"
+
+
 def test_a_touch_in_doubt_becomes_shorter_until_it_is_sure():
     found = explore(Sector(None, nearest=10.0, azimuths=(2.0, 58.0)))
     assert found.result.status == "ok"

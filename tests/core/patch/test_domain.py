@@ -163,10 +163,10 @@ def test_the_domain_ends_where_the_surface_does(distance, turn):
     assert domain.scaled(3.0).area == pytest.approx(9.0 * domain.area)
 
 
-def test_beside_no_brink_the_boundary_is_round():
+def test_next_to_no_open_end_the_boundary_is_round():
     ends, open_ends = cut(SIXTH, 0.3)
     domain, round_one = closed_spline_domain(ends, 1.0, open_ends), closed_spline_domain(ends, 1.0)
-    turns = np.radians(np.arange(120, 241))  # where no end is a brink
+    turns = np.radians(np.arange(120, 241))  # where no end is open
     places = np.column_stack([np.cos(turns), np.sin(turns)])
     radii = np.linalg.norm(domain.points_at(places), axis=1)
     assert radii == pytest.approx(1.0, abs=0.01)

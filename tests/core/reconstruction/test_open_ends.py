@@ -69,8 +69,8 @@ def test_strokes_beyond_an_edge_are_none_of_the_patch():
 
 
 @pytest.mark.parametrize("surface", [surfaces.sphere(25), surfaces.torus(40, 20, 0.6)], ids=["ball", "torus"])
-def test_a_surface_that_goes_on_has_no_brinks(surface):
-    """Long curves end where the surface turns away, which is no brink."""
+def test_a_surface_that_goes_on_has_no_open_ends(surface):
+    """Long curves end where the surface turns away, which is no end of it."""
     for extent in (8.0, 60.0):
         r = surface.fit(surface.track(surfaces.TILTED, extent=extent))
         assert r.domain.open_ends is None
