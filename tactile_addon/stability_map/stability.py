@@ -142,8 +142,8 @@ class StabilityMap:
         options = core.ExplorationOptions(
             self.planes,
             farthest=self._farthest,
-            extent=self.extent,
-            step=self.step,
+            extent=self.extent or None,
+            step=self.step or None,
             noise=self.noise,
             rng=self._rng,
             **self.fit,

@@ -8,17 +8,15 @@ import bpy
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[Any]
-Point: TypeAlias = (
-    Any  # A place, direction or normal: three numbers in a list, an array or a mathutils.Vector.
-)
+# A place, direction or normal: three numbers in a list, an array or a mathutils.Vector.
+Point: TypeAlias = Any
 Triple: TypeAlias = tuple[float, float, float]
 Outcome: TypeAlias = set[Any]  # What an operator returns, such as {"FINISHED"}.
 # A bpy.types.Object. The stubs know neither the custom properties of objects nor those that add-ons register,
 # and they let no object's data be taken for a mesh.
 Object: TypeAlias = Any
 
-# What operators and panels inherit besides these. Blender does not look for properties in a mixin that is
-# itself a subclass of its types, so only the type checker takes it for one.
+# The bases of what operators and panels inherit besides Blender's types, which only the type checker sees.
 if TYPE_CHECKING:
     OperatorMixin = bpy.types.Operator
     PanelMixin = bpy.types.Panel

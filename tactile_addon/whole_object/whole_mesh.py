@@ -36,7 +36,7 @@ class GrowingPatches:
         mesh = bpy.data.meshes.new(f"{surface.name} Touches")
         obj: Object = bpy.data.objects.new(mesh.name, mesh)
         # It is not drawn in front: patches on the far side would show through.
-        obj.matrix_world = Matrix.Translation(surface.origin.tolist())
+        obj.matrix_world = Matrix.Translation(list(surface.origin))
         scene.collection.objects.link(obj)  # A collection of its own might be left empty.
         with undo.after_step():  # There is an undo step when the operator ends.
             undo.note_added(obj)
@@ -100,7 +100,7 @@ def insert(scene: bpy.types.Scene, name: str, whole: WholeSurface, report: dict[
     """Adds a WholeSurface of the object with this name to the scene, and returns the new object."""
     mesh = bpy.data.meshes.new(f"{name} Surface")
     obj = bpy.data.objects.new(mesh.name, mesh)
-    obj.matrix_world, obj.show_in_front = Matrix.Translation(whole.origin.tolist()), True
+    obj.matrix_world, obj.show_in_front = Matrix.Translation(list(whole.origin)), True
     patch_object.collection(scene).objects.link(obj)
     mesh.materials.append(emission("Tactile Surface", attribute=COLOR))
     rewrite(obj, whole, report | {"source": name})
