@@ -100,7 +100,7 @@ def _surface(record):
     if record["is_closed"]:
         return "closed all round"
     if record.get("uncovered"):
-        return f"incomplete, with {many(record['uncovered'], 'place', 'places')} from which it could go on"
+        return f"open, with {many(record['uncovered'], 'place', 'places')} to go on from"
     return "open where nothing was felt"
 
 
