@@ -104,7 +104,7 @@ def _surface(record: Mapping[str, Any]) -> str:
     if record["is_closed"]:
         return "closed all round"
     if record.get("uncovered"):
-        return f"incomplete, with {many(record['uncovered'], 'place', 'places')} from which it could go on"
+        return f"open, with {many(record['uncovered'], 'place', 'places')} to go on from"
     return "open where nothing was felt"
 
 

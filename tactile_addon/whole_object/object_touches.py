@@ -242,6 +242,8 @@ class ObjectTouches:
                 message = f"{off}, whose mesh has open edges, as around holes: {advice}."
             elif status == "ok":
                 message = f"{off}, which the tolerance does not explain: use a smaller tolerance."
+            else:
+                message = f"{off}. {message}"
             status = "uncertain"
         elif status == "ok" and found["height_std"] > self.tolerance:
             message = (

@@ -137,8 +137,37 @@ def map_and_views():
     picture("quad")
 
 
+def cubes():
+    """A point on the edge of a cube, and a cube of a millimeter, which the view clips until it is touched."""
+    cube = only(bpy.ops.mesh.primitive_cube_add)
+    look((0, 0, 0), (1, -1, 0.6), 5)
+    yield from pick(cube, (1.0, -1.0, 0.2))
+    said = patch()["tactile"]["message"]
+    check("a point on an edge is told to move away", "move the point away from that edge" in said, said)
+    picture("cube_edge")
+    cube = only(bpy.ops.mesh.primitive_cube_add, size=1e-3)
+    look((0, 0, 0), (0.5, -1, 0.6), 2.5e-3)
+    yield 1
+    picture("millimeter_clipped")
+    window, area, region = gui.find()
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.tactile.pick("INVOKE_DEFAULT", True, new=True)
+    yield 1
+    gui.click(*(round(v) for v in gui.view_point((1e-4, -5e-4, 1e-4))))
+    yield 1
+    yield from until(lambda: probe() is not None and is_complete())
+    gui.xdo("mousemove", *ASIDE)
+    yield 1
+    check(
+        "a cube of a millimeter is seen", area.spaces.active.clip_start < 1e-4, area.spaces.active.clip_start
+    )
+    check("... and touched", abs(extent(probe()) - 5e-4) < 2e-4, extent(probe()))
+    picture("millimeter")
+
+
 def steps():
     yield from open_tab()
+    yield from cubes()
     yield from facets()
     yield from forehead()
     yield from map_and_views()

@@ -218,6 +218,7 @@ def by_escape():
             picture("whole_part")
             record = surfaces()[0]["tactile_object"].to_dict()
             check("... which is open", not record["is_closed"], record)
+            check("... and says why", record["message"].startswith("Touching was stopped"), record["message"])
             gui.xdo("mousemove", *ASIDE, "sleep", 0.2, "key", "ctrl+z")
             yield 1
         check(f"{times} Esc: nothing else is left", data_blocks() == before, data_blocks())

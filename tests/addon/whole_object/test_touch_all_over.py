@@ -125,7 +125,8 @@ def test_a_budget_ends_it_with_what_there_is(empty, ball, extension):
     report = extension.tactile_addon.whole_object.object_report
     assert report.object_verdict(record).startswith("Incomplete. The patches end at ")
     assert "allow more touches" in record["message"]
-    assert report.object_summary(record).startswith("Incomplete: 3 touches; ")
+    places = f"open, with {record['uncovered']} places to go on from"
+    assert report.object_summary(record).startswith(f"Incomplete: 3 touches; {places}; ")
 
 
 def faces_of(bpy, vertices, faces):

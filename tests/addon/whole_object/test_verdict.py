@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is said of a whole object is true of the mesh that is shown, and of the mesh that was touched."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -90,6 +91,10 @@ def test_what_touches_bridge_is_told(empty, extension, ball, touches_of):
     assert report["status"] == "uncertain"
     told = "off the object, which the tolerance does not explain: use"
     assert report["message"].endswith(f"{told} a smaller tolerance.")
+    atlas = touches.whole.atlas
+    touches.whole.atlas = replace(atlas, tolerance=1e-5)
+    assert touches.report()["message"].endswith(f"off the object. {touches.whole.atlas.message}")
+    touches.whole.atlas = atlas
     corners = [tuple(polygon.vertices) for polygon in ball.data.polygons[1:]]
     points = [tuple(vertex.co) for vertex in ball.data.vertices]
     ball.data.clear_geometry()
