@@ -13,6 +13,9 @@ three ways: all of them as strokes; three curves of some 50 contacts each that a
 curves together with the strokes. The held-out contacts over the domain tell the error, and whether an
 interval of deviation and scatter holds them. The scatter is that of the contacts given to a method about its
 surface.
+
+The last table compares moving centers along the force with `ball=3.15`, which moves them along the normals of
+the fit to the centers. The held-out centers judge both: they should be 3.15 mm away from the surface.
 """
 
 import argparse
@@ -27,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from core import Contour, reconstruct
+from core import Contour, distances, reconstruct
 from core.reconstruction.strokes import means
 
 from . import machine, table, timed
@@ -48,6 +51,7 @@ class Place(NamedTuple):
     outward: np.ndarray
     given: np.ndarray  # (n, 3)
     held_out: np.ndarray  # (m, 3)
+    centers: tuple[np.ndarray, np.ndarray]  # of the ball at both
 
 
 class Score(NamedTuple):
@@ -83,8 +87,10 @@ def places(contacts, directions, count, radius):
         held_out = rng.integers(SHARE, size=blocks[-1] + 1)[blocks] == 0
         near = np.linalg.norm(contacts - contacts[i], axis=1) < radius
         outward = directions[near].mean(axis=0)
-        if np.count_nonzero(near & ~held_out) >= FEWEST:
-            yield Place(contacts[i], outward, contacts[near & ~held_out], contacts[near & held_out])
+        some = near & ~held_out, near & held_out
+        if np.count_nonzero(some[0]) >= FEWEST:
+            centers = tuple(contacts[which] + BALL * directions[which] for which in some)
+            yield Place(contacts[i], outward, *(contacts[which] for which in some), centers)
 
 
 def curves(r, given):
@@ -197,6 +203,29 @@ def scores_at(place, radius):
     return scores
 
 
+def ball_scores(place, radius):
+    """{way: (mean distance of held-out centers from where they should be in mm, seconds)}, or None."""
+    at_center = place.place + BALL * place.outward / np.linalg.norm(place.outward)
+    ways = {
+        "along the force": (place.place, place.given),
+        "along the normals, ball=3.15": (at_center, Contour(place.centers[0], ball=BALL)),
+    }
+    found = {}
+    for way, (point, given) in ways.items():
+        options = {"outward": place.outward, "strokes": [given], "radius": radius}
+        try:
+            seconds, r = timed(reconstruct, point, [], **options)
+        except ValueError:
+            return None
+        centers = r.frame.to_local(place.centers[1])
+        centers = centers[r.domain.contains(*centers[:, :2].T) & (np.abs(centers[:, 2]) <= r.radius)]
+        if len(centers) < FEWEST // SHARE:
+            return None
+        away = r.radius * distances(r.geometry.surface, centers / r.radius)
+        found[way] = np.abs(away - BALL).mean(), seconds
+    return found
+
+
 def best(scores, prefix):
     """The method with the least mean error over all places, of those whose names begin with `prefix`."""
     names = {name for of in scores for name in of if name.startswith(prefix)}
@@ -219,9 +248,10 @@ def main():
     parser.add_argument("--points", type=int, default=20, help="of each exploration (%(default)s)")
     parser.add_argument("--radius", type=float, default=8.0, help="of a patch, in mm (%(default)s)")
     options = parser.parse_args()
-    scores = defaultdict(list)
+    scores, balls = defaultdict(list), []
     for name, contacts, directions in explorations(options.folder):
         for place in places(contacts, directions, options.points, options.radius):
+            balls.append(ball_scores(place, options.radius))
             found = scores_at(place, options.radius)
             if found is not None:
                 scores[name].append(found)
@@ -241,6 +271,14 @@ def main():
         least = min(peers, key=errors.__getitem__)
         rows.append([name, str(len(found)), f"{errors[ALL]:.3f}", f"{errors[least]:.3f}", least])
     table(["exploration", "places", "strokes alone, mm", "best peer, mm", "which"], rows)
+    balls = [found for found in balls if found is not None]
+    head = ["centers are moved", "places", "mean error, mm", "median", "ms"]
+    rows = []
+    for way in balls[0]:
+        errors, seconds = np.array([found[way] for found in balls]).T
+        errors = [f"{error:.3f}" for error in (errors.mean(), np.median(errors))]
+        rows.append([way, str(len(balls)), *errors, f"{1e3 * median(seconds):.1f}"])
+    table(head, rows)
     print(f"Radius {options.radius:g} mm; {machine('numpy', 'scipy', 'scikit-learn')}.")
 
 

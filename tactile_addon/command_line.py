@@ -25,6 +25,7 @@ NOT_OF_ALL = (
     "tilts",
 )
 SURFACE = "save the scene with the surface as .blend, or the surface alone as .ply"
+UNCERTAIN = 3  # The exit code of `join` for a surface that is not closed or in doubt.
 VECTOR: dict[str, Any] = {"type": float, "nargs": 3, "metavar": ("X", "Y", "Z")}
 
 
@@ -35,7 +36,8 @@ def main(args: Sequence[str]) -> int:
     parser = _parser()
     options = parser.parse_args([f" {a}" if _is_number(a) else a for a in args])
     try:
-        write(run(options), options)
+        report = run(options)
+        write(report, options)
     except Misuse as error:
         parser.error(str(error))
     except (RuntimeError, OSError, ValueError) as error:
@@ -44,7 +46,7 @@ def main(args: Sequence[str]) -> int:
     except MemoryError:
         print("tactile: there is not enough memory for this: use a smaller file", file=sys.stderr)
         return 1
-    return 0
+    return UNCERTAIN if options.command == "join" and report["status"] != "ok" else 0
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -37,6 +37,7 @@ WITHIN_90 = 1.645  # This many deviations are a 90 % interval.
 WIDENINGS = 4  # Deviations grow this often until 90 % of the check's contacts are within.
 AT_ONCE = 3000  # Distances are found for this many places at once,
 CURVED_AT_ONCE = 1000  # and curvatures at this many.
+APART = 0.3  # The next touch is this many radii from those that failed.
 TURNS, STEPS = (0.0, 60.0, 120.0), 12  # The planes of the next touch, and the steps of a half curve.
 GRAPH_VERSION = 2  # The version of the graph as plain values.
 
@@ -299,13 +300,18 @@ class Atlas:
             return "ok", "The surface is closed, and all contacts agree with it."
         return "ok", "The object was felt everywhere a finger could reach."
 
-    def next_touch(self) -> NextTouch | None:
-        """Where the next touch would bring most, or None if all is covered to the tolerance."""
-        if self.uncovered:
-            place = max(self.uncovered, key=lambda place: place.area or place.radius)
-            area = place.area or np.pi * place.radius**2
-            return _touch_at(np.array(place.point), np.array(place.normal), place.ahead, place.radius, area)
-        if not self.is_rough:
+    def next_touch(self, failed: ArrayLike = ()) -> NextTouch | None:
+        """Where the next touch would bring most, or None if all is covered to the tolerance.
+
+        failed : (k, 3), points of touches that did not reach the object; the next one is elsewhere, or None
+        """
+        tried = finite_array("failed", failed, (None, 3), LARGEST) if np.size(failed) else np.empty((0, 3))
+        for place in sorted(self.uncovered, key=lambda place: -(place.area or place.radius)):
+            point, away = np.array(place.point), APART * place.radius
+            if (np.linalg.norm(tried - point, axis=1) > away).all():
+                area = place.area or np.pi * place.radius**2
+                return _touch_at(point, np.array(place.normal), place.ahead, place.radius, area)
+        if self.uncovered or not self.is_rough:
             return None
         vertex, mesh = self._rough[1], self.reference.mesh
         patch = self.patches[mesh.patch[vertex]]

@@ -27,16 +27,20 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[Place, .
     if unfelt is None or not reference.is_open.any():
         return tuple(found)
     rim, patch = mesh.vertices[reference.is_open], mesh.patch[reference.is_open]
-    patched = np.flatnonzero(mesh.patch >= 0)
-    missing = patch < 0
-    patch[missing] = mesh.patch[patched[cKDTree(mesh.vertices[patched]).query(rim[missing])[1]]]
+    patched, missing = np.flatnonzero(mesh.patch >= 0), patch < 0
+    if missing.any():
+        nearest = cKDTree(charts.origins if not len(patched) else mesh.vertices[patched]).query(rim[missing])[
+            1
+        ]
+        patch[missing] = mesh.patch[patched[nearest]] if len(patched) else nearest
+    ups = mesh.normals[reference.is_open]
     radii, areas = charts.radii[patch], _areas(unfelt)
     around = cKDTree(unfelt.vertices).query_ball_point(rim, radii)
     gains = np.minimum([areas[some].sum() for some in around], np.pi * radii**2)
     left = np.arange(len(rim))
     while len(left):
         best = left[np.argmax(gains[left])]
-        point, up = rim[best], charts.axes[patch[best], :, 2]
+        point, up = rim[best], ups[best]
         ahead = point - charts.origins[patch[best]]
         ahead = ahead / max(float(np.linalg.norm(ahead)), np.finfo(float).tiny)
         if not ahead.any() or abs(ahead @ up) > STEEP:

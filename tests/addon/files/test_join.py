@@ -147,7 +147,7 @@ def test_the_shell_joins_them_too(command, two_halves, tmp_path):
     outputs = [word for pair in zip(("--json", "--output", "--report"), paths, strict=True) for word in pair]
     given = [*two_halves, "--outward", 0, 0, 1, "--tolerance", 4e-3]
     code, out, _ = command("join", *given, *outputs)
-    assert code == 0
+    assert code == 3  # There is a surface, and it is open.
     rows = {line[:32].strip(): line[32:].strip() for line in out.splitlines()}
     assert rows["measured"] == "half0.csv and 1 more, 1020 contacts"
     report = json.loads(paths[0].read_text())
@@ -159,6 +159,12 @@ def test_the_shell_joins_them_too(command, two_halves, tmp_path):
     code, _, err = command("join", *two_halves)
     assert code == 1
     assert "outward: expected a direction" in err.lower()
+
+
+def test_the_shell_has_no_doubt_about_a_closed_surface(command, three_files):
+    code, out, _ = command("join", *three_files, "--tolerance", 0.02)
+    assert code == 0
+    assert "all contacts agree with it" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(
