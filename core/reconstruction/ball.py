@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import Array
+from ..arguments import SMALLEST, Array
 from ..contours.contour import Contour
 from ..contours.local_geometry import DegenerateCurvesError
 from .result import Reconstruction
@@ -81,7 +81,7 @@ def _require_reached(centers: Reconstruction, contour: Contour) -> None:
     """
     local = centers.frame.to_local(contour.points)
     away = np.linalg.norm(local[:, :2], axis=1)
-    way = local[np.argmax(away), :2] / max(float(away.max()), np.finfo(float).tiny)
+    way = local[np.argmax(away), :2] / max(float(away.max()), SMALLEST)
     order = np.argsort(local[:, :2] @ way, kind="stable")
     s, z = (local[:, :2] @ way)[order], local[order, 2]
     count = max(SIDE, len(s) // SIDES)

@@ -229,28 +229,29 @@ class ObjectTouches:
     def _verdict(self, found: Mapping[str, Any]) -> tuple[str, str]:
         """The status and the message of what was found: those of its atlas, unless the mesh explains more."""
         status, message, unit = found["status"], found["message"], unit_of(found)
+        if found["uncovered"] and self._is_cut_short:
+            places = many(found["uncovered"], "place", "places")
+            return "uncertain", f"Touching was stopped, and the object goes on at {places}: touch it again."
         if found["uncovered"]:
-            if self._is_cut_short:
-                places = many(found["uncovered"], "place", "places")
-                message = f"Touching was stopped, and the object goes on at {places}: touch it again."
-        elif self.compared.largest > OFF_TOLERANCES * self.tolerance:
-            off = f"The surface is up to {length(self.compared.largest, unit)} off the object"
-            if self.edge and status == "ok":
-                message = f"{off}, which the tolerance does not explain: use a shorter edge length."
-            elif self.surface.has_rims():
-                advice = "close them, or use a smaller tolerance"
-                message = f"{off}, whose mesh has open edges, as around holes: {advice}."
-            elif status == "ok":
-                message = f"{off}, which the tolerance does not explain: use a smaller tolerance."
-            else:
-                message = f"{off}. {message}"
-            status = "uncertain"
-        elif status == "ok" and found["height_std"] > self.tolerance:
-            message = (
+            return status, message
+        if self.compared.largest > OFF_TOLERANCES * self.tolerance:
+            off = length(self.compared.largest, unit)
+            if self.surface.has_rims() and not (self.edge and status == "ok"):
+                return "uncertain", (
+                    f"The surface is up to {off} off the object, whose mesh has open edges, as around holes: "
+                    "close them, or use a smaller tolerance."
+                )
+            if status != "ok":
+                return status, f"The surface is up to {off} off the object. {message}"
+            advice = "use a shorter edge length" if self.edge else "use a smaller tolerance"
+            return "uncertain", (
+                f"The surface is up to {off} off the object, which the tolerance does not explain: {advice}."
+            )
+        if status == "ok" and found["height_std"] > self.tolerance:
+            return "uncertain", (
                 f"Heights are accurate to {length(found['height_std'], unit)} on average, and the tolerance "
                 f"is {length(self.tolerance, unit)}: use a larger tolerance."
             )
-            status = "uncertain"
         return status, message
 
 
