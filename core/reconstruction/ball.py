@@ -81,7 +81,7 @@ def _require_reached(centers: Reconstruction, contour: Contour) -> None:
     """
     local = centers.frame.to_local(contour.points)
     away = np.linalg.norm(local[:, :2], axis=1)
-    way = local[np.argmax(away), :2] / max(float(away.max()), np.finfo(float).tiny)
+    way = local[np.argmax(away), :2] / max(float(away.max()), float(np.finfo(float).tiny))
     order = np.argsort(local[:, :2] @ way, kind="stable")
     s, z = (local[:, :2] @ way)[order], local[order, 2]
     count = max(SIDE, len(s) // SIDES)
