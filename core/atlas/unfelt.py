@@ -56,4 +56,5 @@ def _areas(mesh: Mesh) -> Array:
     """The area (n,) of each vertex, a third of that of its triangles."""
     a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
     areas = np.repeat(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0, 3)
-    return np.bincount(mesh.triangles.ravel(), areas, len(mesh.vertices)).astype(np.float64)
+    found: Array = np.bincount(mesh.triangles.ravel(), areas, len(mesh.vertices)).astype(np.float64)
+    return found

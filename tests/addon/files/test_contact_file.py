@@ -151,8 +151,8 @@ def test_without_a_curve_column_a_file_is_one_curve(read):
         ("curve,x_mm,y_cm,z_mm\n", "line 1: expected x, y and z in one unit, got cm and mm"),
         ("curve,x [furlong],y,z\n", 'line 1: expected a unit out of km, m, cm, mm.* got "furlong"'),
         (PLAIN.replace("3", "three"), '"contacts.csv", line 3, column "z": expected a number, got "three"'),
-        (TITLE.format(3) + PLAIN, "line 1: expected version 2 or less, got 3: this was written by a later"),
-        (TITLE.format("x") + PLAIN, "line 1: expected version 2 or less, got x"),
+        (TITLE.format(4) + PLAIN, "line 1: expected version 3 or less, got 4: this was written by a later"),
+        (TITLE.format("x") + PLAIN, "line 1: expected version 3 or less, got x"),
         (TITLE.format(2) + "# point 1 2\n" + PLAIN, "line 2: expected 3 numbers for point, got 2"),
         (TITLE.format(2) + "# noise few\n" + PLAIN, 'line 2, "noise": expected a number, got "few"'),
         (TITLE.format(2) + "# noise -1\n" + PLAIN, 'line 2, "noise": expected a number of 0 or more, got -1'),
@@ -465,3 +465,13 @@ def test_a_file_beyond_memory_is_a_sentence(read, extension, monkeypatch):
     monkeypatch.setattr(extension.core.contact_data.rows, "contours", exhausted)
     with pytest.raises(ValueError, match=r'"contacts.csv": expected contacts that fit into memory, got more'):
         read(PLAIN)
+
+
+def test_a_ball_in_a_file_has_the_unit_of_the_scene(extension, empty, tmp_path):
+    files = extension.tactile_addon.files
+    (tmp_path / "ball.csv").write_text(
+        "# Tactile Patch contacts, version 3,\n# ball 3.15\nx [mm],y [mm],z [mm]\n1,2,3\n"
+    )
+    (contour,) = files.measured.read([tmp_path / "ball.csv"], "FILE", 1.0).contours
+    assert contour.ball == pytest.approx(3.15e-3)
+    assert contour.points == pytest.approx(np.array([[1e-3, 2e-3, 3e-3]]))
