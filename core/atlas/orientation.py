@@ -110,7 +110,7 @@ def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
 def mirrored(points: Array, normals: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
     """Cosines (m,) between normals j and normals i mirrored in the plane between both contacts.
 
-    Also the larger cosine between a normal and the way from one contact to the other, (m,).
+    Also the larger absolute cosine between a normal and the way from one contact to the other, (m,).
     """
     way = points[j] - points[i]
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)

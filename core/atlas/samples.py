@@ -15,14 +15,14 @@ from .indicator import LAYERS, Indicator, solved
 
 # python -m benchmarks.atlas judges these.
 PITCH = 1.2  # Samples of a patch are this many cells apart.
-# Weights of other patches are those of one sample for at most PARTS^2 around, ACROSS^2 or more a patch.
+# The weights of other patches are computed once for up to PARTS^2 samples; a patch has ACROSS^2 or more.
 ACROSS, PARTS = 12, 8
 DENSER = 0.5  # Where walls need cells finer than this share, samples are taken again.
 FINEST, COARSEST = 1.0 / 400.0, 1.0 / 80.0  # Cells are between these shares of the size.
 TOLERANCES = 5.0  # A cell is at most this many tolerances.
-OPPOSITE = -0.9  # Two patches are the sides of a wall if the cosine between their normals is less.
+OPPOSITE = -0.9  # Two patches are the sides of a wall or gap if the cosine between their normals is less.
 THIN_SHARE = 0.01  # Walls are at least as thick as all but this share of the area is.
-CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall.
+CERTAIN = 5.0  # Two sides that are nearer than this many deviations are no wall or gap.
 PATCHES_AT_ONCE, SAMPLES_AT_ONCE = 20, 3000  # A step takes this many patches, or this many samples.
 
 
@@ -41,7 +41,7 @@ def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None,
 
 
 class Samples(NamedTuple):
-    """n points of patches, outward normals (n, 3) each, areas (n,) and the thickness of the wall there (n,).
+    """n points of patches, outward normals (n, 3) each, areas, and the thickness of walls or gaps, (n,) each.
 
     Where patches overlap, their areas add up to that of the surface. The thickness is inf where nothing on
     the other side was felt.
@@ -117,16 +117,19 @@ def _spread(
 
 
 def _others(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
-    """Weights of the other patches of a sheet at local (x, y) of patches, and its thickness, (n,) each."""
+    """Sums of the weights of other patches of the sheet at local (x, y) of patches, (n,).
+
+    Also the thickness of the wall or gap between the sheet and what faces the other way, (n,).
+    """
     points, normals = charts.world(node, x, y)
     pairs, count = charts.pairs(points), len(points)
     up, radius = normals[pairs.place], charts.radii[node[pairs.place]]
     alike = facing_alike(charts, pairs, up, np.zeros(len(up)), radius) * (pairs.node != node[pairs.place])
     others: Array = np.bincount(pairs.place, node_weights(charts, pairs) * alike, count).astype(np.float64)
-    behind = (np.einsum("mi,mi->m", pairs.normal, up) < OPPOSITE) & (pairs.rho < 1.0)
-    behind &= np.abs(pairs.distance) > CERTAIN * pairs.std
+    opposite = (np.einsum("mi,mi->m", pairs.normal, up) < OPPOSITE) & (pairs.rho < 1.0)
+    opposite &= np.abs(pairs.distance) > CERTAIN * pairs.std
     thickness = np.full(count, np.inf)
-    np.minimum.at(thickness, pairs.place[behind], np.abs(pairs.distance[behind]))
+    np.minimum.at(thickness, pairs.place[opposite], np.abs(pairs.distance[opposite]))
     return others, thickness
 
 

@@ -12,7 +12,7 @@ from .meshing import Mesh
 from .reference_mesh import ReferenceMesh
 
 APART = 0.8  # Places are at least so many radii of the patch beside them from each other.
-STEEP = 0.95  # The way from a patch to its rim is not along its normal by a larger cosine.
+STEEP = 0.95  # The way from a patch to its rim is not along the normal there by a larger cosine.
 
 
 def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[Place, ...]:

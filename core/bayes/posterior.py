@@ -26,7 +26,7 @@ from . import kernel as process
 from .kernel import PARTIALS, derived_kernel, kernel, kernels, places_factor, weighted_kernel
 from .prior import FREE, ORDERS
 
-WINDING = 1j * (TERMS[:, 0] - TERMS[:, 1])  # A turn multiplies the phase of z^i z'^j, z = x + iy, by i - j.
+WINDING = 1j * (TERMS[:, 0] - TERMS[:, 1])  # A turn by t adds (i - j) t to the phase of z^i z'^j, z = x + iy.
 LEAST_DEGREE = 2  # No patch has a lower degree.
 DISK = 0.95  # A patch of lower degree is fitted over a disk of this radius: not all curves end at L.
 QUARTIC_SHARE = 0.6  # Share of the radius (benchmarks.real); 0.8 takes in what says nothing of the point.

@@ -11,7 +11,7 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING
 
 # benchmarks.refusals counts the patches that are off, but ok.
-MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh,
+MESH_LAYERS = 4  # A sample is compared with no more layers of the mesh above and below it,
 HAIR = 1e-4  # and rays go on this share of their reach beyond each.
 
 

@@ -145,7 +145,8 @@ def _is_there(target: Object, depsgraph: bpy.types.Depsgraph) -> bool:
 
 
 def may_be_outdated(probe: Object, there: Container[Object]) -> bool:
-    """Whether something that belongs to the probe was removed, brought back or renamed.
+    """Whether `is_outdated` has to look: something of the probe was removed, brought back, hidden or renamed,
+    or its patch is not of its settings.
 
     there : the objects in the view layer
     """
