@@ -100,21 +100,8 @@ def _contacts(
     given: Sequence[ArrayLike | Contour], outward: ArrayLike | None, noise: float | None
 ) -> tuple[Contacts, float, tuple[str, str] | None]:
     """Contacts with outward normals, the noise, and why the normals are in doubt, if they are."""
-    strokes = [
-        stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
-        for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
-    ]
+    strokes, points, noise = _strokes(given, noise)
     up = None if outward is None else unit_vector("outward", outward)
-    points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
-    if len(points) < FEWEST:
-        raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
-    size = float(np.ptp(points, axis=0).max())
-    if 0.0 < size < SMALLEST:
-        raise _too_near()
-    if noise is None:
-        noise = max(stroke.noise or 0.0 for stroke in strokes)
-    if noise > size:
-        raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
     own = [np.zeros(stroke.points.shape) if stroke.normals is None else stroke.normals for stroke in strokes]
     known = np.repeat([stroke.normals is not None for stroke in strokes], [len(some) for some in own])
     normals, planes = np.vstack(own), planes_of(points, noise)
@@ -131,6 +118,25 @@ def _contacts(
         points = points - balls[:, None] * normals
         planes = planes_of(points, noise)
     return Contacts(points, normals, planes.reach, planes.links), noise, doubt
+
+
+def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple[list[Contour], Array, float]:
+    """The strokes, all their contacts (n, 3) and the noise, checked."""
+    strokes = [
+        stroke if isinstance(stroke, Contour) else Contour(stroke)  # type: ignore[arg-type]
+        for stroke in list_of("contours_or_strokes", given, object)  # type: ignore[arg-type]
+    ]
+    points = np.vstack([np.empty((0, 3)), *(stroke.points for stroke in strokes)])
+    if len(points) < FEWEST:
+        raise ValueError(f"contours_or_strokes: expected {FEWEST} contacts or more, got {len(points)}")
+    size = float(np.ptp(points, axis=0).max())
+    if 0.0 < size < SMALLEST:
+        raise _too_near()
+    if noise is None:
+        noise = max(stroke.noise or 0.0 for stroke in strokes)
+    if noise > size:
+        raise ValueError(f"noise: expected less than the size of what was felt, {size:.3g}, got {noise:.3g}")
+    return strokes, points, noise
 
 
 def _require_one_side(points: Array, normals: Array) -> None:

@@ -180,21 +180,8 @@ class Atlas:
     def _verdict(self) -> tuple[str, str]:
         if self.doubt:
             return self.doubt
-        count = len(self.uncovered)
-        if count and self.contacts is not None:
-            places = "one place" if count == 1 else f"{count} places"
-            return "uncertain", (f"Nothing was felt beyond {places} where the object may go on: touch there.")
-        if count:
-            places = "one place" if count == 1 else f"{count} places"
-            if self.is_cut_short:
-                return "uncertain", (
-                    f"The patches end at {places} where the object goes on: allow more touches or a larger "
-                    "tolerance."
-                )
-            return "uncertain", (
-                f"The patches end at {places} where the object goes on, and touches found no patch there: "
-                "use a smaller tolerance."
-            )
+        if self.uncovered:
+            return self._ended()
         inside = self.reference.indicator
         if inside.thinnest < THIN * inside.resolved:
             thin, resolved = (100.0 * width / inside.size for width in (inside.thinnest, inside.resolved))
@@ -209,6 +196,22 @@ class Atlas:
                 "again or use a larger tolerance."
             )
         return self._checked()
+
+    def _ended(self) -> tuple[str, str]:
+        """The verdict where places are uncovered."""
+        count = len(self.uncovered)
+        places = "one place" if count == 1 else f"{count} places"
+        if self.contacts is not None:
+            return "uncertain", f"Nothing was felt beyond {places} where the object may go on: touch there."
+        if self.is_cut_short:
+            return "uncertain", (
+                f"The patches end at {places} where the object goes on: allow more touches or a larger "
+                "tolerance."
+            )
+        return "uncertain", (
+            f"The patches end at {places} where the object goes on, and touches found no patch there: "
+            "use a smaller tolerance."
+        )
 
     @property
     def is_rough(self) -> bool:

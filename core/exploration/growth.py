@@ -71,10 +71,14 @@ class TrackedContours:
         """Whether a half curve goes on beyond what was tracked, (c, 2)."""
         return np.array([[self.partial and s == EXTENT for s in c.stops or ()] for c in self.contours])
 
+    def goes_on(self, counts: Counts) -> NDArray[np.bool_]:
+        """Whether a half curve goes on beyond this number of contacts, (c, 2)."""
+        return (counts < self.whole) | self.open
+
     def shortened(self, counts: Counts, stride: int = 1) -> list[Contour]:
         """The contours of these numbers of contacts and the point; only each `stride`-th is kept."""
         found = []
-        ends = (counts < self.whole) | self.open
+        ends = self.goes_on(counts)
         for contour, at, n, end in zip(self.contours, self.places, counts.tolist(), ends, strict=True):
             assert contour.stops is not None
             which = slice(at - n[0] // stride * stride, at + n[1] // stride * stride + 1, stride)
@@ -153,10 +157,7 @@ def _longer(track: Track, farthest: float, found: GrowthTrial, most: float, too_
     They stay shorter than `too_long`, a length at which the spread is too large.
     """
     accepted, tracked, growing, quick = [found], found.tracked, np.full(found.counts.shape, True), True
-    while found.spread <= most:
-        growing = growing & ((found.counts < tracked.whole) | tracked.open)
-        if not growing.any():
-            break
+    while found.spread <= most and (growing := growing & tracked.goes_on(found.counts)).any():
         quick = quick and found.misfit_ratio <= EASY
         stretched = np.ceil((STRETCH**2 if quick else STRETCH) * found.counts)
         longer = np.where(growing, stretched, found.counts).astype(np.intp)
