@@ -102,7 +102,7 @@ def several_files():
     gui.shot(FOLDER / "join_dialog.png")
     gui.xdo("key", "Return")
     yield 2
-    said = "Some contacts have no normals, and nothing tells their outer side: set outward"
+    said = "Outward: expected a direction where contacts have no normals and do not close around an object"
     check("two files without normals ask for the outer side", said in last_report(), last_report())
     check("... and leave nothing", data_blocks() == before, data_blocks())
     gui.xdo("key", "Escape", "mousemove", 600, 400)
