@@ -57,7 +57,10 @@ def _threads() -> tuple[Any, Any] | None:
     home = Path(scipy.__file__).parent
     for path in (*home.parent.glob("scipy.libs/*openblas*"), *home.glob(".dylibs/*openblas*")):
         library = ctypes.CDLL(str(path))
-        return library.scipy_openblas_get_num_threads, library.scipy_openblas_set_num_threads
+        # A later scipy may call these otherwise; then fits go on with as many threads as it has.
+        get, set_to = (getattr(library, f"scipy_openblas_{do}_num_threads", None) for do in ("get", "set"))
+        if get and set_to:
+            return get, set_to
     return None
 
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Systems solved by LAPACK against numpy's, and the one thread that they run on."""
 
+import ctypes
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
@@ -65,3 +66,12 @@ def test_calls_in_several_threads_of_python_leave_as_many_threads_as_before():
         assert set(seen) == {1}
     finally:
         set_to(before)
+
+
+def test_calls_go_on_where_the_library_has_other_names(monkeypatch):
+    monkeypatch.setattr(ctypes, "CDLL", lambda path: object())
+    lapack._threads.cache_clear()
+    try:
+        np.testing.assert_allclose(lapack.cholesky(MATRIX.copy()), np.linalg.cholesky(MATRIX), atol=1e-14)
+    finally:
+        lapack._threads.cache_clear()

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Atlases of measured contacts: rasters without normals, contours with them."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -84,6 +86,7 @@ def ball(count=600):
     return np.stack([np.sqrt(1.0 - z**2) * np.cos(turn), np.sqrt(1.0 - z**2) * np.sin(turn), z], axis=1)
 
 
+@cache
 def ball_atlas(scale=1.0, length=1.0):
     """The atlas of contacts on a ball, with normals of this length."""
     return core.atlas_of([core.Contour(scale * ball(), normals=length * ball())])
@@ -141,6 +144,11 @@ def test_the_unit_of_contacts_and_the_length_of_normals_change_nothing(scale, le
     assert np.linalg.norm(other.vertices / scale, axis=1) == pytest.approx(1.0, abs=0.01)
 
 
+@cache
+def cap_atlas():
+    return core.atlas_of(cap_rows(), outward=(0, 0, 1), tolerance=0.01)
+
+
 def cap_rows():
     """Rows of contacts without noise on the cap of a unit ball."""
     x = np.linspace(-0.5, 0.5, 41)
@@ -150,7 +158,7 @@ def cap_rows():
 
 
 def test_a_cap_is_uncertain_and_nothing_is_certain_where_nothing_was_felt():
-    atlas = core.atlas_of(cap_rows(), outward=(0, 0, 1), tolerance=0.01)
+    atlas = cap_atlas()
     assert atlas.status == "uncertain"
     assert "Nothing was felt beyond" in atlas.message
     assert atlas.uncovered
@@ -164,7 +172,7 @@ def test_a_cap_is_uncertain_and_nothing_is_certain_where_nothing_was_felt():
 
 
 def test_deviations_grow_beyond_a_rim_and_are_then_infinite():
-    atlas = core.atlas_of(cap_rows(), outward=(0, 0, 1), tolerance=0.01)
+    atlas = cap_atlas()
     rim = atlas.reference.mesh.vertices[atlas.reference.is_open]
     at = rim[np.argmax(rim[:, 0])]
     way = np.eye(3)[0] - at[0] * at  # along the ball
@@ -175,7 +183,7 @@ def test_deviations_grow_beyond_a_rim_and_are_then_infinite():
 
 
 def test_above_what_was_felt_distances_are_finite_and_right():
-    atlas = core.atlas_of(cap_rows(), outward=(0, 0, 1), tolerance=0.01)
+    atlas = cap_atlas()
     points = np.vstack(cap_rows())
     heights = np.random.default_rng(0).uniform(0.0, 0.1, len(points))
     distance, std = atlas.distance((1.0 + heights)[:, None] * points)
@@ -209,18 +217,18 @@ def test_strokes_all_over_a_ball_need_no_normals_and_no_hint():
     assert np.isfinite(std).all()
 
 
-@pytest.mark.parametrize("kind", ["flipped", "random"])
-def test_normals_that_contradict_each_other_are_never_ok(kind):
+@pytest.mark.parametrize("wrong", [second, random])
+@pytest.mark.parametrize("outward", [None, (0, 0, 1)])
+def test_normals_that_contradict_each_other_are_never_ok(wrong, outward):
     points = np.vstack(rings_of_ball())
-    rng = np.random.default_rng(0)
-    normals = points * np.where(np.arange(len(points)) % 2, 1.0, -1.0)[:, None]
-    if kind == "random":
-        normals = rng.normal(size=points.shape)
-    for outward in (None, (0, 0, 1)):
-        with pytest.raises(ValueError, match="normals: expected those of neighboring contacts on one side"):
-            core.atlas_of([core.Contour(points, normals=normals)], outward=outward)
-    # Where a few of them do so in one place, the surface is in doubt there.
-    normals = np.where((points[:, 2] > 0.8)[:, None], normals, points)
+    normals = wrong(points, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="normals: expected those of neighboring contacts on one side"):
+        core.atlas_of([core.Contour(points, normals=normals)], outward=outward)
+
+
+def test_where_a_few_normals_contradict_each_other_the_surface_is_in_doubt():
+    points = np.vstack(rings_of_ball())
+    normals = np.where((points[:, 2] > 0.8)[:, None], second(points, None), points)
     atlas = core.atlas_of([core.Contour(points, normals=normals)])
     assert atlas.status == "uncertain"
     assert "around (" in atlas.message and "contradict each other" in atlas.message
