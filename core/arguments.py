@@ -78,16 +78,13 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 
 def unit_vector(name: str, value: ArrayLike) -> Array:
     """`value` (3,) scaled to length 1. Raises ValueError if it has no direction."""
-    x, y, z = finite_array(name, value, (3,)).tolist()
-    if abs(math.hypot(x, y, z) - 1.0) <= UNIT_ROUNDING:  # Scaling again would change its last bit.
-        return np.array([x, y, z])
-    largest = max(abs(x), abs(y), abs(z))
-    if largest == 0.0:
+    v = finite_array(name, value, (3,))
+    if abs(math.hypot(*v) - 1.0) <= UNIT_ROUNDING:  # Scaling again would change its last bit.
+        return v
+    if not v.any():
         raise ValueError(f"{name}: expected a vector with a direction, got (0, 0, 0)")
-    # The squares of 1e200 and of denormal numbers would be lost.
-    x, y, z = x / largest, y / largest, z / largest
-    length = math.hypot(x, y, z)
-    return np.array([x / length, y / length, z / length])
+    v /= np.abs(v).max()  # The squares of 1e200 and of denormal numbers would be lost.
+    return v / math.hypot(*v)
 
 
 def unit_vectors(name: str, vectors: Array) -> Array:
@@ -97,8 +94,7 @@ def unit_vectors(name: str, vectors: Array) -> Array:
         raise ValueError(f"{name}: expected vectors with a direction, got (0, 0, 0) among them: remove them")
     # The squares of 1e200 and of denormal numbers would be lost.
     scaled = vectors / largest
-    found: Array = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
-    return found
+    return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
 
 
 def number(name: str, value: float, *, above: float | None = None, least: float | None = None) -> float:

@@ -72,8 +72,7 @@ def cholesky(matrix: Array) -> Array:
     factor, failed = dpotrf(matrix.T, lower=0, clean=1, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError("the matrix is not positive definite")
-    lower: Array = factor.T
-    return lower
+    return factor.T
 
 
 @on_one_thread
@@ -90,10 +89,9 @@ def solved_definite(matrix: Array, right: Array) -> Array:
     """matrix^-1 @ right (m,), for a positive definite matrix (m, m), whose lower triangle is used up."""
     from scipy.linalg.lapack import dposv
 
-    _, found, failed = dposv(matrix.T, right, lower=0, overwrite_a=1)
+    _, solution, failed = dposv(matrix.T, right, lower=0, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError("the matrix is not positive definite")
-    solution: Array = found
     return solution
 
 
@@ -102,8 +100,7 @@ def inverse_lower(factor: Array) -> Array:
     """The inverse of a lower triangular matrix (m, m), which is used up."""
     from scipy.linalg.lapack import dtrtri
 
-    inverse: Array = dtrtri(factor.T, lower=0, overwrite_c=1)[0]
-    return inverse.T
+    return dtrtri(factor.T, lower=0, overwrite_c=1)[0].T
 
 
 @on_one_thread
@@ -111,5 +108,4 @@ def solved(factor: Array, right: Array, transposed: bool = False) -> Array:
     """factor^-1 @ right, or factor'^-1 @ right, for a lower triangular matrix (m, m)."""
     from scipy.linalg.lapack import dtrtrs
 
-    found: Array = dtrtrs(factor.T, right, lower=0, trans=0 if transposed else 1)[0]
-    return found
+    return dtrtrs(factor.T, right, lower=0, trans=0 if transposed else 1)[0]

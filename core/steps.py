@@ -3,10 +3,12 @@
 """Generators that do long work in short steps and return its result."""
 
 from collections.abc import Generator
-from typing import Any
+from typing import Any, TypeVar
+
+R = TypeVar("R")
 
 
-def result_of(steps: Generator[Any, Any, Any]) -> Any:
+def result_of(steps: Generator[Any, Any, R]) -> R:
     """What steps return once they are done."""
     try:
         while True:
@@ -15,7 +17,7 @@ def result_of(steps: Generator[Any, Any, Any]) -> Any:
         return end.value
 
 
-def part_of(steps: Generator[float, None, Any], start: float, end: float) -> Generator[float, None, Any]:
+def part_of(steps: Generator[float, None, R], start: float, end: float) -> Generator[float, None, R]:
     """Runs steps that yield the share that is done, and yields that of longer work, from `start` to `end`."""
     while True:
         try:

@@ -194,11 +194,9 @@ def contours(
     order = np.argsort(labels, kind="stable") if times is None else np.lexsort((times, labels))
     found = []
     for rows in np.split(order, np.flatnonzero(np.diff(labels[order])) + 1):
-        some = normals is not None and not np.isnan(normals[rows[0]]).all()
+        own = None if normals is None or np.isnan(normals[rows[0]]).all() else normals[rows]
         try:
-            found.append(
-                Contour(points[rows], normals=None if normals is None or not some else normals[rows])
-            )
+            found.append(Contour(points[rows], normals=own))
         except ValueError as error:
             at = f'{name}, curve "{titles[labels[rows[0]]]}"'
             raise ValueError(f"{at}: {error}") from None

@@ -197,16 +197,13 @@ def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
         key for key in NORMAL_COLUMNS if key not in columns and any(k in columns for k in NORMAL_COLUMNS)
     ]
     if missing:
-        raise ValueError(f'{at}: expected the column "{missing[0]}", got "{_shown(header)}"')
+        text = ", ".join(header)
+        text = text if len(text) < 60 else f"{text[:57]}..."
+        raise ValueError(f'{at}: expected the column "{missing[0]}", got "{text}"')
     used = {found[key] for key in POINT_COLUMNS}
     if len(used) > 1:
         raise ValueError(f"{at}: expected x, y and z in one unit, got {' and '.join(sorted(used))}")
     return len(header), columns, used.pop()
-
-
-def _shown(header: list[str]) -> str:
-    text = ", ".join(header)
-    return text if len(text) < 60 else text[:57] + "..."
 
 
 def _parts(title: str) -> tuple[str, str, str]:

@@ -53,8 +53,7 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
     origin = found[0].points[0]  # Far from the world's origin only differences of points are exact.
     contours = [Contour(contour.points - origin) for contour in found]
     refined = [_refined(start, contours) for start in _starts(contours)]
-    point, feet, tangents = min(refined, key=lambda fit: float(np.sum(_misses(*fit) ** 2)))
-    misses = _misses(point, feet, tangents)
+    point, tangents, misses = min(refined, key=lambda fit: float(np.sum(fit[2] ** 2)))
     _require_near(point, misses, contours)
     _require_crossing(tangents)
     return origin + point, misses
@@ -69,12 +68,6 @@ def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
     order = np.argsort(np.copysign(np.linalg.norm(r, axis=1), r @ tangent), kind="stable")
     normals = None if contour.normals is None else contour.normals[order]
     return replace(contour, points=contour.points[order], normals=normals)
-
-
-def _misses(point: Array, feet: Array, tangents: Array) -> Array:
-    off = feet - point
-    across = off - np.sum(off * tangents, axis=1, keepdims=True) * tangents
-    return np.linalg.norm(across, axis=1)
 
 
 def _starts(contours: Sequence[Contour]) -> Array:
@@ -104,21 +97,24 @@ def _size(contour: Contour) -> float:
 
 
 def _refined(point: Array, contours: Sequence[Contour]) -> tuple[Array, Array, Array]:
-    """Gauss-Newton from a start: the point, and feet and tangents of the curves next to it, (c, 3) each."""
+    """Runs Gauss-Newton: the point (3,), the curves' unit tangents there (c, 3) and their offsets (c,)."""
     reach = min(map(_size, contours))
     for _ in range(NEWTON_STEPS):
         near = [Contour(_near(point, contour.points)) for contour in contours]
         local = local_curves(curves_through(*stacked(point[None], [near])))[0][0]
         speeds = np.linalg.norm(local[:, 1], axis=1, keepdims=True)
         feet, tangents = point + local[:, 0], local[:, 1] / np.maximum(speeds, 1e-300)
-        across = np.eye(3) - tangents[:, :, None] * tangents[:, None]
+        projections = np.eye(3) - tangents[:, :, None] * tangents[:, None]
         # Parallel lines have a solution, too, which _require_crossing then refuses.
-        step = np.linalg.lstsq(across.sum(axis=0), np.einsum("cij,cj->i", across, local[:, 0]), rcond=1e-9)[0]
+        rhs = np.einsum("cij,cj->i", projections, local[:, 0])
+        step = np.linalg.lstsq(projections.sum(axis=0), rhs, rcond=1e-9)[0]
         length = float(np.linalg.norm(step))
         if length <= 1e-9 * reach:
             break
         point = point + step * min(1.0, 0.5 * reach / length)
-    return point, feet, tangents
+    off = feet - point
+    across = off - np.sum(off * tangents, axis=1, keepdims=True) * tangents
+    return point, tangents, np.linalg.norm(across, axis=1)
 
 
 def _near(point: Array, points: Array) -> Array:

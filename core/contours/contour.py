@@ -3,8 +3,10 @@
 """Sampling planes and the contours in them (paper, section II), and vectors as Python floats."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,26 +109,24 @@ class Contour:
                     f"points: numbers of single precision are {spacing:g} apart here, too coarse for a curve "
                     "of this size: expected coordinates relative to a nearby point, or double precision"
                 )
-        object.__setattr__(self, "points", points)
-        if self.plane_normal is not None:
-            object.__setattr__(self, "plane_normal", unit_vector("plane_normal", self.plane_normal))
-        if self.normals is not None:
-            normals = finite_array("normals", self.normals, (len(points), 3))
-            object.__setattr__(self, "normals", normals)
-        if self.noise is not None:
-            object.__setattr__(self, "noise", number("noise", self.noise, least=0.0))
-        if self.stops is not None:
-            object.__setattr__(self, "stops", tuple(list_of("stops", self.stops, str)))
-            if len(self.stops) != 2:
-                raise ValueError(f"stops: expected two words, got {shown(self.stops)}")
+        checks: dict[str, Callable[[Any], Any]] = {
+            "plane_normal": partial(unit_vector, "plane_normal"),
+            "normals": lambda normals: finite_array("normals", normals, (len(points), 3)),
+            "noise": partial(number, "noise", least=0.0),
+            "stops": lambda stops: tuple(list_of("stops", stops, str)),
+            "normal_std": partial(number, "normal_std", least=0.0),
+            "ball": partial(number, "ball", above=0.0),
+        }
+        given = {name: value for name, value in vars(self).items() if value is not None}
+        checked = {name: check(given[name]) for name, check in checks.items() if name in given}
+        vars(self).update(checked, points=points)
+        if self.stops is not None and len(self.stops) != 2:
+            raise ValueError(f"stops: expected two words, got {shown(self.stops)}")
         if self.normal_std is not None:
-            object.__setattr__(self, "normal_std", number("normal_std", self.normal_std, least=0.0))
             if self.normals is None:
                 raise ValueError("normal_std: expected the measured normals that it belongs to, got none")
             if not np.abs(self.normals).max(axis=1, initial=0.0).all():
                 raise ValueError("normals: expected directions where normal_std is given, got (0, 0, 0)")
-        if self.ball is not None:
-            object.__setattr__(self, "ball", number("ball", self.ball, above=0.0))
         self._keep_each_once()
 
     def _keep_each_once(self) -> None:
@@ -135,10 +135,10 @@ class Contour:
         if len(starts) == len(order):
             return
         firsts = np.argsort(order[starts])
-        object.__setattr__(self, "points", self.points[order[starts]][firsts])
+        vars(self)["points"] = self.points[order[starts]][firsts]
         if self.normals is not None:
-            normals = np.add.reduceat(alike(self.normals, order, starts)[order], starts, axis=0)
-            object.__setattr__(self, "normals", normals[firsts])
+            sums = np.add.reduceat(alike(self.normals, order, starts)[order], starts, axis=0)
+            vars(self)["normals"] = sums[firsts]
 
     def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
         """The contour of some of its contacts, which are known to be valid."""

@@ -138,14 +138,11 @@ def local_curves(curves: Curves) -> tuple[Array, Array]:
     count, longest = near.sum(axis=1), np.abs(s).max(axis=1)
     determined = (count > LEAST_CONTACTS) & (longest > 0.0)
     scale = np.where(determined, longest, 1.0)[:, None]
-    basis = np.empty((3, *s.shape))
-    basis[0], s = near & determined[:, None], s / scale
-    np.multiply(basis[0], s, out=basis[1])
-    np.multiply(basis[1], s, out=basis[2])
-    turned = basis.transpose(1, 0, 2)
-    inverse = np.linalg.inv(turned @ basis.transpose(1, 2, 0) + RIDGE * np.eye(3))
-    solution = inverse @ (turned @ r)
-    off = r - basis.transpose(1, 2, 0) @ solution
+    basis = (near & determined[:, None])[..., None] * (s / scale)[..., None] ** np.arange(3)
+    transposed = basis.swapaxes(1, 2)
+    inverse = np.linalg.inv(transposed @ basis + RIDGE * np.eye(3))
+    solution = inverse @ (transposed @ r)
+    off = r - basis @ solution
     variance = np.einsum("cni,cni->c", off, off) / np.maximum(count - 3, 1)
     stds = np.where(determined, np.sqrt(variance * inverse[:, 0, 0]), 0.0)
     solution /= (scale ** np.arange(3))[..., None]
@@ -160,12 +157,8 @@ def misses(curves: Curves) -> Array:
     """
     local, stds = local_curves(curves)
     foot = local[..., 0, :]
-    along = np.einsum("...i,...i->...", foot, curves.tangents)[..., None] * curves.tangents
-    across = foot - along
-    found = np.empty((*stds.shape, 2))
-    np.sqrt(np.einsum("...i,...i->...", across, across), out=found[..., 0])
-    found[..., 1] = stds
-    return found
+    across = foot - np.einsum("...i,...i->...", foot, curves.tangents)[..., None] * curves.tangents
+    return np.stack([np.linalg.norm(across, axis=-1), stds], axis=-1)
 
 
 def _parabola(s: Array, r: Array) -> tuple[Array, Array]:

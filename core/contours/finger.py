@@ -121,15 +121,13 @@ def contacts(
             return NO_CONTACT if flank is None else CREASE
         at, new_up, point, normal = contact
         length = abs(new_up)
+        is_sharp = (new_up * up.conjugate()).real < MAX_TURN * length or dot(normal, last) < least_cosine
         # If the surface lies in the plane, there is no curve to follow.
-        if length < LEAST_IN_PLANE or (new_up * up.conjugate()).real < MAX_TURN * length:
-            return CREASE
-        if dot(normal, last) < least_cosine:
+        if length < LEAST_IN_PLANE or is_sharp:
             return CREASE
         if dot(normal, n) < MAX_TILT:
             return NOT_MONGE
-        last = normal
-        up = new_up / length
+        up, last = new_up / length, normal
         yield point, normal
 
 

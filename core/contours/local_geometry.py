@@ -45,7 +45,7 @@ class Frame:
 
 def surface_normals(tangents: Array, outward: Array) -> Array:
     """The unit n (..., 3) that minimize sum (n . t)^2 over tangents (..., c, 3), on the side of `outward`."""
-    n: Array = np.linalg.eigh(np.swapaxes(tangents, -1, -2) @ tangents)[1][..., 0]
+    n = np.linalg.eigh(np.swapaxes(tangents, -1, -2) @ tangents)[1][..., 0]
     return np.copysign(1.0, np.einsum("...i,...i->...", n, outward))[..., None] * n
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far half curves can be followed from the reference point, as long as fits explain their contacts.
 
-The generators here yield contours and are sent the Reconstruction of these, or the error why there is none.
+The generators here yield an Ask and are sent the Reconstruction of its contours, or why there is none.
 So touches of one surface can grow side by side, and their fits be done in stacks.
 """
 
@@ -37,8 +37,16 @@ TOO_ROUGH = 0.0085  # Contacts of this roughness have a fit that ends growth, in
 EXPLAINED = 3.0  # The root mean square residual of a half curve may be this many times its noise.
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
-Fits = Generator[list[Contour], Reconstruction | DegenerateCurvesError, "GrowthTrial"]
+Answer = Reconstruction | DegenerateCurvesError
+Fits = Generator["Ask", Answer, "GrowthTrial"]
 Track = Callable[[float], "TrackedContours"]  # It follows half curves to a length, longer at each call.
+
+
+class Ask(NamedTuple):
+    """Contours to be fitted: with the caller's options or, while `growing`, by "bayes"."""
+
+    contours: list[Contour]
+    growing: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +242,7 @@ def _seed(track: Track, step: float, trials: list[GrowthTrial]) -> Fits:
 def tried(tracked: TrackedContours, counts: Counts) -> Fits:
     """The fit of these numbers of contacts. It takes as few of them as suffice in most cases."""
     stride = stride_of(counts)
-    r = yield tracked.shortened(counts, stride)
+    r = yield Ask(tracked.shortened(counts, stride), growing=True)
     if isinstance(r, DegenerateCurvesError):
         raise r
     spread = r.mean_height_std / (tracked.largest_std or GROWN_STD * r.radius)

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How far a surface is from a patch all over it, even without vertices, and the patch's verdict from that."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from ..contours.contour import Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.status import CONTRADICTING
@@ -19,9 +18,9 @@ def height_error(r: Reconstruction, surface: Surface) -> float | None:
     """The mean distance in height of patch and surface over the domain, or None if there is no surface."""
     points, weights = r.domain.nodes
     heights = r.height(points[:, 0], points[:, 1])
-    up = r.frame.axes[:, 2].tolist()
+    up = vector_of(r.frame.axes[:, 2])
     starts = r.frame.to_world(np.column_stack([points, heights])).tolist()
-    offs = [layer_off(surface, start, up, r.radius) for start in starts]
+    offs = [layer_off(surface, vector_of(start), up, r.radius) for start in starts]
     met = [i for i, off in enumerate(offs) if off is not None]
     return float(np.average([offs[i] or 0.0 for i in met], weights=weights[met])) if met else None
 
@@ -41,34 +40,25 @@ def judged_by_mesh(r: Reconstruction, mean: float) -> tuple[str, str]:
     )
 
 
-def layer_off(surface: Surface, start: list[float], up: list[float], reach: float) -> float | None:
+def layer_off(surface: Surface, start: Vector, up: Vector, reach: float) -> float | None:
     """How far along `up`, in either direction, the nearest layer with its outside up is; None beyond `reach`.
 
     Layers that are seen from inside are another wall of the object, or its other side.
     """
     nearest, hair = None, HAIR * reach
     for sign in (1.0, -1.0):
-        gone = -hair  # Rays that begin on the mesh, but for rounding, may miss all of it.
+        # Rays that begin on the mesh, but for rounding, may miss all of it.
+        gone, direction = -hair, scaled(up, sign)
         for _ in range(MESH_LAYERS):
-            at = _along(start, up, sign * gone)
-            hit = surface.ray_cast(at, _along([0.0, 0.0, 0.0], up, sign), reach - gone)
+            hit = surface.ray_cast(along(start, direction, gone), direction, reach - gone)
             if hit is None:
                 break
             point, normal = contact_of(hit, 1.0)
-            gone = abs(_dot([a - b for a, b in zip(point, start, strict=True)], up))
-            if _dot(normal, up) > 0.0:
+            gone = abs(dot(along(point, start, -1.0), up))
+            if dot(normal, up) > 0.0:
                 nearest = reach = gone
                 break
             gone += hair
             if gone >= reach:
                 break
     return nearest
-
-
-def _along(start: list[float], up: list[float], distance: float) -> tuple[float, float, float]:
-    x, y, z = (a + distance * v for a, v in zip(start, up, strict=True))
-    return x, y, z
-
-
-def _dot(a: Sequence[float], b: Sequence[float]) -> float:
-    return sum(v * w for v, w in zip(a, b, strict=True))

@@ -4,7 +4,6 @@
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ..contours.contour import EXTENT, UNEXPLAINED, Contour, SamplingPlane
 from ..contours.local_geometry import DegenerateCurvesError
 from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
-from .growth import MOST_STEPS, STRETCH, Counts, GrowthTrial, Track, TrackedContours, grown
+from .growth import MOST_STEPS, STRETCH, Answer, Ask, Counts, GrowthTrial, Track, TrackedContours, grown
 from .options import ExplorationOptions
 from .sampling_density import CONTACT_COUNTS, SHORTEST, spacing, suffices
 from .taps import Tapped, beside
@@ -43,14 +42,6 @@ class Exploration:
     stds: tuple[float, ...] = ()
 
 
-class Ask(NamedTuple):
-    """Contours to be fitted: with the caller's options or, while `growing`, the defaults."""
-
-    contours: list[Contour]
-    growing: bool = False
-
-
-Answer = Reconstruction | DegenerateCurvesError
 Steps = Generator[Ask, Answer, Exploration]
 Contacts = tuple[list[Contour], float, Reconstruction | None]  # contours, their step, their fit if known
 
@@ -93,27 +84,24 @@ class Touch:
         return replace(found, stds=tuple(stds))
 
     def _of_extent(self, extent: float) -> Steps:
-        steps = (
-            [extent / count for count in CONTACT_COUNTS] if self.options.step is None else [self.options.step]
-        )
-
         def at(step: float) -> Contacts:
             """The contacts this step apart."""
             contours = self.follow(self.options.planes, step=step)(extent)
             return contours if self.options.extent else [_open(c) for c in contours], step, None
 
-        return (yield from self._dense(at, extent, steps))
+        return (yield from self._dense(at, extent, [extent / count for count in CONTACT_COUNTS]))
 
     def _grown(self) -> Steps:
         """The touch as large as it can be trusted."""
         between = max(self.options.step or 0.0, self.farthest / MOST_STEPS)
         try:
-            largest = yield from self._longest(between)
+            largest = yield from grown(self._tracking(between), self.farthest, between)
         except DegenerateCurvesError:
             if self.options.step is not None:
                 raise
             # The surface may be too narrow for this step: a strip along an edge, or a fillet.
-            largest = yield from self._longest(between / FINER)
+            between /= FINER
+            largest = yield from grown(self._tracking(between), self.farthest, between)
         counts = largest.counts
         found = yield from self._of_half_lengths(largest, counts)
         if largest.is_sure and found.result.status != "ok" and self.options.is_grown:
@@ -124,18 +112,6 @@ class Touch:
             return found
         found = yield from self._agreeing(largest, counts, found)
         return (yield from self._shortened(found)) if self.options.is_grown else found
-
-    def _longest(self, step: float) -> Generator[Ask, Answer, GrowthTrial]:
-        """The longest half curves that fits explain, of contacts this step apart."""
-        fits = grown(self._tracking(step), self.farthest, step)
-        contours = next(fits)
-        while True:
-            answer = yield Ask(contours, growing=not self.options.is_grown)
-            try:
-                contours = fits.send(answer)
-            except StopIteration as end:
-                largest: GrowthTrial = end.value
-                return largest
 
     def _agreeing(self, largest: GrowthTrial, counts: Counts, found: Exploration) -> Steps:
         """The touch with curves so short that no tap contradicts it, or `found` if there is none."""
@@ -203,15 +179,12 @@ class Touch:
             fewer = np.minimum((half_lengths / step * (1.0 + 1e-6)).astype(np.intp), again.whole)
             return again.shortened(fewer), step, None
 
-        steps = (
-            [spacing(half_lengths, count) for count in CONTACT_COUNTS]
-            if self.options.step is None
-            else [self.options.step]
-        )
-        return (yield from self._dense(at, length, steps))
+        automatic = [spacing(half_lengths, count) for count in CONTACT_COUNTS]
+        return (yield from self._dense(at, length, automatic))
 
-    def _dense(self, at: Callable[[float], Contacts], extent: float, steps: list[float]) -> Steps:
-        """The touch with the first of these steps that brings enough contacts, or else with the last."""
+    def _dense(self, at: Callable[[float], Contacts], extent: float, automatic: list[float]) -> Steps:
+        """The touch with the step of the options, or the first automatic one that suffices, or the last."""
+        steps = automatic if self.options.step is None else [self.options.step]
         for longest in dict.fromkeys(steps):
             contours, step, known = at(longest)
             r = known or (yield Ask(contours))

@@ -70,8 +70,7 @@ class ExplorationOptions:
             "most_planes": number("most_planes", self.most_planes, least=3.0),
             "noise": number("noise", self.noise, least=0.0),
         }
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)  # as dataclasses do that are frozen
+        vars(self).update(checked)  # __setattr__ of a frozen dataclass raises.
 
     @property
     def fit(self) -> FitOptions:

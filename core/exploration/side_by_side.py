@@ -19,7 +19,8 @@ from ..reconstruction.options import FitOptions
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import Given
 from ..reconstruction.strokes import gathered
-from .one_touch import Answer, Ask, Exploration, Steps, Touch
+from .growth import Answer, Ask
+from .one_touch import Exploration, Steps, Touch
 from .options import ExplorationOptions
 from .taps import tapped
 
@@ -113,9 +114,9 @@ def _side_by_side(steps: Sequence[Steps], points: Array, outward: Array, fit: Fi
                 found[i] = error
             yield
         answers = {}
-        for growing in (True, False):
-            which = [i for i, ask in requests.items() if ask.growing is growing]
-            options = replace(fit, method="bayes") if growing else fit
+        for method in dict.fromkeys(("bayes", fit.method)):
+            which = [i for i, ask in requests.items() if ("bayes" if ask.growing else fit.method) == method]
+            options = replace(fit, method=method)
             touches = [Given(requests[i].contours, *gathered(())) for i in which]
             if which:
                 results = fitted(points[which], touches, outward[which], options)

@@ -92,8 +92,7 @@ def explore(
     (found,) = result_of(exploring_many(surface, p[None], up[None], options))
     if isinstance(found, ValueError):
         raise found
-    touch: Exploration = found
-    return touch
+    return found
 
 
 def explore_many(
@@ -110,6 +109,6 @@ def explore_many(
 
     A touch that is not possible is returned as its error. Raises ValueError for bad arguments.
     """
-    wanted = ExplorationOptions(planes_of(planes), **options)
-    found: list[Exploration | ValueError] = result_of(exploring_many(surface, points, outward, wanted))
-    return found
+    return result_of(
+        exploring_many(surface, points, outward, ExplorationOptions(planes_of(planes), **options))
+    )

@@ -61,7 +61,7 @@ class Objective:
 
     def total_absolute_curvature(self, at: _Fields, rounding: float = 0.0) -> float:
         """The integral g of (8)."""
-        return self._area * float(_rounded(at.det, rounding) @ at.shrink)
+        return self._area * float(np.hypot(at.det, rounding) @ at.shrink)
 
     def value(self, at: _Fields, rounding: float = 0.0) -> float:
         """The objective g + lambda f of (9)."""
@@ -70,7 +70,7 @@ class Objective:
     def gradient(self, at: _Fields, rounding: float = 0.0) -> Array:
         """The gradient (terms,); without rounding, the signs delta_j of K count as constant (IV-B)."""
         (zx, zy), (zxx, zxy, zyy) = at.slopes, at.bends
-        size = _rounded(at.det, rounding)
+        size = np.hypot(at.det, rounding)
         delta = (at.det / size if rounding else np.where(at.det >= 0.0, 1.0, -1.0)) * at.shrink
         slope = -3.0 * size * at.shrink / at.w
         by_field = np.concatenate([slope * zx, slope * zy, delta * zyy, -2.0 * delta * zxy, delta * zxx])
@@ -80,16 +80,12 @@ class Objective:
         """The Hessian (terms, terms), in which W counts as constant: slopes are small where D matters."""
         zxx, zxy, zyy = at.bends
         xx, xy, yy = self._basis[2:]
-        size = _rounded(at.det, rounding)
+        size = np.hypot(at.det, rounding)
         det = zyy * xx - 2.0 * zxy * xy + zxx * yy  # the gradient of D
         delta = at.det / size * at.shrink
         mixed = (delta * xx) @ yy.T
         around = (rounding**2 * at.shrink / (size * size * size) * det) @ det.T
         return self._area * (around + mixed + mixed.T - (2.0 * delta * xy) @ xy.T) + self._data_hessian
-
-
-def _rounded(det: Array, rounding: float) -> Array:
-    return np.sqrt(det * det + rounding * rounding)
 
 
 def newton_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:

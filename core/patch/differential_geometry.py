@@ -27,17 +27,6 @@ class Derivatives:
         return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
     @property
-    def first_form(self) -> tuple[Array, Array, Array]:
-        """E, F, G of the first fundamental form."""
-        return 1.0 + self.x**2, self.x * self.y, 1.0 + self.y**2
-
-    @property
-    def second_form(self) -> tuple[Array, Array, Array]:
-        """L, M, N of the second fundamental form, which is negative where the surface falls away from +z."""
-        w = np.sqrt(1.0 + self.x**2 + self.y**2)
-        return self.xx / w, self.xy / w, self.yy / w
-
-    @property
     def gaussian_curvature(self) -> Array:
         """K = (LN - M^2) / (EG - F^2), in 1/length^2."""
         return (self.xx * self.yy - self.xy**2) / (1.0 + self.x**2 + self.y**2) ** 2
@@ -45,9 +34,10 @@ class Derivatives:
     @property
     def mean_curvature(self) -> Array:
         """H = (EN - 2FM + GL) / 2(EG - F^2), in 1/length."""
-        (e, f, g), (ll, mm, nn) = self.first_form, self.second_form
-        # EG - F^2 equals E + G - 1, which does not cancel on steep surfaces.
-        return (e * nn - 2.0 * f * mm + g * ll) / (2.0 * (e + g - 1.0))
+        e, f, g = 1.0 + self.x**2, self.x * self.y, 1.0 + self.y**2
+        # EG - F^2 equals E + G - 1, which does not cancel on steep surfaces; L, M, N are z_xx, z_xy, z_yy
+        # over its square root.
+        return (e * self.yy - 2.0 * f * self.xy + g * self.xx) / (2.0 * (e + g - 1.0) ** 1.5)
 
     @property
     def principal_curvatures(self) -> tuple[Array, Array]:

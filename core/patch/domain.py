@@ -26,10 +26,7 @@ SAME_END = 1e-3
 WIDE = np.radians(100.0)
 SHORTEST = 1e-6  # No length is divided by less than this share of the farthest end's distance.
 AT_POINT = 0.01  # Where the surface ends at the origin, the domain ends this share of the radius away.
-GAUSS_ALONG, GAUSS_ACROSS = (
-    4,
-    3,
-)  # Gauss points between ends, and outward, for means over the domain.
+GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Gauss-Legendre nodes along each piece of the boundary, and outward.
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +138,7 @@ class Domain:
         after, gone = (before + 1) % len(turns), turn - turns[before]
         width = np.maximum((turns[after] - turns[before]) % (2.0 * np.pi), 1e-12)
         a, b = radii[before], radii[after]
-        radius: Array = a * b * np.sin(width) / (a * np.sin(gone) + b * np.sin(width - gone))
-        return radius
+        return a * b * np.sin(width) / (a * np.sin(gone) + b * np.sin(width - gone))
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether each (x, y) lies inside or on the boundary; booleans of the shape of x and y."""
@@ -156,28 +152,22 @@ class Domain:
         """The points (n, 2) that have these `places`."""
         return places * self._radius(np.arctan2(places[:, 1], places[:, 0]))[:, None]
 
-    def radii(self, count: int, unequal: float = 0.0) -> Array:
+    def radii(self, count: int) -> Array:
         """Radii (count,) of the boundary, at azimuths from 0 on, but nowhere beyond what is between the ends.
 
         Between ends at very different distances the spline swings out to where nothing was felt, and between
-        ends more than WIDE apart there is only what is inside the line from one to the other. This also holds
-        where one of them is nearer than the share `unequal` of the other's distance.
+        ends more than WIDE apart there is only what is inside the line from one to the other.
         """
         turns, whole = 2.0 * np.pi * np.arange(count) / count, 2.0 * np.pi
         at, out = np.arctan2(self.ends[:, 1], self.ends[:, 0]) % whole, np.hypot(*self.ends.T)
         order = np.argsort(at)
-        at, out = (
-            np.concatenate([values[order[-1:]], values[order], values[order[:1]]]) for values in (at, out)
-        )
+        at, out = (np.pad(values[order], 1, mode="wrap") for values in (at, out))
         at[0], at[-1] = at[0] - whole, at[-1] + whole
         i = np.searchsorted(at, turns, side="right")
         before, after, last, following = turns - at[i - 1], at[i] - turns, out[i - 1], out[i]
         across = np.maximum(last * np.sin(before) + following * np.sin(after), SHORTEST * out.max())
         line = np.maximum(last * following * np.sin(before + after) / across, AT_POINT * out.max())
-        apart = (before + after > WIDE) | (
-            np.minimum(last, following) < unequal * np.maximum(last, following)
-        )
-        line = np.where(apart, line, np.inf)
+        line = np.where(before + after > WIDE, line, np.inf)
         return np.minimum(np.minimum(self._radius(turns), np.interp(turns, at, out)), line)
 
     def boundary(self, n: int) -> Array:

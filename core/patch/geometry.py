@@ -34,17 +34,13 @@ class Geometry(HeightField):
 
     def derivatives(self, x: ArrayLike, y: ArrayLike) -> Derivatives:
         """Height, slopes and second derivatives at local (x, y)."""
-        d = self.surface.derivatives(*self.in_unit_radius(x, y))
+        d = self.surface.derivatives(np.divide(x, self.radius), np.divide(y, self.radius))
         bends = (values / self.radius for values in (d.xx, d.xy, d.yy))
         return Derivatives(self.radius * d.z, d.x, d.y, *bends)
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """The height z at local (x, y)."""
-        return self.radius * self.surface.height(*self.in_unit_radius(x, y))
-
-    def in_unit_radius(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """Local x and y in units of L."""
-        return np.asarray(x, dtype=float) / self.radius, np.asarray(y, dtype=float) / self.radius
+        return self.radius * self.surface.height(np.divide(x, self.radius), np.divide(y, self.radius))
 
     def contains(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
         """Whether each local (x, y) lies in the domain or on its boundary; in the shape of x and y."""
@@ -98,8 +94,7 @@ def total_absolute_curvature(surface: HeightField, domain: Domain) -> float:
     """The integral of |K| over the patch (8)."""
     points, h = domain.grid(GRID)
     d = surface.derivatives(*points.T)
-    w = 1.0 + d.x**2 + d.y**2
-    return h**2 * float(np.sum(np.abs(d.xx * d.yy - d.xy**2) * w**-1.5))
+    return h**2 * float(np.sum(np.abs(d.gaussian_curvature) * np.sqrt(1.0 + d.x**2 + d.y**2)))
 
 
 def overlapped(geometry: Geometry, vertices: ArrayLike, normals: ArrayLike) -> NDArray[np.intp]:

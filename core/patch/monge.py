@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Surfaces z(x, y) over their tangent plane, their differential geometry, and the one of equation (1)."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -51,10 +52,9 @@ def derived_monomials(
 ) -> Array:
     """The values (k, m, n) of k derivatives (dx, dy) of the terms (m, 2) at n points."""
     i, j = terms.T
-    x_powers, y_powers = np.ones((2, int(terms.max(initial=0)) + 1, len(x)))
-    for k in range(1, len(x_powers)):
-        np.multiply(x_powers[k - 1], x, out=x_powers[k])
-        np.multiply(y_powers[k - 1], y, out=y_powers[k])
+    powers = np.ones((int(terms.max(initial=0)) + 1, 2, len(x)))
+    powers[1:] = x, y
+    x_powers, y_powers = np.cumprod(powers, axis=0).swapaxes(0, 1)
     derived = np.empty((len(orders), len(terms), len(x)))
     for values, (dx, dy) in zip(derived, orders, strict=True):
         # If a derivative of a term is 0, its factor is 0, whatever power is multiplied with it.
@@ -143,11 +143,8 @@ class MongePatch(HeightField):
     @property
     def degree(self) -> int:
         """The degree d of (1)."""
-        terms, degree = len(self.coefficients), 2
-        while terms > 0:
-            degree += 1
-            terms -= degree + 1
-        return degree
+        # There are (d + 1) (d + 2) / 2 - 6 coefficients.
+        return (math.isqrt(8 * len(self.coefficients) + 49) - 3) // 2
 
     def scaled(self, factor: float) -> "MongePatch":
         """This surface with every length multiplied by `factor`."""
@@ -175,20 +172,16 @@ def polynomial_derivatives(
 
     They follow from tables of the coefficients (k,), times x^i, times y^j.
     """
-    x_array, y_array = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    if x_array.shape != y_array.shape:
-        x_array, y_array = np.broadcast_arrays(x_array, y_array)
+    x_array, y_array = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     count, (i, j) = int(terms[-1].sum()) + 1, terms.T
     table = np.zeros((count, count))
     table[j, i] = coefficients
     tables = [_derive(count, dy) @ table @ _derive(count, dx).T for dx, dy in orders]
     powers = np.ones((count, 2, x_array.size))
-    powers[1] = x_array.ravel(), y_array.ravel()
-    for k in range(2, count):
-        np.multiply(powers[k - 1], powers[1], out=powers[k])
+    powers[1:] = x_array.ravel(), y_array.ravel()
+    powers = np.cumprod(powers, axis=0)
     rows = (np.concatenate(tables) @ powers[:, 0]).reshape(len(orders), count, -1)
-    found: Array = np.einsum("mjn,jn->mn", rows, powers[:, 1]).reshape(len(orders), *x_array.shape)
-    return found
+    return np.einsum("mjn,jn->mn", rows, powers[:, 1]).reshape(len(orders), *x_array.shape)
 
 
 @cache

@@ -126,12 +126,6 @@ def _delaunay(points: Array, inner: int) -> NDArray[np.intp]:
     return triangles[(triangles.min(axis=1) < inner) | (np.count_nonzero(ahead, axis=1) == 2)]
 
 
-def _doubled_areas(points: Array, triangles: NDArray[np.intp]) -> Array:
-    a, b, c = points[triangles].transpose(1, 2, 0)
-    areas: Array = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    return areas
-
-
 def _smoothed(points: Array, triangles: NDArray[np.intp], inner: int) -> Array:
     """The points, of which all inside except the first are moved to the means of their neighbors."""
     start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()  # Inner edges are there twice.
@@ -139,4 +133,6 @@ def _smoothed(points: Array, triangles: NDArray[np.intp], inner: int) -> Array:
     for _ in range(SMOOTHING_PASSES):
         sums = [np.bincount(start, smoothed[end, axis], len(points)) for axis in (0, 1)]
         smoothed[1:inner] = np.column_stack(sums)[1:inner] / counts[1:inner, None]
-    return smoothed if _doubled_areas(smoothed, triangles).min() > 0.0 else points
+    (ax, ay), (bx, by), (cx, cy) = smoothed[triangles].transpose(1, 2, 0)
+    twice_areas = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    return smoothed if twice_areas.min() > 0.0 else points

@@ -47,5 +47,4 @@ class FitOptions:
             "weight": None if weight is None else number("weight", weight, above=0.0),
             "radius": None if self.radius is None else number("radius", self.radius, above=0.0),
         }
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)  # as dataclasses do that are frozen
+        vars(self).update(checked)  # __setattr__ of a frozen dataclass raises.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import Array, finite_array
-from ..contours.contour import SamplingPlane, Vector, dot
+from ..contours.contour import SamplingPlane, Vector, along, dot, scaled, vector_of
 from ..contours.finger import Surface, contact_of
 from ..contours.tracking import track
 from ..exploration.mesh_error import layer_off
@@ -35,15 +35,15 @@ def reachable(
     """
     points = np.asarray(vertices, dtype=float)
     over = overlapped(geometry, points, normals)
-    up = _vector(geometry.frame.axes[:, 2])
-    visible = [not is_hidden(surface, _vector(point), up, 2.0 * geometry.radius) for point in points[over]]
+    up = vector_of(geometry.frame.axes[:, 2])
+    visible = [not is_hidden(surface, vector_of(point), up, 2.0 * geometry.radius) for point in points[over]]
     over = over[np.array(visible, dtype=bool)]
     x, y, z = geometry.frame.to_local(points[over]).T
     heights = geometry.height(x, y)
     feet, offs = geometry.frame.to_world(np.column_stack([x, y, heights])).tolist(), np.abs(z - heights)
     hair = 2.0 * OWN_LAYER * geometry.radius
     own = [
-        off <= hair or layer_off(surface, foot, list(up), off - hair) is None
+        off <= hair or layer_off(surface, vector_of(foot), up, off - hair) is None
         for foot, off in zip(feet, offs.tolist(), strict=True)
     ]
     return over[np.array(own, dtype=bool)]
@@ -157,8 +157,8 @@ def _overlap(r: Reconstruction, surface: Surface) -> float:
 
 def _below(r: Reconstruction, surface: Surface, local: Vector, distance: float) -> Vector | None:
     """The world point where a ray from a local point down along the normal meets what a finger can reach."""
-    up = _vector(r.frame.axes[:, 2])
-    hit = surface.ray_cast(_vector(r.frame.to_world(local)), (-up[0], -up[1], -up[2]), distance)
+    up = vector_of(r.frame.axes[:, 2])
+    hit = surface.ray_cast(vector_of(r.frame.to_world(local)), scaled(up, -1.0), distance)
     if hit is None:
         return None
     point, normal = contact_of(hit, 1.0)
@@ -167,10 +167,4 @@ def _below(r: Reconstruction, surface: Surface, local: Vector, distance: float) 
 
 def is_hidden(surface: Surface, point: Vector, up: Vector, reach: float) -> bool:
     """Whether something of the surface is above the point, within `reach` along the unit `up`."""
-    (x, y, z), (ux, uy, uz), hair = point, up, OWN_LAYER * reach
-    return surface.ray_cast((x + hair * ux, y + hair * uy, z + hair * uz), up, reach) is not None
-
-
-def _vector(values: ArrayLike) -> Vector:
-    x, y, z = np.asarray(values, dtype=float).tolist()
-    return x, y, z
+    return surface.ray_cast(along(point, up, OWN_LAYER * reach), up, reach) is not None

@@ -192,13 +192,3 @@ def test_between_ends_far_apart_in_azimuth_radii_end_at_the_line():
     radii = closed_spline_domain(circle([30, 150, 270]), 1.0).radii(360)
     assert radii[[90, 210, 330]] == pytest.approx(0.5)
     assert radii[[60, 120]] == pytest.approx(0.5 / np.cos(np.radians(30)))
-
-
-def test_between_unequal_ends_radii_end_at_the_line_if_asked():
-    ends = circle(SIXTH) * np.array([0.1, 1, 1, 1, 1, 1])[:, None]
-    domain = closed_spline_domain(ends, 1.0)
-    line = 0.1 * np.sin(np.radians(60)) / (1.1 * np.sin(np.radians(30)))
-    assert domain.radii(360, 0.2)[[30, 330]] == pytest.approx(line)
-    for unequal in (0.0, 0.05):
-        assert domain.radii(360, unequal)[30] == pytest.approx(np.linalg.norm(domain.boundary(360)[30]))
-    assert (domain.radii(360, 0.2)[61:300] == domain.radii(360)[61:300]).all()
