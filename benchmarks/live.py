@@ -117,7 +117,7 @@ def main():
     addon, core, clock = extension.tactile_addon, extension.core, Clock()
     side_by_side, tracking = core.exploration.side_by_side, core.contours.tracking
     clock.wrap(addon.touch.surface.MeshSurface, "ray_cast", "ray casts")
-    for name in ("first_contact", "_followed"):
+    for name in ("first_contact", "_extended"):
         clock.wrap(tracking, name, "tracking")
     clock.wrap(side_by_side, "fitted", "fit")
     clock.wrap(addon.touch.touch_object, "reconstruction_report", "fit")

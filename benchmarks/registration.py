@@ -138,7 +138,7 @@ class Exhaustive:
         mesh = scanned_mesh.mesh_of(self.vertices / r.radius, self.faces.astype(np.intp), 1.0)
         places = np.concatenate([axes, origins[..., None] / r.radius], axis=2)
         for neighbors in (1, pose_search.NEAREST_TRIANGLES):
-            places, residuals, _ = pose_search._descended(places, touch, mesh, neighbors, 10)
+            places, residuals, _ = pose_search._registered(places, touch, mesh, neighbors, 10)
             kept = pose_search._distinct(places, residuals)[:REFINED]
             places, residuals = places[kept], residuals[kept]
         rotations = places[..., :3] @ r.frame.axes.T

@@ -70,7 +70,7 @@ def main():
     side_by_side, tracking = extension.core.exploration.side_by_side, extension.core.contours.tracking
     for owner, name, stage in (
         (tracking, "first_contact", "tracking"),
-        (tracking, "_followed", "tracking"),
+        (tracking, "_extended", "tracking"),
         (side_by_side, "fitted", "fit"),
         (side_by_side, "_with_stds", "fit"),
     ):

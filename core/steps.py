@@ -18,7 +18,7 @@ def result_of(steps: Generator[Any, Any, R]) -> R:
 
 
 def part_of(steps: Generator[float, None, R], start: float, end: float) -> Generator[float, None, R]:
-    """Runs steps that yield the share that is done, and yields that of longer work, from `start` to `end`."""
+    """Yields the progress of steps as that from `start` to `end` of longer work; returns their result."""
     while True:
         try:
             share = next(steps)

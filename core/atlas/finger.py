@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..contours.contour import Vector, along, cross, dot, scaled, tangent_of
-from ..contours.finger import ALIKE, Contact, Hit, Surface, contact_of
+from ..contours.finger import SAME_SHEET_COSINE, Contact, Hit, Surface, contact_of
 
 # python -m benchmarks.atlas judges these.
 DISK_PLACES = 36  # A disk around a contact is felt at this number of places.
@@ -76,7 +76,7 @@ class Finger(NamedTuple):
         """The contact along a normal within a length of a point, if the surface there faces the same way."""
         down = scaled(normal, -1.0)
         felt = self._felt(self.surface.ray_cast(along(point, normal, length), down, 2.0 * length), down)
-        return felt if felt is not None and dot(felt[1], normal) > ALIKE else None
+        return felt if felt is not None and dot(felt[1], normal) > SAME_SHEET_COSINE else None
 
     def _felt(self, hit: Hit | None, way: Vector) -> Contact | None:
         """The contact where a ray in this direction has hit, or None if it came from inside the object."""

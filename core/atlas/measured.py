@@ -36,7 +36,7 @@ CHECKED = 1000  # So many contacts check the surface:
 OFF_STDS, OFF_CELLS = 5.0, 0.5  # they are off it if they are by so many deviations and cells,
 OFF = 0.03  # and not more than this share may be off or face the other way.
 ABREAST = 8  # So many neighbors of each contact are to face the same way.
-ALIKE = 2.0  # Neighbors share a place if they are apart by up to so many times the median of all.
+SAME_SHEET_COSINE = 2.0  # Neighbors share a place if they are apart by up to so many times the median of all.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 
@@ -154,7 +154,7 @@ def _require_one_side(points: Array, normals: Array) -> None:
     sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
     apart = np.abs(np.einsum("nki,nki->nk", chords, sums))
     alike = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
-    wrong = (facing < -FACING) & (apart <= ALIKE * alike)
+    wrong = (facing < -FACING) & (apart <= SAME_SHEET_COSINE * alike)
     if wrong.mean() > OPPOSITE:
         raise ValueError(
             "normals: expected those of neighboring contacts on one side, got opposite ones at "

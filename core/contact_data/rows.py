@@ -63,19 +63,20 @@ def header_of(text: str) -> tuple[str, int, int] | None:
     """The first line that is neither empty nor a comment, its number, and the place of the next; or None."""
     for start, number, block in blocks(text):
         for line in block.split("\n"):
-            if _says(line):
+            if is_row(line):
                 return line, number, start + len(line) + 1
             number += 1
             start += len(line) + 1
     return None
 
 
-def _says(line: str) -> bool:
+def is_row(line: str) -> bool:
+    """Whether a line has fields, and is neither blank nor a comment."""
     words = line.lstrip()
     return bool(words) and not words.startswith("#")
 
 
-class Rows:
+class RowReader:
     """The rows of a table, which are added in blocks; `contours` makes curves of all of them.
 
     columns : the places of the known columns, by name
@@ -93,9 +94,9 @@ class Rows:
     def add(self, number: int, block: str) -> None:
         """Adds lines from this number on. Raises ValueError with line and column if one is no contact."""
         try:
-            labels, numbers = self._together(block)
+            labels, numbers = self._parse_block(block)
         except (ValueError, csv.Error):  # A row is blank, short, without a normal, or wrong.
-            labels, numbers = self._one_by_one(number, block)
+            labels, numbers = self._parse_lines(number, block)
         ids = [self._curves.setdefault(label, len(self._curves)) for label in labels]
         self._labels.append(np.array(ids, dtype=np.intp))
         self._numbers.append(numbers)
@@ -120,9 +121,12 @@ class Rows:
             self.labels,
         )
 
-    def _together(self, block: str) -> tuple[list[str], Array]:
-        """The labels and numbers (n, k) of rows without any exception. Raises ValueError for other rows."""
-        lines = filter(_says if "#" in block else str.strip, block.split("\n"))
+    def _parse_block(self, block: str) -> tuple[list[str], Array]:
+        """The labels and numbers (n, k) of a block, column by column.
+
+        Raises ValueError without a message if any row needs `_parse_lines`: blank, short, mixed or malformed.
+        """
+        lines = filter(is_row if "#" in block else str.strip, block.split("\n"))
         if '"' in block:
             rows = [next(csv.reader([line], delimiter=self._separator)) for line in lines]
         else:
@@ -142,18 +146,19 @@ class Rows:
             raise ValueError
         return labels, numbers
 
-    def _one_by_one(self, number: int, block: str) -> tuple[list[str], Array]:
+    def _parse_lines(self, number: int, block: str) -> tuple[list[str], Array]:
+        """The labels and numbers (n, k) of a block, line by line. Raises ValueError with line and column."""
         labels, numbers = [], []
         for place, line in enumerate(block.split("\n"), number):
             at = f"{self._name}, line {place}"
-            fields = fields_of(at, line, self._separator) if _says(line) else []
+            fields = fields_of(at, line, self._separator) if is_row(line) else []
             if any(fields):
-                label, values = self._row(at, fields)
+                label, values = self._parse_row(at, fields)
                 labels.append(label)
                 numbers.append(values)
         return labels, np.array(numbers).reshape(-1, len(self._keys))
 
-    def _row(self, at: str, fields: list[str]) -> tuple[str, list[float]]:
+    def _parse_row(self, at: str, fields: list[str]) -> tuple[str, list[float]]:
         if any(fields[self._width :]):
             raise ValueError(
                 f"{at}: expected {self._width} fields, got {len(fields)}: decimal commas need semicolons or "

@@ -44,19 +44,19 @@ def contacts_from_csv(text: str, name: str = "the table") -> Contacts:
     """
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     rows.require_short_lines(name, text)
-    said = _said(name, text)
+    metadata = _metadata(name, text)
     table = _table(name, text)
     contours = table.contours()
     for key in CURVE_KEYS:
-        stds = said.pop(key, [None])
+        stds = metadata.pop(key, [None])
         stds = stds * len(contours) if len(stds) == 1 else stds
         if len(stds) != len(contours):
             raise ValueError(f"{name}: expected one {key} or {len(contours)}, one a curve, got {len(stds)}")
         contours = [_with(name, c, key, std) for c, std in zip(contours, stds, strict=True)]
-    beside = [label.lower().startswith(STROKE) for label in table.labels]
-    strokes = tuple(itertools.compress(contours, beside))
-    contours = [c for c, stroke in zip(contours, beside, strict=True) if not stroke]
-    return Contacts(contours, table.unit, **said, strokes=strokes)
+    is_stroke = [label.lower().startswith(STROKE) for label in table.labels]
+    strokes = tuple(itertools.compress(contours, is_stroke))
+    contours = [c for c, stroke in zip(contours, is_stroke, strict=True) if not stroke]
+    return Contacts(contours, table.unit, **metadata, strokes=strokes)
 
 
 def contacts_to_csv(contacts: Contacts) -> str:
@@ -74,7 +74,7 @@ def contacts_to_csv(contacts: Contacts) -> str:
     text = io.StringIO()
     version = WITHOUT_BALL if all(contour.ball is None for contour in contours) else FORMAT_VERSION
     print(f"{TITLE}{version}, lengths in {unit or 'no unit'}", file=text)
-    for key, values in {"point": point, "outward": outward, **_of_curves(contours)}.items():
+    for key, values in {"point": point, "outward": outward, **_curve_metadata(contours)}.items():
         if values is not None:
             print("#", key, *("-" if value is None else repr(value) for value in values), file=text)
     table = csv.writer(text, lineterminator="\n")
@@ -85,7 +85,7 @@ def contacts_to_csv(contacts: Contacts) -> str:
     return text.getvalue()
 
 
-def _table(name: str, text: str) -> rows.Rows:
+def _table(name: str, text: str) -> rows.RowReader:
     """The header's columns and all rows of a text."""
     found = rows.header_of(text)
     if found is None:
@@ -94,13 +94,13 @@ def _table(name: str, text: str) -> rows.Rows:
     at = f"{name}, line {number}"
     separator = next((s for s in ";\t" if s in header), ",")
     width, columns, unit = _columns(at, rows.fields_of(at, header, separator))
-    table = rows.Rows(name, separator, width, columns, unit)
+    table = rows.RowReader(name, separator, width, columns, unit)
     for _, first, block in rows.blocks(text, start, number + 1):
         table.add(first, block)
     return table
 
 
-def _of_curves(contours: list[Contour]) -> dict[str, list[float | None]]:
+def _curve_metadata(contours: list[Contour]) -> dict[str, list[float | None]]:
     """What is known of contours by key: one number for all of them, or one for each."""
     found = {key: [getattr(contour, key) for contour in contours] for key in CURVE_KEYS}
     return {
@@ -131,11 +131,11 @@ def _with(name: str, contour: Contour, key: str, std: float | None) -> Contour:
         raise ValueError(f"{name}: {error}") from None
 
 
-def _said(name: str, text: str) -> dict[str, Any]:
+def _metadata(name: str, text: str) -> dict[str, Any]:
     """What the comments of a text that `contacts_to_csv` has written say, by key; nothing for others."""
     if not text.startswith(TITLE):
         return {}
-    said: dict[str, Any] = {}
+    metadata: dict[str, Any] = {}
     start, number, version = 0, 1, 0
     while text.startswith("#", start):
         end = text.find("\n", start) + 1 or len(text)
@@ -150,14 +150,14 @@ def _said(name: str, text: str) -> dict[str, Any]:
         if key in VECTOR_KEYS and len(words) != 3:
             raise ValueError(f"{at}: expected 3 numbers for {key}, got {len(words)}")
         if key in VECTOR_KEYS:
-            said[key] = [rows.number_of(f'{at}, "{key}"', word, LARGEST) for word in words]
+            metadata[key] = [rows.number_of(f'{at}, "{key}"', word, LARGEST) for word in words]
         elif key in CURVE_KEYS:
-            said[key] = [_deviation(f'{at}, "{key}"', word) for word in words]
+            metadata[key] = [_nonnegative_or_none(f'{at}, "{key}"', word) for word in words]
         start, number = end, number + 1
-    return said
+    return metadata
 
 
-def _deviation(at: str, word: str) -> float | None:
+def _nonnegative_or_none(at: str, word: str) -> float | None:
     """The number of 0 or more in a word, or None for "-"."""
     std = None if word == "-" else rows.number_of(at, word, LARGEST)
     if std is not None and std < 0.0:
@@ -180,7 +180,7 @@ def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
     columns: dict[str, int] = {}
     found: dict[str, str] = {}
     for i, title in enumerate(header):
-        key, bracketed, suffix = _parts(title.lower())
+        key, bracketed, suffix = _name_and_unit(title.lower())
         if key not in COLUMNS:
             continue
         unit = (bracketed or suffix).replace("μ", "µ")
@@ -206,7 +206,7 @@ def _columns(at: str, header: list[str]) -> tuple[int, dict[str, int], str]:
     return len(header), columns, used.pop()
 
 
-def _parts(title: str) -> tuple[str, str, str]:
+def _name_and_unit(title: str) -> tuple[str, str, str]:
     """A column's name, and its unit as in "x [mm]" or "x_mm", or ""."""
     place = next((i for i, letter in enumerate(title) if letter in "[(_"), len(title))
     name, mark, rest = title[:place], title[place : place + 1], title[place + 1 :]

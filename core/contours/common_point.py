@@ -20,12 +20,12 @@ from .curves import (
 )
 from .local_geometry import LEAST_ANGLE, DegenerateCurvesError
 
-MOST_APART = 0.1  # A curve may miss the point by this share of its size.
-GAP = 0.25  # Around the point, a curve may have no contacts within this share of its size.
+MAX_OFFSET = 0.1  # A curve may miss the point by this share of its size.
+MAX_GAP = 0.25  # Around the point, a curve may have no contacts within this share of its size.
 NEWTON_STEPS = 50  # Gauss-Newton takes at most this many steps; five are the rule.
 MOST_STARTS = 3  # This many starts are tried: curves may come near each other in several places.
 MOST_SEARCHED = 1000  # Starts are looked for among this many contacts of each curve,
-QUERIES = 10**6  # and among this many distances of a contact from a curve.
+MAX_QUERIES = 10**6  # and among this many distances of a contact from a curve.
 CONTACTS_AROUND = 4 * WINDOW  # This many contacts of a curve are looked at around a point.
 
 
@@ -60,7 +60,10 @@ def common_point(contours: Sequence[Contour]) -> tuple[Array, Array]:
 
 
 def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
-    """The contour with its contacts sorted along a curve through `point`."""
+    """The contour with its contacts sorted by their signed distance from `point` (3,).
+
+    The distance is Euclidean, and its sign is that of the component along the curve's tangent at the point.
+    """
     r = contour.points - finite_array("point", point, (3,), LARGEST)
     if not len(r):
         return contour
@@ -71,19 +74,21 @@ def in_running_order(contour: Contour, point: ArrayLike) -> Contour:
 
 
 def _starts(contours: Sequence[Contour]) -> Array:
-    """The contacts nearest to all curves in the sense of least squares, best first, apart from each other.
+    """Starting points (k, 3) for Gauss-Newton, k <= MOST_STARTS, the best first.
 
-    If there are many contacts, some of them suffice, because Gauss-Newton goes on from there.
+    They are contacts with the least sum of squared distances from the nearest contacts of all curves, more
+    than 2 MAX_OFFSET of the smallest curve's size from each other. Of very many contacts only some are
+    searched, because Gauss-Newton goes on from there.
     """
     from scipy.spatial import cKDTree
 
     thinned = [contour.points[:: -(-len(contour.points) // MOST_SEARCHED)] for contour in contours]
     contacts = np.vstack(thinned)
-    contacts = contacts[:: -(-len(contacts) * len(thinned) // QUERIES)]
+    contacts = contacts[:: -(-len(contacts) * len(thinned) // MAX_QUERIES)]
     squares = np.zeros(len(contacts))
     for points in thinned:
         squares += cKDTree(points).query(contacts)[0] ** 2
-    apart, starts = MOST_APART * min(map(_size, contours)), np.empty((0, 3))
+    apart, starts = MAX_OFFSET * min(map(_size, contours)), np.empty((0, 3))
     left = squares <= 4.0 * squares.min() + len(contours) * apart**2
     while len(starts) < MOST_STARTS and left.any():
         best = contacts[np.argmin(np.where(left, squares, np.inf))]
@@ -127,13 +132,13 @@ def _near(point: Array, points: Array) -> Array:
 
 
 def _require_near(point: Array, misses: Array, contours: Sequence[Contour]) -> None:
-    for number, (contour, miss) in enumerate(zip(contours, misses, strict=True), 1):
+    for number, (contour, offset) in enumerate(zip(contours, misses, strict=True), 1):
         size = _size(contour)
         gap = float(np.linalg.norm(contour.points - point, axis=1).min())
-        if not (miss <= MOST_APART * size and gap <= GAP * size):
+        if not (offset <= MAX_OFFSET * size and gap <= MAX_GAP * size):
             raise DegenerateCurvesError(
                 f"the curves do not come near each other: curve {number}, {size:.3g} long, is "
-                f"{max(miss, gap):.3g} away from the point nearest to all: give the reference point, or "
+                f"{max(offset, gap):.3g} away from the point nearest to all: give the reference point, or "
                 "leave that curve out"
             )
 

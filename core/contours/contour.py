@@ -58,9 +58,9 @@ class SamplingPlane:
         along the normal, or the tilt is not between -90 and 90 degrees.
         """
         n = vector_of(unit_vector("normal", normal))
-        return np.array(self.floats(n, tangent_of(n, tangent))).T
+        return np.array(self.axes_of_unit_vectors(n, tangent_of(n, tangent))).T
 
-    def floats(self, n: Vector, e1: Vector) -> tuple[Vector, Vector, Vector]:
+    def axes_of_unit_vectors(self, n: Vector, e1: Vector) -> tuple[Vector, Vector, Vector]:
         """`axes` for the unit normal n and the unit tangent e1 at azimuth 0, in Python floats."""
         azimuth, tilt = number("azimuth", self.azimuth), number("tilt", self.tilt)
         if abs(tilt) >= math.pi / 2:
@@ -137,7 +137,7 @@ class Contour:
         firsts = np.argsort(order[starts])
         vars(self)["points"] = self.points[order[starts]][firsts]
         if self.normals is not None:
-            sums = np.add.reduceat(alike(self.normals, order, starts)[order], starts, axis=0)
+            sums = np.add.reduceat(consistently_oriented(self.normals, order, starts)[order], starts, axis=0)
             vars(self)["normals"] = sums[firsts]
 
     def part(self, which: slice, stops: tuple[str, str]) -> "Contour":
@@ -186,8 +186,11 @@ def equal_points(points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return order, np.flatnonzero(np.append(True, changes)[: len(order)])
 
 
-def alike(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) -> Array:
-    """The normals (n, 3) with length 1, or 0, each on the side of the first in its group."""
+def consistently_oriented(normals: Array, order: NDArray[np.intp], starts: NDArray[np.intp]) -> Array:
+    """Unit normals (n, 3), each flipped to the side of the first in its group; (0, 0, 0) stays.
+
+    order, starts : groups of contacts, as `equal_points` returns them
+    """
     unit = normals / np.maximum(np.abs(normals).max(axis=1, keepdims=True), 1e-300)
     unit /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1e-300)
     group = np.empty(len(order), dtype=np.intp)

@@ -17,7 +17,7 @@ from .contour import Contour
 WINDOW = 10
 LEAST_CONTACTS = 3  # A contour has more than the quadratic's two unknowns, besides the reference point.
 RIDGE = 1e-12  # This share is added to the equations of r0, r1 and r2, because all s may be the same.
-EXACT = 1e-6  # Measured normals have at least this deviation, in radians.
+MIN_NORMAL_STD = 1e-6  # Measured normals have at least this deviation, in radians.
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def stacked(
             present[i, j, :count] = True
             if contour.normals is not None and contour.normal_std is not None:
                 normals = unit_vectors("normals", contour.normals)
-                measured[i, j, :count] = normals / max(contour.normal_std, EXACT)
+                measured[i, j, :count] = normals / max(contour.normal_std, MIN_NORMAL_STD)
     return r, present, measured if any(map(has_measured_normals, touches)) else None
 
 
@@ -114,17 +114,21 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
 
 
 def besides_point(r: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Distances (..., n) of contacts (..., n, 3) from the point, and a mask of those that are not at it."""
+    """Distances (..., n) of contacts (..., n, 3) from the point, and a mask of those that are above 0.
+
+    A distance counts as 0 up to 1e-9 of the largest one, or up to SMALLEST.
+    """
     distance = np.sqrt(np.einsum("...ni,...ni->...n", r, r))
     least = np.maximum(1e-9 * distance.max(axis=-1, initial=0.0, keepdims=True), SMALLEST)
     return distance, distance > least
 
 
 def local_curves(curves: Curves) -> tuple[Array, Array]:
-    """r = r0 + r1 s + r2 s^2 for the curves of b touches, with s along the tangent, and the deviation of r0.
+    """Parabolas r(s) = r0 + r1 s + r2 s^2, the least squares fits to the WINDOW nearest contacts of curves.
 
-    The rows r0, r1 and r2 are fitted to the nearest contacts, (b, c, 3, 3); deviations are (b, c). All are 0
-    for curves with too few contacts.
+    s is the projection onto the tangent. Returns the rows r0, r1 and r2, (b, c, 3, 3), and the standard
+    deviations of r0 by the residuals, (b, c), lengths. Both are 0 for curves of LEAST_CONTACTS contacts or
+    fewer.
     """
     shape = curves.present.shape
     present = curves.present.reshape(-1, shape[-1])

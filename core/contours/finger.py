@@ -17,7 +17,7 @@ LEAST_IN_PLANE = 1e-3  # A surface normal has at least this share in the samplin
 
 # The surface is that of a patch if the cosine between their normals is more, that of 40 degrees: an edge of
 # 45 that is crossed aslant turns less in the plane (python -m benchmarks.atlas --shapes).
-ALIKE = 0.77
+SAME_SHEET_COSINE = 0.77
 
 Hit = tuple[Sequence[float], Sequence[float]]  # A point and a normal, as a surface answers.
 Contact = tuple[Vector, Vector]  # A point of the surface and its outward normal.
@@ -32,9 +32,9 @@ class Surface(Protocol):
 
 # A contact: its place and the surface normal, both in the sampling plane as complex numbers, and both in
 # space.
-_Contact = tuple[complex, complex, Vector, Vector]
+_PlaneContact = tuple[complex, complex, Vector, Vector]
 # It takes start, direction and distance of a ray.
-_Cast = Callable[[complex, complex, float], _Contact | None]
+_Cast = Callable[[complex, complex, float], _PlaneContact | None]
 
 
 def first_contact(
@@ -63,7 +63,7 @@ def section(surface: Surface, origin: Vector, t: Vector, u: Vector, side: float)
     """
     (x0, y0, z0), (tx, ty, tz), (ux, uy, uz), ray_cast = origin, t, u, surface.ray_cast
 
-    def cast(start: complex, direction: complex, distance: float) -> _Contact | None:
+    def cast(start: complex, direction: complex, distance: float) -> _PlaneContact | None:
         """The contact of a ray along the unit `direction`, or None."""
         a, b, c, d = start.real, start.imag, direction.real, direction.imag
         hit = ray_cast(
@@ -131,7 +131,7 @@ def contacts(
         yield point, normal
 
 
-def _next_contact(cast: _Cast, at: complex, ahead: complex, up: complex, step: float) -> _Contact | None:
+def _next_contact(cast: _Cast, at: complex, ahead: complex, up: complex, step: float) -> _PlaneContact | None:
     """The contact one `step` from `at`, by a ray from above back along the curve's normal.
 
     A step along the tangent leads farther than a step along the curve. If that is more than 0.1 %, the ray is

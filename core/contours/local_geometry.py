@@ -129,10 +129,10 @@ def degeneracy(
             f"curve {np.argmin(lengths) + 1} has no direction at the point: split it where it passes the "
             "point again, or sort its contacts"
         )
-    return _indistinct(in_plane / lengths[:, None])
+    return _too_few_directions(in_plane / lengths[:, None])
 
 
-def _indistinct(tangents: Array) -> DegenerateCurvesError | None:
+def _too_few_directions(tangents: Array) -> DegenerateCurvesError | None:
     """An error that names two curves, unless three of these unit tangents differ as lines by LEAST_ANGLE."""
     least = math.sin(LEAST_ANGLE)
     sines = np.sqrt(np.maximum(1.0 - (tangents @ tangents.T) ** 2, 0.0))

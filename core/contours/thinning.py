@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from .contour import Contour, alike
+from .contour import Contour, consistently_oriented
 from .curves import WINDOW, besides_point
 
 # With this many contacts a contour no fit is worse, with noise in all directions (tests: test_thinning).
@@ -34,11 +34,11 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     if size <= 1:
         return contour, 1
     r = r[beside]
-    along = _along(r, max(WINDOW * size, len(r) // 4))
+    along = _signed_positions(r, max(WINDOW * size, len(r) // 4))
     order = np.argsort(along, kind="stable")
     before = int(np.count_nonzero(along < 0.0))
     # Groups are counted from the point outward, so that the way in which a contour runs makes no difference.
-    behind, ahead = _bounds(before, size), _bounds(len(order) - before, size)
+    behind, ahead = _group_bounds(before, size), _group_bounds(len(order) - before, size)
     starts = np.concatenate([before - behind[:0:-1], before + ahead[:-1]])
     counts = np.diff(starts, append=len(order))[:, None]
 
@@ -51,15 +51,18 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     fewer = replace(
         contour,
         points=point + means(r),
-        normals=None if normals is None else means(alike(normals[beside], order, starts)),
+        normals=None if normals is None else means(consistently_oriented(normals[beside], order, starts)),
         noise=None if noise is None else noise / root,
         normal_std=None if std is None else std / root,
     )
     return fewer, size
 
 
-def _along(r: Array, count: int) -> Array:
-    """Signed places (n,) of contacts (n, 3) along their curve, in the direction in which they run."""
+def _signed_positions(r: Array, count: int) -> Array:
+    """Signed positions (n,) of contacts (n, 3) on the principal axis of the `count` nearest ones.
+
+    Contacts are relative to the point. The sign makes positions rise with the index.
+    """
     # It takes the tangent of `count` contacts near the point, because a steep curve's longest axis is its
     # normal.
     order = np.argsort(np.einsum("ni,ni->n", r, r), kind="stable")
@@ -69,7 +72,7 @@ def _along(r: Array, count: int) -> Array:
     return along
 
 
-def _bounds(length: int, size: int) -> NDArray[np.intp]:
+def _group_bounds(length: int, size: int) -> NDArray[np.intp]:
     """The bounds, from 0 to the length, of groups of about this size; 0 alone if the length is 0."""
     count = max(1, length // size) if length else 0
     return np.arange(count + 1, dtype=np.intp) * length // max(count, 1)

@@ -39,13 +39,11 @@ def track(
     Raises ValueError for bad numbers, and if there is no surface at the point.
     """
     step, extent = number("step", step, above=0.0), number("extent", extent, above=0.0)
-    _count(extent, step)
-    return following(surface, point, outward, planes, step=step, noise=noise, rng=rng, tangent=tangent)(
-        extent
-    )
+    _half_count(extent, step)
+    return tracker(surface, point, outward, planes, step=step, noise=noise, rng=rng, tangent=tangent)(extent)
 
 
-def following(
+def tracker(
     surface: Surface,
     point: ArrayLike,
     outward: ArrayLike,
@@ -69,7 +67,7 @@ def following(
     start, up, side = first_contact(surface, vector_of(p), n, e1, step)
     curves = []
     for plane in planes:
-        t, u, across = plane.floats(n, e1)
+        t, u, across = plane.axes_of_unit_vectors(n, e1)
         cast, up_in_plane = section(surface, start, t, u, side), complex(dot(up, t), dot(up, u))
         # The curve's normal, turned clockwise by a quarter, is its tangent.
         halves = [_Half(contacts(cast, up_in_plane, turn, n, step, least_cosine)) for turn in (1j, -1j)]
@@ -77,13 +75,13 @@ def following(
 
     def contours(extent: float) -> list[Contour]:
         """The contours to this extent, a length. Raises ValueError if it is not a length of several steps."""
-        count = _count(extent, step)
-        return [_followed(curve, count, noise, generator) for curve in curves]
+        count = _half_count(extent, step)
+        return [_extended(curve, count, noise, generator) for curve in curves]
 
     return contours
 
 
-def _count(extent: float, step: float) -> int:
+def _half_count(extent: float, step: float) -> int:
     """The number of contacts of half a contour."""
     if extent < step:
         raise ValueError(f"step: expected no more than the extent {extent:g}, got {step:g}")
@@ -111,15 +109,15 @@ class _Curve:
     normals: Array
 
 
-def _followed(curve: _Curve, count: int, noise: float, generator: np.random.Generator) -> Contour:
+def _extended(curve: _Curve, count: int, noise: float, generator: np.random.Generator) -> Contour:
     """The contour of `count` contacts on either side; contacts keep the noise that they have."""
-    back, ahead = (_more(half, count) for half in curve.halves)
+    back, ahead = (_next_contacts(half, count) for half in curve.halves)
     if back or ahead:
         points, normals = np.array([*back[::-1], *ahead]).transpose(1, 0, 2)
         if noise:
             # The point has none.
             offsets = np.delete(generator.normal(0.0, noise, len(points) + 1), len(back))
-            points = points + offsets[:, None] * _in_plane(normals, curve.across)
+            points = points + offsets[:, None] * _curve_normals(normals, curve.across)
         behind = len(back)
         curve.points = np.concatenate([points[:behind], curve.points, points[behind:]])
         curve.normals = np.concatenate([normals[:behind], curve.normals, normals[behind:]])
@@ -127,8 +125,8 @@ def _followed(curve: _Curve, count: int, noise: float, generator: np.random.Gene
     return Contour(curve.points, np.array(curve.across), curve.normals, noise, stops)
 
 
-def _more(half: _Half, count: int) -> list[tuple[Vector, Vector]]:
-    """Feels the contacts that are missing to `count`, with their normals."""
+def _next_contacts(half: _Half, count: int) -> list[tuple[Vector, Vector]]:
+    """The contacts, with normals, by which a half contour grows to `count`, or fewer where it ends."""
     found: list[tuple[Vector, Vector]] = []
     while half.stop == EXTENT and half.count < count:
         try:
@@ -149,7 +147,7 @@ def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
         ) from None
 
 
-def _in_plane(normals: Array, across: Vector) -> Array:
+def _curve_normals(normals: Array, across: Vector) -> Array:
     """The curve's unit normals from those of the surface; shorter if these hardly lie in the plane."""
     in_plane = normals - np.outer(normals @ across, across)
     return in_plane / np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), LEAST_IN_PLANE)

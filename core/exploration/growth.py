@@ -26,15 +26,15 @@ from .sampling_density import stride_of
 # benchmarks.extents judges how far curves grow.
 MOST_STEPS = 96  # A half curve as long as it may be has this number of steps.
 SEEDS = (24, 12, 6, 3)  # A half curve begins with one of these numbers of steps.
-GROWN_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
+MAX_STD = 0.6 * DOUBTFUL_STD  # Growth ends here: the longest patches underestimate their deviation.
 # A misfit ratio is measured such that growth ends where it exceeds 1.
 STRETCH = 1.5  # A half curve grows by this factor at once, and by its square up to the ratio EASY.
 EASY = 0.1
-NEARLY_ENDED = 0.75  # Where curves twice as long exceed 1, only those of at most this spread grow.
-HOPELESS = 3.0  # Beyond this ratio curves half as long are not tried: they are too long as well.
-CLOSE = 1.15  # A sure touch may be shorter than one that is not by this factor (benchmarks.real).
-TOO_ROUGH = 0.0085  # Contacts of this roughness have a fit that ends growth, in 99 of 100 cases.
-EXPLAINED = 3.0  # The root mean square residual of a half curve may be this many times its noise.
+MAX_SPREAD_SHORT_SEED = 0.75  # Where curves twice as long exceed 1, only those of at most this spread grow.
+SKIP_RATIO = 3.0  # Beyond this ratio curves half as long are not tried: they are too long as well.
+SEARCH_FACTOR = 1.15  # A sure touch may be shorter than one that is not by this factor (benchmarks.real).
+ROUGHNESS_LIMIT = 0.0085  # Contacts of this roughness have a fit that ends growth, in 99 of 100 cases.
+MAX_RESIDUAL_RATIO = 3.0  # The root mean square residual of a half curve may be this many times its noise.
 
 Counts = NDArray[np.intp]  # Numbers of contacts of the c contours on either side of the point, (c, 2).
 Answer = Reconstruction | DegenerateCurvesError
@@ -99,7 +99,7 @@ class TrackedContours:
         contours = self.shortened(counts, stride_of(counts))
         points = np.vstack([contour.points for contour in contours])
         noise = max(contour.noise or 0.0 for contour in contours)
-        return roughness(points - self.point, noise) / TOO_ROUGH
+        return roughness(points - self.point, noise) / ROUGHNESS_LIMIT
 
     def misfits(self, counts: Counts, r: Reconstruction) -> Array:
         """The root mean square residual of a fit on each half curve, over what noise explains, (c, 2)."""
@@ -111,7 +111,7 @@ class TrackedContours:
         starts = np.cumsum(sizes) - sizes.ravel()
         squares = np.append((z - r.height(x, y)) ** 2, 0.0)
         sums = np.add.reduceat(squares, starts).reshape(-1, 3)[:, ::2]
-        limit = max(EXPLAINED * max(r.noise, MISFIT) * r.radius, self.largest_std or 0.0)
+        limit = max(MAX_RESIDUAL_RATIO * max(r.noise, MISFIT) * r.radius, self.largest_std or 0.0)
         return np.where(counts > 0, np.sqrt(sums / np.maximum(counts, 1)), 0.0) / limit
 
 
@@ -146,7 +146,12 @@ class GrowthTrial(NamedTuple):
 
 
 def grown(track: Track, farthest: float, step: float) -> Fits:
-    """The longest half curves that fits explain. Raises DegenerateCurvesError if none carries a fit."""
+    """The longest half curves whose fit is accepted, as a GrowthTrial: a seed first, then `_longer`.
+
+    track : tracks all half curves to a length; farthest, step : lengths
+
+    Raises DegenerateCurvesError if no seed carries a fit.
+    """
     trials: list[GrowthTrial] = []
     found = yield from _seed(track, step, trials)
     # A shorter one was tried after it and has more misfit. Noise causes that: longer curves bear it better.
@@ -156,13 +161,17 @@ def grown(track: Track, farthest: float, step: float) -> Fits:
         return found
     longest = (found.counts == np.minimum(SEEDS[0], found.tracked.whole)).all()
     too_long = min((trial.length for trial in trials if trial.spread > 1.0), default=np.inf)
-    return (yield from _longer(track, farthest, found, 1.0 if longest else NEARLY_ENDED, too_long))
+    return (yield from _longer(track, farthest, found, 1.0 if longest else MAX_SPREAD_SHORT_SEED, too_long))
 
 
 def _longer(track: Track, farthest: float, found: GrowthTrial, most: float, too_long: float) -> Fits:
-    """The longest half curves that grow from `found`, while its spread is at most `most`.
+    """Half curves lengthened by STRETCH, or by its square while misfits are below EASY, and fitted again.
 
-    They stay shorter than `too_long`, a length at which the spread is too large.
+    The half curve with the largest misfit above 1 stops; all stop if the spread exceeds 1, and its last
+    length counts.
+
+    most : the spread above which nothing grows
+    too_long : a length that the longest half curve does not reach
     """
     accepted, tracked, growing, quick = [found], found.tracked, np.full(found.counts.shape, True), True
     while found.spread <= most and (growing := growing & tracked.goes_on(found.counts)).any():
@@ -179,7 +188,7 @@ def _longer(track: Track, farthest: float, found: GrowthTrial, most: float, too_
             further = min(length + tracked.step, farthest)  # One step more shows whether they end there.
             tracked = track(further)
         try:
-            trial = yield from tried(tracked, np.minimum(longer, tracked.whole))
+            trial = yield from fit_trial(tracked, np.minimum(longer, tracked.whole))
         except DegenerateCurvesError:
             break
         if quick and trial.misfit_ratio > 1.0:
@@ -196,12 +205,12 @@ def _longer(track: Track, farthest: float, found: GrowthTrial, most: float, too_
 
 
 def _longest_sure(sure: GrowthTrial, longer: GrowthTrial) -> Fits:
-    """The longest sure trial, within CLOSE, between one that is sure and a longer one that is not."""
-    while longer.length > CLOSE * sure.length:
+    """The longest sure trial, by geometric bisection until lengths differ by less than SEARCH_FACTOR."""
+    while longer.length > SEARCH_FACTOR * sure.length:
         counts = np.sqrt(sure.counts * longer.counts).astype(np.intp)
         if (counts == sure.counts).all():
             break
-        trial = yield from tried(longer.tracked, counts)
+        trial = yield from fit_trial(longer.tracked, counts)
         sure, longer = (trial, longer) if trial.is_sure and trial.misfit_ratio <= 1.0 else (sure, trial)
     return sure
 
@@ -215,7 +224,7 @@ def _seed(track: Track, step: float, trials: list[GrowthTrial]) -> Fits:
         misfit = tracked.roughness(counts) if seeds else 0.0  # The shortest is fitted however rough it is.
         if misfit <= 1.0:
             try:
-                trial = yield from tried(tracked, counts)
+                trial = yield from fit_trial(tracked, counts)
             except DegenerateCurvesError as why:
                 error = why
                 continue
@@ -225,10 +234,10 @@ def _seed(track: Track, step: float, trials: list[GrowthTrial]) -> Fits:
             misfit = trial.spread
         else:
             rough.append(counts)
-        if misfit > HOPELESS and len(seeds) > 1:
+        if misfit > SKIP_RATIO and len(seeds) > 1:
             seeds.pop(0)
     if not trials and rough:  # The longer ones were too rough, and the shorter ones carry no fit.
-        trials.append((yield from tried(tracked, rough[-1])))
+        trials.append((yield from fit_trial(tracked, rough[-1])))
     if not trials and error is not None:
         raise error
     best = min(trials, key=lambda trial: (trial.misfit_ratio, trial.length))
@@ -239,11 +248,11 @@ def _seed(track: Track, step: float, trials: list[GrowthTrial]) -> Fits:
     return max((best, *sure), key=lambda trial: trial.length)
 
 
-def tried(tracked: TrackedContours, counts: Counts) -> Fits:
+def fit_trial(tracked: TrackedContours, counts: Counts) -> Fits:
     """The fit of these numbers of contacts. It takes as few of them as suffice in most cases."""
     stride = stride_of(counts)
     r = yield Ask(tracked.shortened(counts, stride), growing=True)
     if isinstance(r, DegenerateCurvesError):
         raise r
-    spread = r.mean_height_std / (tracked.largest_std or GROWN_STD * r.radius)
+    spread = r.mean_height_std / (tracked.largest_std or MAX_STD * r.radius)
     return GrowthTrial(tracked, counts, stride, tracked.misfits(counts, r), spread, r)

@@ -14,8 +14,8 @@ from ..reconstruction.next_plane import suggest_plane
 from ..reconstruction.result import Reconstruction
 from .growth import MOST_STEPS, STRETCH, Answer, Ask, Counts, GrowthTrial, Track, TrackedContours, grown
 from .options import ExplorationOptions
-from .sampling_density import CONTACT_COUNTS, SHORTEST, spacing, suffices
-from .taps import Tapped, beside
+from .sampling_density import CONTACT_COUNTS, MIN_HALF_CONTACTS, spacing, suffices
+from .taps import Tapped, adjacent_half_curves
 
 HELPS = 0.1  # Share of the mean deviation that one more plane must take off (benchmarks.speed --base).
 FINER = 8.0  # Steps are shorter by this factor if curves have too few contacts (benchmarks.atlas --shapes).
@@ -43,7 +43,7 @@ class Exploration:
 
 
 Steps = Generator[Ask, Answer, Exploration]
-Contacts = tuple[list[Contour], float, Reconstruction | None]  # contours, their step, their fit if known
+Sampled = tuple[list[Contour], float, Reconstruction | None]  # contours, their step, their fit if known
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +84,12 @@ class Touch:
         return replace(found, stds=tuple(stds))
 
     def _of_extent(self, extent: float) -> Steps:
-        def at(step: float) -> Contacts:
+        def at(step: float) -> Sampled:
             """The contacts this step apart."""
             contours = self.follow(self.options.planes, step=step)(extent)
             return contours if self.options.extent else [_open(c) for c in contours], step, None
 
-        return (yield from self._dense(at, extent, [extent / count for count in CONTACT_COUNTS]))
+        return (yield from self._refined_step(at, extent, [extent / count for count in CONTACT_COUNTS]))
 
     def _grown(self) -> Steps:
         """The touch as large as it can be trusted."""
@@ -104,25 +104,25 @@ class Touch:
             largest = yield from grown(self._tracking(between), self.farthest, between)
         counts = largest.counts
         found = yield from self._of_half_lengths(largest, counts)
-        if largest.is_sure and found.result.status != "ok" and self.options.is_grown:
+        if largest.is_sure and found.result.status != "ok" and self.options.is_bayes:
             # The step was chosen anew, so these are other contacts than those that were explained.
             counts = np.floor(counts / STRETCH).astype(np.intp)
             found = yield from self._of_half_lengths(largest, counts)
         if not self.options.is_tapped:
             return found
-        found = yield from self._agreeing(largest, counts, found)
-        return (yield from self._shortened(found)) if self.options.is_grown else found
+        found = yield from self._shortened_by_taps(largest, counts, found)
+        return (yield from self._shortened_until_sure(found)) if self.options.is_bayes else found
 
-    def _agreeing(self, largest: GrowthTrial, counts: Counts, found: Exploration) -> Steps:
+    def _shortened_by_taps(self, largest: GrowthTrial, counts: Counts, found: Exploration) -> Steps:
         """The touch with curves so short that no tap contradicts it, or `found` if there is none."""
         r, (found, where) = found.result, self._tapped(found)
-        if not (len(where) and self.options.is_grown and r.status == "ok"):
+        if not (len(where) and self.options.is_bayes and r.status == "ok"):
             return found
         shorter = found
         while len(where):
-            worst, counts = beside(shorter.result, where), counts.copy()
+            worst, counts = adjacent_half_curves(shorter.result, where), counts.copy()
             counts.flat[worst] = (counts.flat[worst] / SHORTER).astype(np.intp)
-            if counts.flat[worst].min() < SHORTEST:
+            if counts.flat[worst].min() < MIN_HALF_CONTACTS:
                 break
             try:
                 shorter, where = self._tapped((yield from self._of_half_lengths(largest, counts)))
@@ -130,7 +130,7 @@ class Touch:
                 break
         return shorter if shorter.result.status == "ok" else found
 
-    def _shortened(self, found: Exploration) -> Steps:
+    def _shortened_until_sure(self, found: Exploration) -> Steps:
         """The touch if it is sure, or else the longest of LEAST_SHARE of its extent or more that is."""
         extent = found.extent
         while found.result.status != "ok" and extent > LEAST_SHARE * SHORTER * found.extent:
@@ -166,11 +166,11 @@ class Touch:
         tracked, half_lengths = largest.tracked, largest.tracked.step * counts.astype(np.float64)
         length = float(half_lengths.max())
 
-        def at(step: float) -> Contacts:
+        def at(step: float) -> Sampled:
             """The contacts this step apart, or somewhat nearer to each other."""
             stride = int(step / tracked.step * (1.0 + 1e-6))
             if stride:
-                same = self.options.is_grown and counts is largest.counts and stride == largest.stride
+                same = self.options.is_bayes and counts is largest.counts and stride == largest.stride
                 known = largest.result if same else None
                 return tracked.shortened(counts, stride), stride * tracked.step, known
             # One step more shows whether a half curve ends there.
@@ -180,9 +180,9 @@ class Touch:
             return again.shortened(fewer), step, None
 
         automatic = [spacing(half_lengths, count) for count in CONTACT_COUNTS]
-        return (yield from self._dense(at, length, automatic))
+        return (yield from self._refined_step(at, length, automatic))
 
-    def _dense(self, at: Callable[[float], Contacts], extent: float, automatic: list[float]) -> Steps:
+    def _refined_step(self, at: Callable[[float], Sampled], extent: float, automatic: list[float]) -> Steps:
         """The touch with the step of the options, or the first automatic one that suffices, or the last."""
         steps = automatic if self.options.step is None else [self.options.step]
         for longest in dict.fromkeys(steps):
@@ -216,10 +216,10 @@ class Touch:
             if (
                 self.options.extent is not None
                 or misfits.flat[worst] <= 1.0
-                or counts.flat[worst] <= 2 * SHORTEST
+                or counts.flat[worst] <= 2 * MIN_HALF_CONTACTS
             ):
                 return replace(found, contours=contours, result=r, planes=(*found.planes, plane))
-            counts.flat[worst] = max(2 * SHORTEST, int(counts.flat[worst] / STRETCH) // 2 * 2)
+            counts.flat[worst] = max(2 * MIN_HALF_CONTACTS, int(counts.flat[worst] / STRETCH) // 2 * 2)
 
 
 def _open(contour: Contour) -> Contour:

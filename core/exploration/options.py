@@ -78,7 +78,7 @@ class ExplorationOptions:
         return FitOptions(self.method, self.degree, None, self.weight, self.solver)
 
     @property
-    def is_grown(self) -> bool:
+    def is_bayes(self) -> bool:
         """Whether the fit that is returned is the one that makes the curves grow."""
         return self.method == "bayes"
 

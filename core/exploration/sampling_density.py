@@ -13,7 +13,7 @@ from ..reconstruction.result import Reconstruction
 
 # benchmarks.amount chose these.
 CONTACT_COUNTS = (12, 24, 48)  # The longest half curve has the first of these numbers that suffices.
-SHORTEST = 4  # The shortest half curve has at least this many contacts.
+MIN_HALF_CONTACTS = 4  # The shortest half curve has at least this many contacts.
 # More contacts help if twice as many would lower the mean deviation of the height by the share NOTICEABLE.
 # They cannot, if noise is below QUIET times that deviation.
 NOTICEABLE = 0.15
@@ -51,7 +51,7 @@ def stride_of(counts: NDArray[np.intp]) -> int:
 
 
 def spacing(half_lengths: Array | NDArray[np.intp], count: int) -> float:
-    """The step at which the longest half curve (c, 2) has `count` contacts, the shortest SHORTEST or more."""
+    """The step with `count` contacts on the longest half curve (c, 2), and MIN_HALF_CONTACTS on others."""
     longest = float(half_lengths.max())
     shortest = float(np.where(half_lengths > 0, half_lengths, longest).min())
-    return min(longest / count, max(shortest / SHORTEST, longest / CONTACT_COUNTS[-1]))
+    return min(longest / count, max(shortest / MIN_HALF_CONTACTS, longest / CONTACT_COUNTS[-1]))

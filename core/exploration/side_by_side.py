@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..arguments import LARGEST, Array, finite_array, unit_vector
 from ..contours.contour import EXTENT, Contour, SamplingPlane
-from ..contours.finger import ALIKE, Surface
-from ..contours.tracking import following, generator_of, track
+from ..contours.finger import SAME_SHEET_COSINE, Surface
+from ..contours.tracking import generator_of, track, tracker
 from ..reconstruction.deviations import with_height_stds
 from ..reconstruction.from_contours import fitted
 from ..reconstruction.options import FitOptions
@@ -26,9 +26,9 @@ from .taps import tapped
 
 GLANCE_CONTACTS = 8  # A half curve has this many contacts where it only has to show whether it ends.
 LONGEST = 1e15  # Lengths beyond this, or below its inverse, are not tried.
-# Touches with a given deviation, as those of a whole object, end where normals are not ALIKE from one
-# contact to the next; all others go on whatever the cosine between these.
-ANY = -1.0
+# With a given deviation, as for a whole object, touches end where the cosine between successive normals is
+# below SAME_SHEET_COSINE; all others end at none.
+ANY_COSINE = -1.0
 BISECTIONS = 6  # They narrow a factor of two to a 64th of it.
 
 Found = Generator[None, None, list[Exploration | ValueError]]
@@ -47,7 +47,7 @@ def exploring_many(
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
     generator, tangent = generator_of(options.rng), options.tangent
-    cosine = ALIKE if options.largest_std else ANY
+    cosine = SAME_SHEET_COSINE if options.largest_std else ANY_COSINE
 
     def steps(point: Array, direction: Array) -> Steps:
         """The steps of one touch."""
@@ -55,7 +55,7 @@ def exploring_many(
         place = surface, point, direction
         farthest = options.farthest or _farthest(partial(track, *place, options.planes, tangent=tangent))
         follow = partial(
-            following, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
+            tracker, *place, noise=options.noise, rng=generator, tangent=tangent, least_cosine=cosine
         )
         touch = Touch(follow, point, reference, farthest, partial(tapped, surface), options)
         return (yield from touch.steps())
@@ -63,17 +63,17 @@ def exploring_many(
     return _side_by_side([steps(*place) for place in zip(p, up, strict=True)], p, up, options.fit)
 
 
-def _farthest(feel: Callable[..., list[Contour]]) -> float:
-    """The shortest length, to a hundredth, before which all half curves end.
+def _farthest(track_to: Callable[..., list[Contour]]) -> float:
+    """The length at which all half curves have ended, to one part in 64: by doubling, then bisection.
 
-    Raises what `feel` raises if nothing can be felt at any length.
+    track_to : `track` without its extent and step, whose ValueError passes on
     """
     felt: list[float] = []
 
     def ended(length: float) -> bool:
         """Whether all half curves, felt coarsely, end before that, or nothing can be felt at this length."""
         try:
-            contours = feel(extent=length, step=length / GLANCE_CONTACTS)
+            contours = track_to(extent=length, step=length / GLANCE_CONTACTS)
         except ValueError:
             if length <= 1.0 / LONGEST and not felt:
                 raise

@@ -20,7 +20,7 @@ from .mesh_error import height_error
 # the way to the boundary, and two at WITHIN.
 NEAR_RIM, WITHIN = 0.98, 0.6
 TOO_FAR_OFF = 10.0  # A tap that is off by more deviations contradicts the fit by itself.
-BESIDE = 0.01  # The side of the surface is felt from so far above the point, as a share of the radius.
+SIDE_HEIGHT = 0.01  # The side of the surface is felt from so far above the point, as a share of the radius.
 
 
 class Tapped(NamedTuple):
@@ -53,7 +53,7 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     offs = np.empty(len(where))
     felt = np.array([contact_of(hit, 1.0)[0] for hit in hits if hit is not None]).reshape(-1, 3)
     offs[met] = np.abs((felt - feet[met]) @ up)
-    offs[~met] = [_off(surface, r, vector_of(foot)) for foot in feet[~met]]
+    offs[~met] = [_height_offset(surface, r, vector_of(foot)) for foot in feet[~met]]
     missed, offs = np.isnan(offs), np.nan_to_num(offs)
     within = height_error(r, surface) or 0.0
     contradicts = (
@@ -66,11 +66,11 @@ def tapped(surface: Surface, r: Reconstruction) -> Tapped:
     return Tapped(taps, where[(offs > CONTRADICTING * stds) & contradicts])
 
 
-def _off(surface: Surface, r: Reconstruction, foot: Vector) -> float:
+def _height_offset(surface: Surface, r: Reconstruction, foot: Vector) -> float:
     """How far above or below a place the surface is whose outside is up; NaN if there is none within L."""
     d1, _, up = (vector_of(axis) for axis in r.frame.axes.T)
     at_point = section(surface, vector_of(r.frame.origin), d1, up, 1.0)
-    point = at_point(complex(0.0, BESIDE * r.radius), -1j, 2.0 * BESIDE * r.radius)
+    point = at_point(complex(0.0, SIDE_HEIGHT * r.radius), -1j, 2.0 * SIDE_HEIGHT * r.radius)
     side = math.copysign(1.0, dot(point[3], up)) if point else 1.0
     cast = section(surface, foot, d1, up, side)
     for direction in (-1j, 1j):
@@ -80,8 +80,11 @@ def _off(surface: Surface, r: Reconstruction, foot: Vector) -> float:
     return math.nan
 
 
-def beside(r: Reconstruction, where: Array) -> NDArray[np.intp]:
-    """The longer of the two half curves beside each local place (k, 2), as indices into raveled Counts."""
+def adjacent_half_curves(r: Reconstruction, where: Array) -> NDArray[np.intp]:
+    """For each local place (k, 2) the longer of the two half curves next to it in azimuth.
+
+    They are indices into raveled Counts (c, 2), and each is there once.
+    """
     x, y, _ = r.frame.to_local(np.vstack([contour.points[[0, -1]] for contour in r.contours])).T
     turns = np.arctan2(where[:, 1], where[:, 0])[:, None] - np.arctan2(y, x)
     turns[:, np.hypot(x, y) <= SAME_END * r.radius] = np.nan  # The curve goes to one side only.

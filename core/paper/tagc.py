@@ -28,9 +28,9 @@ class _Fields(NamedTuple):
     slopes: Array  # z_x, z_y (2, m)
     bends: Array  # z_xx, z_xy, z_yy (3, m)
     w: Array
-    shrink: Array  # W^(-3/2)
+    w_power: Array  # W^(-3/2)
     det: Array
-    miss: Array  # (n,)
+    residuals: Array  # (n,)
 
 
 class Objective:
@@ -56,25 +56,25 @@ class Objective:
         z = (a @ self._flat).reshape(5, -1) + self._quadric_bends
         (zx, zy), (zxx, zxy, zyy) = z[:2], z[2:]
         w = 1.0 + zx * zx + zy * zy
-        miss = self._data.basis @ a - self._data.remainder
-        return _Fields(z[:2], z[2:], w, 1.0 / (w * np.sqrt(w)), zxx * zyy - zxy * zxy, miss)
+        residuals = self._data.basis @ a - self._data.remainder
+        return _Fields(z[:2], z[2:], w, 1.0 / (w * np.sqrt(w)), zxx * zyy - zxy * zxy, residuals)
 
     def total_absolute_curvature(self, at: _Fields, rounding: float = 0.0) -> float:
         """The integral g of (8)."""
-        return self._area * float(np.hypot(at.det, rounding) @ at.shrink)
+        return self._area * float(np.hypot(at.det, rounding) @ at.w_power)
 
     def value(self, at: _Fields, rounding: float = 0.0) -> float:
         """The objective g + lambda f of (9)."""
-        return self.total_absolute_curvature(at, rounding) + self._scale * float(at.miss @ at.miss)
+        return self.total_absolute_curvature(at, rounding) + self._scale * float(at.residuals @ at.residuals)
 
     def gradient(self, at: _Fields, rounding: float = 0.0) -> Array:
         """The gradient (terms,); without rounding, the signs delta_j of K count as constant (IV-B)."""
         (zx, zy), (zxx, zxy, zyy) = at.slopes, at.bends
         size = np.hypot(at.det, rounding)
-        delta = (at.det / size if rounding else np.where(at.det >= 0.0, 1.0, -1.0)) * at.shrink
-        slope = -3.0 * size * at.shrink / at.w
+        delta = (at.det / size if rounding else np.where(at.det >= 0.0, 1.0, -1.0)) * at.w_power
+        slope = -3.0 * size * at.w_power / at.w
         by_field = np.concatenate([slope * zx, slope * zy, delta * zyy, -2.0 * delta * zxy, delta * zxx])
-        return self._area * (self._flat @ by_field) + 2.0 * self._scale * (at.miss @ self._data.basis)
+        return self._area * (self._flat @ by_field) + 2.0 * self._scale * (at.residuals @ self._data.basis)
 
     def hessian(self, at: _Fields, rounding: float) -> Array:
         """The Hessian (terms, terms), in which W counts as constant: slopes are small where D matters."""
@@ -82,9 +82,9 @@ class Objective:
         xx, xy, yy = self._basis[2:]
         size = np.hypot(at.det, rounding)
         det = zyy * xx - 2.0 * zxy * xy + zxx * yy  # the gradient of D
-        delta = at.det / size * at.shrink
+        delta = at.det / size * at.w_power
         mixed = (delta * xx) @ yy.T
-        around = (rounding**2 * at.shrink / (size * size * size) * det) @ det.T
+        around = (rounding**2 * at.w_power / (size * size * size) * det) @ det.T
         return self._area * (around + mixed + mixed.T - (2.0 * delta * xy) @ xy.T) + self._data_hessian
 
 
@@ -96,30 +96,36 @@ def newton_minimum(objective: Objective, start: Array) -> tuple[Array, bool]:
     scale = max(float(np.mean(np.abs(at.det))), 1e-9)
     # If the weight is huge, rounding may leave the metric indefinite.
     least = 1e-13 * np.trace(objective.metric) * np.eye(len(a))
-    unit = np.linalg.inv(np.linalg.cholesky(objective.metric + least)).T
+    whitening = np.linalg.inv(np.linalg.cholesky(objective.metric + least)).T
     for share in ROUNDINGS:
         rounding, damping = scale * share, 1e-3
         value = objective.value(at, rounding)
         enough = SETTLED_OBJECTIVE if share > ROUNDINGS[-1] else CONVERGED
         while steps < NEWTON_CAP:
             before, steps = value, steps + 1
-            a, at, value, damping = _newton_step(objective, unit, a, at, value, rounding, damping)
+            a, at, value, damping = _newton_step(objective, whitening, a, at, value, rounding, damping)
             if before - value <= enough * before:
                 break
     return a, steps < NEWTON_CAP
 
 
 def _newton_step(
-    objective: Objective, unit: Array, a: Array, at: _Fields, value: float, rounding: float, damping: float
+    objective: Objective,
+    whitening: Array,
+    a: Array,
+    at: _Fields,
+    value: float,
+    rounding: float,
+    damping: float,
 ) -> tuple[Array, _Fields, float, float]:
-    """A step down: the new coefficients, their fields and value, and the damping of the next step.
+    """A Levenberg-damped Newton step: coefficients, fields, value, and the damping of the next step.
 
-    unit : (terms, terms), columns that are orthonormal in the metric
+    whitening : (terms, terms), W with W' M W = I for the metric M
 
-    The Hessian may be indefinite, so the moduli of its eigenvalues relative to the metric count.
+    The absolute eigenvalues of W' H W take the place of those of the Hessian, which may be indefinite.
     """
-    bends, axes = np.linalg.eigh(unit.T @ objective.hessian(at, rounding) @ unit)
-    axes = unit @ axes
+    bends, axes = np.linalg.eigh(whitening.T @ objective.hessian(at, rounding) @ whitening)
+    axes = whitening @ axes
     along = objective.gradient(at, rounding) @ axes
     while True:
         lengths = along / (np.maximum(np.abs(bends), 1e-9) + damping)

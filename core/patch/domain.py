@@ -19,12 +19,12 @@ GRID = 600  # The grid (8) over a domain has about this number of points.
 BOUNDARY_SAMPLES = 1024  # With this number of samples the radius of the boundary is right to 1e-5.
 HULL_PLACES = 32  # This number of places on the hull of contacts bounds a domain.
 INSIDE_HULL = 0.05  # The origin is inside such a hull by at least this share of the radius.
-QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])  # It turns rows counterclockwise.
+QUARTER_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])  # It turns rows counterclockwise.
 # Ends this near to each other, as a share of the radius, count once; near the origin, not at all.
 SAME_END = 1e-3
 # Ends of two or three curves are at most 90 degrees apart: if these are more, one between was at the origin.
-WIDE = np.radians(100.0)
-SHORTEST = 1e-6  # No length is divided by less than this share of the farthest end's distance.
+MAX_END_GAP = np.radians(100.0)
+MIN_LENGTH_SHARE = 1e-6  # No length is divided by less than this share of the farthest end's distance.
 AT_POINT = 0.01  # Where the surface ends at the origin, the domain ends this share of the radius away.
 GAUSS_ALONG, GAUSS_ACROSS = 4, 3  # Gauss-Legendre nodes along each piece of the boundary, and outward.
 
@@ -50,11 +50,13 @@ class Domain:
         return None if self.open_ends is None else self.open_ends | np.roll(self.open_ends, -1)
 
     @cached_property
-    def _boundary(self) -> tuple[Array, Array]:
-        """The lengths (m,) of the chords, and the closed cubic spline over them by powers, (4, m, 2).
+    def _spline(self) -> tuple[Array, Array]:
+        """The chord lengths h (m,), and the closed C2 cubic spline over them by powers, (4, m, 2).
 
-        Its slopes at the ends follow from the continuity of its second derivative. Next to straight
-        pieces, which are chords, it begins across the ray to the end, as a circle would.
+        The slopes s at the ends solve the cyclic system h_i s_(i-1) + 2 (h_(i-1) + h_i) s_i + h_(i-1) s_(i+1)
+        = 3 (h_i d_(i-1) + h_(i-1) d_i) with the slopes d of the chords (de Boor, A Practical Guide to
+        Splines, IV). Next to straight pieces, which are chords, the spline begins across the ray to the end,
+        as a circle would.
         """
         rows = np.arange(len(self.ends))
         last, following = rows - 1, rows + 1 - len(rows)  # The rows before and after, in a circle.
@@ -69,7 +71,10 @@ class Domain:
         straight = self._straight
         if straight is not None:
             adjacent = straight | straight[last]
-            system[adjacent], right[adjacent] = np.eye(len(rows))[adjacent], self.ends[adjacent] @ QUARTER
+            system[adjacent], right[adjacent] = (
+                np.eye(len(rows))[adjacent],
+                self.ends[adjacent] @ QUARTER_TURN,
+            )
             right[adjacent] /= np.linalg.norm(self.ends[adjacent], axis=1, keepdims=True)
         slopes = np.linalg.solve(system, right)
         bend = (slopes + slopes[following] - 2.0 * rise) / over
@@ -82,7 +87,7 @@ class Domain:
     @cached_property
     def _polar(self) -> tuple[Array, Array]:
         """Ascending azimuths and the radii of the boundary there."""
-        chords, (start, slope, bend, third) = self._boundary
+        chords, (start, slope, bend, third) = self._spline
         each = math.ceil(BOUNDARY_SAMPLES / len(self.ends))  # Equal numbers keep the ends' symmetry.
         t = (chords[:, None] / each * np.arange(each))[..., None]
         start, slope, bend, third = (part[:, None] for part in (start, slope, bend, third))
@@ -94,7 +99,11 @@ class Domain:
         return azimuths[order], radii[order]
 
     def _without_turning_back(self) -> tuple[Array, Array]:
-        """A monotone spline of the radius, because next to a short end the closed spline may turn back."""
+        """Azimuths and radii (BOUNDARY_SAMPLES,) of a periodic monotone cubic r(azimuth) through the ends.
+
+        It takes the place of the closed spline where that is not star-shaped, as next to a short end (scipy's
+        PchipInterpolator).
+        """
         from scipy.interpolate import PchipInterpolator
 
         # Of two ends in one direction the farther one counts.
@@ -116,7 +125,7 @@ class Domain:
         They lie on curves parallel to the boundary.
         """
         piece, share, along, out, outward = _gauss(len(self.ends))
-        lengths, pieces = self._boundary
+        lengths, pieces = self._spline
         chords, (start, slope, bend, third) = lengths[piece, None], pieces[:, piece]
         t = share[:, None] * chords
         points = start + t * (slope + t * (bend + t * third))
@@ -126,12 +135,16 @@ class Domain:
 
     @property
     def node_places(self) -> Array:
-        """How far out the nodes are, as shares (n,) of the boundary's radius there."""
+        """The radii (n,) of the nodes divided by that of the boundary at their azimuths, between 0 and 1."""
         piece, _, _, out, _ = _gauss(len(self.ends))
         return np.repeat(out.ravel(), len(piece))
 
     def _radius(self, azimuth: Array) -> Array:
-        """The boundary's radius at azimuths, on chords between samples: straight pieces are exact."""
+        """The radius of the boundary's polygon at azimuths (...): a b sin w / (a sin u + b sin(w - u)).
+
+        a and b are the radii of the samples before and after, w the angle between them, and u that from the
+        first.
+        """
         azimuths, radii = self._polar
         turns, turn = azimuths - azimuths[0], (azimuth - azimuths[0]) % (2.0 * np.pi)
         before = np.searchsorted(turns, turn, side="right") - 1
@@ -156,7 +169,7 @@ class Domain:
         """Radii (count,) of the boundary, at azimuths from 0 on, but nowhere beyond what is between the ends.
 
         Between ends at very different distances the spline swings out to where nothing was felt, and between
-        ends more than WIDE apart there is only what is inside the line from one to the other.
+        ends more than MAX_END_GAP apart there is only what is inside the line from one to the other.
         """
         turns, whole = 2.0 * np.pi * np.arange(count) / count, 2.0 * np.pi
         at, out = np.arctan2(self.ends[:, 1], self.ends[:, 0]) % whole, np.hypot(*self.ends.T)
@@ -165,9 +178,9 @@ class Domain:
         at[0], at[-1] = at[0] - whole, at[-1] + whole
         i = np.searchsorted(at, turns, side="right")
         before, after, last, following = turns - at[i - 1], at[i] - turns, out[i - 1], out[i]
-        across = np.maximum(last * np.sin(before) + following * np.sin(after), SHORTEST * out.max())
+        across = np.maximum(last * np.sin(before) + following * np.sin(after), MIN_LENGTH_SHARE * out.max())
         line = np.maximum(last * following * np.sin(before + after) / across, AT_POINT * out.max())
-        line = np.where(before + after > WIDE, line, np.inf)
+        line = np.where(before + after > MAX_END_GAP, line, np.inf)
         return np.minimum(np.minimum(self._radius(turns), np.interp(turns, at, out)), line)
 
     def boundary(self, n: int) -> Array:

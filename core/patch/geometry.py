@@ -14,7 +14,7 @@ from .domain import GRID, Domain
 from .monge import HeightField
 from .triangulation import patch_mesh
 
-EVEN = 1e-4  # A similarity in single precision may be off by so much.
+SIMILARITY_TOLERANCE = 1e-4  # A similarity in single precision may be off by so much.
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ def similarity(matrix: ArrayLike) -> tuple[float, Array, Array]:
     m = finite_array("matrix", matrix, (4, 4))
     scale = float(np.cbrt(np.linalg.det(m[:3, :3])))
     u, stretches, v = np.linalg.svd(m[:3, :3])
-    even = scale > 0.0 and np.abs(stretches / scale - 1.0).max() <= EVEN
+    even = scale > 0.0 and np.abs(stretches / scale - 1.0).max() <= SIMILARITY_TOLERANCE
     if not even or np.abs(m[3] - (0.0, 0.0, 0.0, 1.0)).max() > 0.0:
         raise ValueError("matrix: expected a rotation, one scale above 0 and a shift, got another matrix")
     return scale, u @ v, m[:3, 3]

@@ -176,7 +176,7 @@ def polynomial_derivatives(
     count, (i, j) = int(terms[-1].sum()) + 1, terms.T
     table = np.zeros((count, count))
     table[j, i] = coefficients
-    tables = [_derive(count, dy) @ table @ _derive(count, dx).T for dx, dy in orders]
+    tables = [_derivative_matrix(count, dy) @ table @ _derivative_matrix(count, dx).T for dx, dy in orders]
     powers = np.ones((count, 2, x_array.size))
     powers[1:] = x_array.ravel(), y_array.ravel()
     powers = np.cumprod(powers, axis=0)
@@ -185,7 +185,7 @@ def polynomial_derivatives(
 
 
 @cache
-def _derive(powers: int, order: int) -> Array:
+def _derivative_matrix(powers: int, order: int) -> Array:
     """The matrix (powers, powers) that takes coefficients of x^i to those of the derivative of this order."""
     return np.linalg.matrix_power(np.diag(np.arange(1.0, powers), 1), order)
 
@@ -193,12 +193,16 @@ def _derive(powers: int, order: int) -> Array:
 def _newton_step(surface: HeightField, foot: Array, q: Array) -> Array:
     """The steps -H^-1 g for half the squared distance, (n, 2); H is without z'' if it is not positive."""
     d = surface.derivatives(*foot.T)
-    above = d.z - q[:, 2]
-    gx, gy = foot[:, 0] - q[:, 0] + above * d.x, foot[:, 1] - q[:, 1] + above * d.y
-    hxx, hxy, hyy = 1.0 + d.x**2 + above * d.xx, d.x * d.y + above * d.xy, 1.0 + d.y**2 + above * d.yy
-    bowl = (hxx > 0.0) & (hxx * hyy - hxy**2 > 0.0)
-    hxx = np.where(bowl, hxx, 1.0 + d.x**2)
-    hxy = np.where(bowl, hxy, d.x * d.y)
-    hyy = np.where(bowl, hyy, 1.0 + d.y**2)
-    det = np.where(bowl, hxx * hyy - hxy**2, 1.0 + d.x**2 + d.y**2)
+    residual = d.z - q[:, 2]
+    gx, gy = foot[:, 0] - q[:, 0] + residual * d.x, foot[:, 1] - q[:, 1] + residual * d.y
+    hxx, hxy, hyy = (
+        1.0 + d.x**2 + residual * d.xx,
+        d.x * d.y + residual * d.xy,
+        1.0 + d.y**2 + residual * d.yy,
+    )
+    is_convex = (hxx > 0.0) & (hxx * hyy - hxy**2 > 0.0)
+    hxx = np.where(is_convex, hxx, 1.0 + d.x**2)
+    hxy = np.where(is_convex, hxy, d.x * d.y)
+    hyy = np.where(is_convex, hyy, 1.0 + d.y**2)
+    det = np.where(is_convex, hxx * hyy - hxy**2, 1.0 + d.x**2 + d.y**2)
     return np.column_stack([hxy * gy - hyy * gx, hxy * gx - hxx * gy]) / det[:, None]

@@ -30,7 +30,7 @@ RIM_SPACING = 0.65
 EDGE_GROWTH = 0.5  # The distance of neighbors grows by this share of the distance from the rim.
 CLEAR = 0.6  # The lattice keeps this share of a rim's edge away from the rim.
 SMOOTHING_PASSES = 3  # Inner points are smoothed this often.
-UNEQUAL = 1e-6  # Points are moved by this share, so that no four lie on a circle, which has two diagonals.
+JITTER = 1e-6  # Points are moved by this share, so that no four lie on a circle, which has two diagonals.
 
 Size = Callable[[Array], Array]
 
@@ -46,7 +46,7 @@ def patch_mesh(surface: HeightField, domain: Domain, tolerance: float) -> tuple[
     def size(points: Array) -> Array:
         """The distance (n,) of neighbors that the second derivatives allow at points (n, 2)."""
         flattest = CHORD * tolerance / (COARSEST_EDGE * mean_radius) ** 2
-        wanted = np.sqrt(CHORD * tolerance / np.maximum(_bend(surface, points), flattest))
+        wanted = np.sqrt(CHORD * tolerance / np.maximum(_chord_error_scale(surface, points), flattest))
         return np.maximum(wanted, FINEST_EDGE * mean_radius)
 
     plane, triangles = triangulate(domain, size, VISIBLE * mean_radius)
@@ -66,8 +66,11 @@ def triangulate(domain: Domain, size: Size, off: float) -> tuple[Array, NDArray[
     return _smoothed(points, triangles, len(inner)), triangles
 
 
-def _bend(surface: HeightField, points: Array) -> Array:
-    """8 times the largest chord error (n,) of an equilateral triangle of side 1, by second derivatives."""
+def _chord_error_scale(surface: HeightField, points: Array) -> Array:
+    """8 / side^2 times the error (n,) of a flat equilateral triangle on the osculating paraboloid.
+
+    With eigenvalues |a| >= |b| of the Hessian it is |a|, plus |b| / 3 if both have one sign.
+    """
     d = surface.derivatives(*points.T)
     mean, half = 0.5 * np.abs(d.xx + d.yy), np.hypot(0.5 * (d.xx - d.yy), d.xy)
     return mean + half + np.maximum(mean - half, 0.0) / 3.0
@@ -84,10 +87,10 @@ def _rim(domain: Domain, size: Size, off: float) -> tuple[Array, float]:
         return np.column_stack([np.interp(at, lengths, values) for values in closed.T])
 
     samples = around(RIM_SAMPLES)
-    bow = 0.5 * np.hypot(*(np.roll(samples, 1, 0) - 2.0 * samples + np.roll(samples, -1, 0)).T).max()
+    sagitta = 0.5 * np.hypot(*(np.roll(samples, 1, 0) - 2.0 * samples + np.roll(samples, -1, 0)).T).max()
     rings = np.arange(5)[:, None, None] / 4.0 * samples
     sizes = size(rings.reshape(-1, 2)).reshape(5, RIM_SAMPLES)
-    bound = max(RIM_SAMPLES / 2.0 * math.sqrt(bow / off), lengths[-1] / (RIM_SPACING * sizes[-1].min()))
+    bound = max(RIM_SAMPLES / 2.0 * math.sqrt(sagitta / off), lengths[-1] / (RIM_SPACING * sizes[-1].min()))
     return around(4 * math.ceil(min(bound, MOST_RIM_EDGES) / 4.0)), float(sizes.min())
 
 
@@ -119,7 +122,7 @@ def _delaunay(points: Array, inner: int) -> NDArray[np.intp]:
     from scipy.spatial import Delaunay
 
     scaled = points / np.abs(points).max()
-    scaled *= 1.0 + UNEQUAL * (scaled**2 @ (1.0, 2.0))[:, None]
+    scaled *= 1.0 + JITTER * (scaled**2 @ (1.0, 2.0))[:, None]
     triangles = Delaunay(scaled).simplices.astype(np.intp)  # counterclockwise in two dimensions
     # A triangle outside has its corners on the rim, and runs against the rim.
     ahead = triangles < np.roll(triangles, -1, axis=1)

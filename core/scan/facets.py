@@ -18,10 +18,10 @@ from ..reconstruction.result import Reconstruction
 FEW = 12  # On fewer facets a curvature is off by some .8 to 1.2 of the larger one; on more, by .3.
 MANY = 40  # If contacts lie on this number of faces, the mesh is fine, even where it is flat.
 # Edges between these angles stand for a smooth bend,
-SAME, SMOOTH = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
+DISTINCT_COSINE, SMOOTH_COSINE = math.cos(math.radians(1.0)), math.cos(math.radians(40.0))
 # if both facets have this share of the wider one's width, and of the radius; else one is a fillet.
-LIKE = 0.25
-BEYOND = 0.05  # The facet behind an edge is looked for this share of the width beyond it.
+MIN_WIDTH_RATIO = 0.25
+NEIGHBOR_STEP = 0.05  # The facet behind an edge is looked for this share of the width beyond it.
 
 
 class Facet(NamedTuple):
@@ -51,7 +51,7 @@ def has_few_facets(
         if face in touched or not (facet := shape(face)).width:
             continue
         touched[face] = facet
-        if all(facet.normal @ normal < SAME for normal in distinct):
+        if all(facet.normal @ normal < DISTINCT_COSINE for normal in distinct):
             distinct.append(facet.normal)
         if len(distinct) == FEW or len(touched) == MANY:
             return False
@@ -66,10 +66,10 @@ def _is_smooth(facet: Facet, radius: float, facet_near: Callable[[Array], Facet]
     for start, edge, out in zip(starts, along, outward, strict=True):
         if not np.any(out):
             continue
-        beyond = facet_near(start + 0.5 * edge + BEYOND * facet.width * out / np.linalg.norm(out))
-        is_bend = SMOOTH < float(facet.normal @ beyond.normal) < SAME
+        beyond = facet_near(start + 0.5 * edge + NEIGHBOR_STEP * facet.width * out / np.linalg.norm(out))
+        is_bend = SMOOTH_COSINE < float(facet.normal @ beyond.normal) < DISTINCT_COSINE
         narrow, wide = sorted((facet.width, beyond.width))
-        if is_bend and narrow >= LIKE * max(wide, radius):
+        if is_bend and narrow >= MIN_WIDTH_RATIO * max(wide, radius):
             return True
     return False
 

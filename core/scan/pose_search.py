@@ -18,7 +18,7 @@ from ..arguments import LARGEST, Array, finite_array, shown
 from ..patch.monge import QUARTIC, exponents, monomials
 from ..reconstruction.result import Reconstruction
 from .sampling import spaced
-from .scanned_mesh import Mesh, corners_of, mesh_distances, mesh_of
+from .scanned_mesh import ScanMesh, corners_of, mesh_distances, mesh_of
 
 # Oriented points are an array (2, n, 3): contacts, and the patch's unit normals there, in the frame. Lengths
 # are in units of the patch's radius. benchmarks.registration judges these numbers and those of
@@ -76,8 +76,8 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     center = 0.5 * (co[corners].min(axis=(0, 1)) + co[corners].max(axis=(0, 1)))
     size = math.dist(oriented[0].min(axis=0), oriented[0].max(axis=0))
     mesh = mesh_of((co - center) / r.radius, corners, size)
-    starts = _coarse(oriented, mesh)
-    places, residuals, slides = _descended(starts, oriented, mesh, NEAREST_TRIANGLES, FINE_STEPS)
+    starts = _initial_poses(oriented, mesh)
+    places, residuals, slides = _registered(starts, oriented, mesh, NEAREST_TRIANGLES, FINE_STEPS)
     distinct = _distinct(places, residuals)
     poses = []
     for i in distinct[:best]:
@@ -91,7 +91,7 @@ def register(r: Reconstruction, vertices: ArrayLike, faces: ArrayLike, *, best: 
     return poses
 
 
-def _coarse(oriented: Array, mesh: Mesh) -> Array:
+def _initial_poses(oriented: Array, mesh: ScanMesh) -> Array:
     """The most promising places (m, 3, 4), moved to where contacts are nearest to the planes of triangles."""
     from scipy.spatial.transform import Rotation
 
@@ -107,11 +107,11 @@ def _coarse(oriented: Array, mesh: Mesh) -> Array:
     ]
     places = places[order // TRIED_TURNS]
     places[..., :3] = places[..., :3] @ turns[order % TRIED_TURNS]
-    places, residuals, _ = _descended(places, oriented, mesh, 1, COARSE_STEPS)
+    places, residuals, _ = _registered(places, oriented, mesh, 1, COARSE_STEPS)
     return places[_distinct(places, residuals)[:FINE]]
 
 
-def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
+def _fields(mesh: ScanMesh, reach: float) -> tuple[Array, Array]:
     """Places all over the mesh, (m, 3, 4), and coefficients (k, m) of the polynomials that stand for it."""
     from scipy.spatial import cKDTree
 
@@ -135,10 +135,10 @@ def _fields(mesh: Mesh, reach: float) -> tuple[Array, Array]:
 
 
 def _scores(oriented: Array, fields: Array) -> Array:
-    """The sums (m,) of squared distances of the contacts to polynomials (k, m).
+    """The sums (m,) of squared normal residuals of the contacts to the polynomials (k, m) of m places.
 
-    What a small tilt and a shift along the normal can remove does not count. On a quadric, neither does what
-    a small shift along the surface can remove.
+    Residuals are projected off the span of 1, x and y, so that a small tilt and a shift along the normal cost
+    nothing. On a quadric, neither does a small shift along the surface.
     """
     x, y, z = oriented[0].T
     weights = oriented[1, :, 2:]  # On a slope a height is more than the distance.
@@ -154,11 +154,14 @@ def _axes(normals: Array) -> Array:
     return np.stack([first, np.cross(normals, first), normals], axis=2)
 
 
-def _descended(
-    places: Array, oriented: Array, mesh: Mesh, neighbors: int, steps: int
+def _registered(
+    places: Array, oriented: Array, mesh: ScanMesh, neighbors: int, steps: int
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Places where the contacts are nearest to the mesh (Levenberg-Marquardt), their residuals, and whether
-    noise alone may shift them to another."""
+    """Rigid motions (m, 3, 4) of least squared distances from the mesh, by Levenberg-Marquardt.
+
+    Also the root mean square distances (m,) in units of the radius, and whether the smallest eigenvalue of
+    J'J is so low that noise alone may shift the contacts by SAME_PLACE or SAME_TURN, (m,).
+    """
     from scipy.spatial.transform import Rotation
 
     places, (distances, slopes) = places.copy(), mesh_distances(places, oriented, mesh, neighbors)

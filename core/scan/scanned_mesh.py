@@ -18,7 +18,7 @@ FACING_WEIGHT = 0.05  # A right angle between normals counts about as much as th
 TOUCHING = 1e-9
 
 
-class Mesh(NamedTuple):
+class ScanMesh(NamedTuple):
     """Triangles (m, 3, 3) of similar size; their normals, centers and smooth normals (m, 3); a KD-tree."""
 
     triangles: Array
@@ -38,7 +38,7 @@ def corners_of(faces: ArrayLike, count: int) -> NDArray[np.intp]:
     return indices.astype(np.intp)
 
 
-def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> Mesh:
+def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> ScanMesh:
     """The mesh as it is searched. Raises ValueError if its size does not suit the patch."""
     from scipy.spatial import cKDTree
 
@@ -49,26 +49,26 @@ def mesh_of(co: Array, corners: NDArray[np.intp], patch: float) -> Mesh:
             f"got {size:.2g}: bring both to one unit, or take another extent"
         )
     normals = np.zeros_like(co)
-    np.add.at(normals, corners, _across(co[corners])[:, None])
+    np.add.at(normals, corners, _area_vectors(co[corners])[:, None])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    pieces = _halved(np.concatenate([co, normals], axis=1)[corners])
-    across, mean = _across(pieces[..., :3]), pieces.mean(axis=1)
+    pieces = _bisected(np.concatenate([co, normals], axis=1)[corners])
+    across, mean = _area_vectors(pieces[..., :3]), pieces.mean(axis=1)
     lengths, bends = np.linalg.norm(across, axis=1), np.linalg.norm(mean[:, 3:], axis=1)
     good = (lengths > 1e-12) & (bends > 1e-6)
     if not good.any():
         raise ValueError("faces: expected triangles, got none that has an area")
     centers, smooth = mean[good, :3], mean[good, 3:] / bends[good, None]
     tree = cKDTree(np.concatenate([centers, FACING_WEIGHT * smooth], axis=1))
-    return Mesh(pieces[good, :, :3], across[good] / lengths[good, None], centers, smooth, tree)
+    return ScanMesh(pieces[good, :, :3], across[good] / lengths[good, None], centers, smooth, tree)
 
 
-def _across(triangles: Array) -> Array:
+def _area_vectors(triangles: Array) -> Array:
     """The normals (..., 3) of triangles (..., 3, 3), whose lengths are twice the areas."""
     a, b, c = np.moveaxis(triangles, -2, 0)
     return np.cross(b - a, c - a)
 
 
-def _halved(pieces: Array) -> Array:
+def _bisected(pieces: Array) -> Array:
     """Triangles with normals, (m, 3, 6), that are halved until no edge is longer than LONGEST_EDGE."""
     done = []
     while len(pieces):
@@ -82,7 +82,7 @@ def _halved(pieces: Array) -> Array:
     return np.concatenate(done)
 
 
-def mesh_distances(places: Array, oriented: Array, mesh: Mesh, neighbors: int) -> tuple[Array, Array]:
+def mesh_distances(places: Array, oriented: Array, mesh: ScanMesh, neighbors: int) -> tuple[Array, Array]:
     """Distances (m, n, 1) of the contacts to the mesh, and their derivatives (m, n, 6) by the motion.
 
     With one neighbor it is the distance to the plane of the nearest triangle; with more, to the nearest point
@@ -96,7 +96,7 @@ def mesh_distances(places: Array, oriented: Array, mesh: Mesh, neighbors: int) -
     up, offsets = mesh.normals[nearest], points - mesh.centers[nearest]
     if neighbors > 1:
         near %= len(mesh.centers)  # There may be fewer.
-        away = points[:, None] - _feet(points[:, None], mesh.triangles[near])
+        away = points[:, None] - _closest_points(points[:, None], mesh.triangles[near])
         # Triangles that face the other way belong to the other side of a thin wall, however near they are.
         back = np.einsum("nki,ni->nk", mesh.smooth[near], normals) < 0.0
         row, least = np.arange(len(points)), (np.linalg.norm(away, axis=2) + back).argmin(axis=1)
@@ -108,9 +108,9 @@ def mesh_distances(places: Array, oriented: Array, mesh: Mesh, neighbors: int) -
     return distances, np.concatenate([np.cross(arms, up), up], axis=2)
 
 
-def _feet(points: Array, triangles: Array) -> Array:
+def _closest_points(points: Array, triangles: Array) -> Array:
     """The point (..., 3) of each triangle (..., 3, 3) that is nearest to a point (..., 3)."""
-    across, corners = _across(triangles), np.moveaxis(triangles, -2, 0)
+    across, corners = _area_vectors(triangles), np.moveaxis(triangles, -2, 0)
     edges, arms = np.roll(corners, -1, axis=0) - corners, points - corners
     height = np.sum(arms[0] * across, axis=-1, keepdims=True)
     below = points - height / np.sum(across**2, axis=-1, keepdims=True) * across

@@ -98,7 +98,7 @@ def test_what_is_too_rough_for_any_fit_to_be_trusted_is_not_fitted(monkeypatch):
     asked = []
     monkeypatch.setattr(side_by_side, "fitted", lambda *given: asked.append(1) or fitted(*given))
     found, few = explore(short_waves()), len(asked)
-    monkeypatch.setattr(growth, "TOO_ROUGH", np.inf)
+    monkeypatch.setattr(growth, "ROUGHNESS_LIMIT", np.inf)
     assert explore(short_waves()).extent == found.extent
     assert len(asked) - few > few
 
@@ -144,14 +144,14 @@ def test_a_touch_is_as_long_as_it_is_sure():
 
 
 def test_rough_curves_are_fitted_where_shorter_ones_carry_no_fit(monkeypatch):
-    tried = growth.tried
+    tried = growth.fit_trial
 
     def of_more_than_the_least(felt, counts):
         if counts.max() <= growth.SEEDS[-1]:
             raise core.DegenerateCurvesError("too few")
         return (yield from tried(felt, counts))
 
-    monkeypatch.setattr(growth, "tried", of_more_than_the_least)
+    monkeypatch.setattr(growth, "fit_trial", of_more_than_the_least)
     monkeypatch.setattr(growth.TrackedContours, "roughness", lambda *_: 2.0)
     assert explore(surfaces.plane()).result.status == "ok"
 
@@ -174,7 +174,7 @@ def test_among_seeds_in_doubt_the_longest_that_is_sure_is_taken(largest_std, mon
         step, whole = 1.0, np.full((3, 2), 24)
         roughness = staticmethod(lambda counts: 0.0)
 
-    monkeypatch.setattr(growth, "tried", tried)
+    monkeypatch.setattr(growth, "fit_trial", tried)
     felt = Felt()
     felt.largest_std = largest_std
     found = result_of(growth._seed(lambda length: felt, 1.0, []))

@@ -261,7 +261,7 @@ def test_noise_shifts_a_pose_by_a_20th_of_the_radius_or_turns_it_by_2_degrees(
         pose_search, "mesh_distances", lambda *_: (np.zeros((1, 6, 1)), np.diag(growth)[None])
     )
     place = np.concatenate([np.eye(3), np.zeros((3, 1))], axis=1)[None]
-    assert pose_search._descended(place, np.zeros((2, 6, 3)), None, 1, 1)[2].tolist() == [slides]
+    assert pose_search._registered(place, np.zeros((2, 6, 3)), None, 1, 1)[2].tolist() == [slides]
 
 
 def test_the_coarse_search_forgives_a_tilt_and_a_shift_along_the_normal_and_nothing_else():
@@ -322,7 +322,9 @@ def test_long_triangles_are_halved_until_a_patch_covers_many():
     mesh = scanned_mesh.mesh_of(corners, np.array([[0, 1, 2], [0, 2, 3]]), 1.0)
     edges = np.linalg.norm(np.roll(mesh.triangles, 1, axis=1) - mesh.triangles, axis=2)
     assert 0.125 < edges.max() <= 0.25
-    assert np.linalg.norm(scanned_mesh._across(mesh.triangles), axis=1).sum() / 2.0 == pytest.approx(6.0)
+    assert np.linalg.norm(scanned_mesh._area_vectors(mesh.triangles), axis=1).sum() / 2.0 == pytest.approx(
+        6.0
+    )
     assert mesh.centers == pytest.approx(mesh.triangles.mean(axis=1))
     assert mesh.smooth == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(mesh.smooth), 1)))
 
@@ -330,13 +332,13 @@ def test_long_triangles_are_halved_until_a_patch_covers_many():
 def test_a_piece_is_long_by_its_edges_and_not_by_its_normals():
     corners = 0.1 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     normals = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    assert len(scanned_mesh._halved(np.concatenate([corners, normals], axis=1)[None])) == 1
+    assert len(scanned_mesh._bisected(np.concatenate([corners, normals], axis=1)[None])) == 1
 
 
 def test_the_foot_on_a_triangle_is_the_nearest_of_its_points():
     rng = np.random.default_rng(0)
     triangles, points = rng.normal(size=(200, 3, 3)), rng.normal(size=(200, 3))
-    feet = scanned_mesh._feet(points, triangles)
+    feet = scanned_mesh._closest_points(points, triangles)
     a, b = np.meshgrid(np.linspace(0.0, 1.0, 101), np.linspace(0.0, 1.0, 101))
     shares = np.stack([a, b, 1.0 - a - b])[:, a + b <= 1.0 + 1e-9].T
     nearest = np.linalg.norm(shares @ triangles - points[:, None], axis=2).min(axis=1)
