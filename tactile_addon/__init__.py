@@ -43,6 +43,7 @@ MENUS = (
     *export_operators.MENUS,
     *report_operator.MENUS,
 )
+PROPERTIES = color_range.PROPERTIES | map_object.PROPERTIES  # Of objects, by name.
 _commands: list[Any] = []
 _drawings: list[Any] = []
 HERE = str(Path(__file__).resolve().parent)  # It holds presets/.
@@ -50,8 +51,8 @@ HERE = str(Path(__file__).resolve().parent)  # It holds presets/.
 
 def register() -> None:
     probe.register()
-    color_range.register()
-    map_object.register()
+    for name, kind in PROPERTIES.items():
+        setattr(bpy.types.Object, name, kind)
     dots.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
@@ -63,7 +64,7 @@ def register() -> None:
     bpy.utils.register_preset_path(HERE)
     change_handlers.register()
     _commands.append(bpy.utils.register_cli_command("tactile", command_line.main))
-    _drawings.extend(overlay.draw_handlers())
+    _drawings.extend(overlay.add_drawings(overlay.DRAWINGS))
 
 
 def unregister() -> None:
@@ -80,6 +81,6 @@ def unregister() -> None:
         bpy.utils.unregister_class(cls)
     kept.forget()
     dots.unregister()
-    map_object.unregister()
-    color_range.unregister()
+    for name in PROPERTIES:
+        delattr(bpy.types.Object, name)
     probe.unregister()

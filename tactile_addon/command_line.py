@@ -60,28 +60,32 @@ def _parser() -> argparse.ArgumentParser:
         ("map", _add_map, "touch a mesh all over and paint a copy by how well touches go"),
         ("table", _add_table, "write the results of a scene's patches as a table, one row each"),
     ):
-        add_arguments(commands.add_parser(name, help=help))
+        add_arguments(commands.add_parser(name, help=help).add_argument)
     parser.set_defaults(**dict.fromkeys(NOT_OF_ALL))
     return parser
 
 
-def _add_reconstruct(command: argparse.ArgumentParser) -> None:
-    add = command.add_argument
+def _add_reconstruct(add: Callable[..., Any]) -> None:
     add("--location", **VECTOR, help="where to touch (default: the 3D cursor)")
     add("--outward", **VECTOR, help="outward direction there (default: the surface's own)")
-    help = "add planes until the mean deviation of the height is down to this or no plane would help"
-    add("--tolerance", type=float, help=help)
+    add(
+        "--tolerance",
+        type=float,
+        help="add planes until the mean deviation of the height is down to this or no plane would help",
+    )
     add("--contacts", type=Path, metavar="CSV", help="write the simulated contacts")
     _add_inputs(add)
     _add_verify(add)
 
 
-def _add_fit(command: argparse.ArgumentParser) -> None:
-    add = command.add_argument
+def _add_fit(add: Callable[..., Any]) -> None:
     _add_contacts(add, ".csv or .ply with the curves of one patch")
     add("--point", **VECTOR, help="where the curves meet (default: the point nearest to all)")
-    help = "a place among strokes; all curves are then strokes (default for strokes alone: their mean)"
-    add("--location", **VECTOR, help=help)
+    add(
+        "--location",
+        **VECTOR,
+        help="a place among strokes; all curves are then strokes (default for strokes alone: their mean)",
+    )
     add(
         "--radius",
         type=float,
@@ -93,8 +97,12 @@ def _add_fit(command: argparse.ArgumentParser) -> None:
         metavar="DEGREES",
         help="standard deviation of measured normals, to fit them too",
     )
-    help = "put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts"
-    add("--onto", type=Path, metavar="MESH", help=help)
+    add(
+        "--onto",
+        type=Path,
+        metavar="MESH",
+        help="put the patch onto this scanned mesh, .ply, .stl or .obj in the unit of the contacts",
+    )
     _add_method(add)
     _add_verify(add)
 
@@ -108,22 +116,20 @@ def _add_contacts(add: Callable[..., Any], help: str) -> None:
     add("--noise", type=float, help="noise floor: a contact has at least this standard deviation")
 
 
-def _add_join(command: argparse.ArgumentParser) -> None:
-    add = command.add_argument
+def _add_join(add: Callable[..., Any]) -> None:
     _add_contacts(add, ".csv or .ply with curves all over an object")
     add("--tolerance", type=float, help="standard deviation to reach for heights (1.2 %% of each patch)")
     _add_output(add, SURFACE)
 
 
-def _add_map(command: argparse.ArgumentParser) -> None:
-    add = command.add_argument
-    help = "distance between the points that are touched (a quarter of the extent)"
-    add("--spacing", type=float, help=help)
+def _add_map(add: Callable[..., Any]) -> None:
+    add(
+        "--spacing", type=float, help="distance between the points that are touched (a quarter of the extent)"
+    )
     _add_inputs(add)
 
 
-def _add_object(command: argparse.ArgumentParser) -> None:
-    add = command.add_argument
+def _add_object(add: Callable[..., Any]) -> None:
     _add_target(add)
     add("--location", **VECTOR, help="where to begin (default: any place that works)")
     add("--tolerance", type=float, help="standard deviation to reach for heights (size / 500)")
@@ -133,9 +139,9 @@ def _add_object(command: argparse.ArgumentParser) -> None:
     _add_output(add, SURFACE)
 
 
-def _add_table(command: argparse.ArgumentParser) -> None:
-    command.add_argument("file", nargs="?", type=Path, metavar="FILE", help=".blend (the open scene)")
-    command.add_argument("--output", type=Path, metavar="OUT", required=True, help="the table to write, .csv")
+def _add_table(add: Callable[..., Any]) -> None:
+    add("file", nargs="?", type=Path, metavar="FILE", help=".blend (the open scene)")
+    add("--output", type=Path, metavar="OUT", required=True, help="the table to write, .csv")
 
 
 def _add_verify(add: Callable[..., Any]) -> None:
@@ -148,18 +154,24 @@ def _add_inputs(add: Callable[..., Any]) -> None:
     degrees: dict[str, Any] = {"type": float, "nargs": "+", "metavar": "DEGREES"}
     add("--azimuths", **degrees, help="three to six plane directions (0 60 120)")
     add("--tilts", **degrees, help="tilts of the planes, one each (0)")
-    help = "length of each half curve (as far as a patch can be trusted; map: size / 8)"
-    add("--extent", type=float, help=help)
+    add(
+        "--extent",
+        type=float,
+        help="length of each half curve (as far as a patch can be trusted; map: size / 8)",
+    )
     add("--step", type=float, help="distance between contacts (such that more would add little)")
     _add_sensor(add)
     _add_method(add)
 
 
 def _add_target(add: Callable[..., Any]) -> None:
-    help = ".blend, .ply, .stl or .obj (the open scene)"
-    add("file", nargs="?", type=Path, metavar="FILE", help=help)
-    help = "object to touch (default: the active one, or the only mesh)"
-    add("--target", default="", metavar="NAME", help=help)
+    add("file", nargs="?", type=Path, metavar="FILE", help=".blend, .ply, .stl or .obj (the open scene)")
+    add(
+        "--target",
+        default="",
+        metavar="NAME",
+        help="object to touch (default: the active one, or the only mesh)",
+    )
 
 
 def _add_sensor(add: Callable[..., Any]) -> None:
@@ -170,8 +182,12 @@ def _add_sensor(add: Callable[..., Any]) -> None:
 def _add_method(add: Callable[..., Any]) -> None:
     """Adds the options of how to fit, and what to write."""
     add("--method", choices=[name for name, _, _ in METHODS], help="how to fit (bayes)")
-    help = "degree of the polynomial (auto: the lowest that describes what the contacts show)"
-    add("--degree", type=str.strip, choices=["auto", *"23456"], help=help)
+    add(
+        "--degree",
+        type=str.strip,
+        choices=["auto", *"23456"],
+        help="degree of the polynomial (auto: the lowest that describes what the contacts show)",
+    )
     add("--weight", type=float, help="lambda L^2, the weight of the contacts against smoothness (1000, 1e5)")
     add("--solver", choices=[name for name, _, _ in SOLVERS], help="solver of tagc (fast)")
     _add_output(
@@ -182,8 +198,12 @@ def _add_method(add: Callable[..., Any]) -> None:
 def _add_output(add: Callable[..., Any], help: str) -> None:
     add("--json", metavar="PATH", help="write the report as JSON; -: one line on standard output")
     add("--output", type=Path, metavar="OUT", help=help)
-    help = "write a page for a browser: pictures, deviations, tolerance bands, settings, versions"
-    add("--report", type=Path, metavar="HTML", help=help)
+    add(
+        "--report",
+        type=Path,
+        metavar="HTML",
+        help="write a page for a browser: pictures, deviations, tolerance bands, settings, versions",
+    )
 
 
 def _is_number(text: str) -> bool:

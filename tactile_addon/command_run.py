@@ -20,11 +20,11 @@ from .comparison.verify_operator import verify_patch
 from .files import contact_file, measured, mesh_file, patch_table, whole_file
 from .report import report_operator
 from .scene import patch_record
-from .stability_map.map_report import map_readable
+from .stability_map.map_report import map_table_rows
 from .touch.types import Object
 from .touch.units import ADAPTIVE, METERS
-from .touch.wording import readable
-from .whole_object.object_report import object_readable
+from .touch.wording import readable_rows, table
+from .whole_object.object_report import object_table_rows
 
 
 class Misuse(ValueError):
@@ -43,15 +43,25 @@ class Command(NamedTuple):
     more: dict[str, Any]
 
 
+def _lines_of(rows: Callable[[Any], list[tuple[str, str]]]) -> Callable[[Any], str]:
+    """A function that puts the rows of a report into lines of label and value."""
+    return lambda report: table(rows(report))
+
+
 COMMANDS = {
-    "reconstruct": Command("reconstruct", patch_record.RECORD, readable, {}),
-    "fit": Command("import_contacts", patch_record.RECORD, readable, {}),
+    "reconstruct": Command("reconstruct", patch_record.RECORD, _lines_of(readable_rows), {}),
+    "fit": Command("import_contacts", patch_record.RECORD, _lines_of(readable_rows), {}),
     "table": Command("", "", lambda report: f"{report['rows']} rows written", {}),
-    "object": Command("touch_all_over", patch_record.ATLAS_RECORD, object_readable, {"progress": True}),
-    "join": Command(
-        "import_contacts", patch_record.ATLAS_RECORD, object_readable, {"whole": True, "progress": True}
+    "object": Command(
+        "touch_all_over", patch_record.ATLAS_RECORD, _lines_of(object_table_rows), {"progress": True}
     ),
-    "map": Command("stability_map", patch_record.MAP_RECORD, map_readable, {"progress": True}),
+    "join": Command(
+        "import_contacts",
+        patch_record.ATLAS_RECORD,
+        _lines_of(object_table_rows),
+        {"whole": True, "progress": True},
+    ),
+    "map": Command("stability_map", patch_record.MAP_RECORD, _lines_of(map_table_rows), {"progress": True}),
 }
 # The operators take these options unchanged.
 PLAIN = {"location", "outward", "spacing", "extent", "step", "noise", "seed", "method", "weight", "solver"}
@@ -111,7 +121,9 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     if options.file is not None:
         mesh_file.open_file(options.file)
     if options.command == "table":
-        return {"rows": _write_table(options.output)}
+        patches = patch_table.patches_of(bpy.context.view_layer.objects)
+        patch_table.write(options.output, patches, bpy.context.scene)
+        return {"rows": len(patches)}
     arguments = _arguments(options)
     before: set[Object] = set(bpy.data.objects)
     command = COMMANDS[options.command]
@@ -204,13 +216,6 @@ def _save(path: Path, made: Object) -> None:
         mesh_file.save_scene(path)
 
 
-def _write_table(path: Path) -> int:
-    """Writes the table of the scene's patches, and returns their number."""
-    patches = patch_table.patches_of(bpy.context.view_layer.objects)
-    patch_table.write(path, patches, bpy.context.scene)
-    return len(patches)
-
-
 def _default_target() -> str:
     """The name of the scene's only mesh, if nothing else is active."""
     if bpy.context.view_layer.objects.active is not None:
@@ -222,9 +227,9 @@ def _default_target() -> str:
 def write(report: Mapping[str, Any], options: argparse.Namespace) -> None:
     """Prints the report, or writes it to the files that were named."""
     if options.verify is not None:
-        table = io.StringIO()
-        csv.writer(table).writerows(zip(*verification_columns(report), strict=True))
-        whole_file.write_text(options.verify, table.getvalue())
+        text = io.StringIO()
+        csv.writer(text).writerows(zip(*verification_columns(report), strict=True))
+        whole_file.write_text(options.verify, text.getvalue())
     if options.json == "-":
         print(json.dumps(report, allow_nan=False))
         return

@@ -45,7 +45,8 @@ def main():
     except (RuntimeError, OSError) as error:
         sys.exit(f"demo: {str(error).strip()}")
     report = patch[extension.tactile_addon.scene.patch_record.RECORD].to_dict()
-    print(extension.tactile_addon.touch.wording.readable(report))
+    wording = extension.tactile_addon.touch.wording
+    print(wording.table(wording.readable_rows(report)))
     print(f"saved {blender.BUILD / 'demo.blend'} and {blender.BUILD / 'demo.png'}")
 
 

@@ -17,7 +17,7 @@ from ..probes import probe
 from ..probes.in_slices import InSlices, Progress
 from ..probes.operators import has_patch, is_in_object_mode, is_unlocked, target_object
 from ..scene import patch_record
-from ..touch.surface import MeshSurface
+from ..touch.detached_mesh import DetachedMesh
 from ..touch.touch_report import Registration
 from ..touch.types import Object, Outcome
 from ..touch.wording import registration_summary
@@ -36,8 +36,8 @@ class Search:
     def __init__(self, patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) -> None:
         if probe.probe_of(patch) is not None:
             raise ValueError(f'The place of "{patch.name}" is that of its probe, so it is known already')
-        vertices, faces = MeshSurface(target, depsgraph).triangles()
-        given = patch_record.reconstruction_of(patch), vertices, faces
+        mesh = DetachedMesh(target, depsgraph)
+        given = patch_record.reconstruction_of(patch), mesh.points + mesh.origin, mesh.triangles
         self.patch, self.target, self._matrix = patch.name, target.name, patch.matrix_world.copy()
         self._found: list[core.Pose] | None = None
         self._error: ValueError | None = None

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that compares a patch, where it is now, with any mesh, and the work behind it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from typing import Any
 
 import bpy
@@ -10,6 +10,7 @@ import numpy as np
 from bpy.props import StringProperty
 
 from ... import core
+from ...core.steps import result_of
 from ..probes import probe, touch_again
 from ..probes.change_handlers import is_pending
 from ..probes.in_slices import InSlices, Progress
@@ -54,10 +55,10 @@ class Verification:
         """Casts a ray at the target, as MeshSurface does."""
         return self._surface.ray_cast(*ray)
 
-    def steps(self) -> Iterator[None]:
+    def steps(self) -> Generator[None, None, None]:
         """Does everything, as a generator that yields every few hundredths of a second."""
         r = self._r
-        _, vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
+        vertices, normals = self._surface.vertices_near(r.frame.origin, 2.0 * r.radius)
         self.count, seen = len(vertices), [np.empty((0, 3))]
         yield
         for start in range(0, self.count, VERTICES_AT_ONCE):
@@ -101,8 +102,7 @@ def verify_patch(patch: Object, target: Object, depsgraph: bpy.types.Depsgraph) 
     """
     verification = Verification(patch, target)
     verification.look(depsgraph)
-    for _ in verification.steps():
-        pass
+    result_of(verification.steps())
     verification.write()
 
 
@@ -115,9 +115,7 @@ def _inputs(patch: Object, target: Object) -> tuple[Any, ...]:
 
 def _vertices(mesh: bpy.types.Mesh, r: core.Reconstruction, scale: float) -> tuple[Array, Array]:
     """Points and unit normals of the patch's vertices, in its frame and scaled by `scale`."""
-    points: Array = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    attributes.attribute_of(mesh, attributes.POSITION).data.foreach_get("vector", points.ravel())
-    points = scale * points.astype(float)
+    points = scale * mesh_data.values(mesh, attributes.POSITION)
     return points, r.geometry.normal(points[:, 0], points[:, 1])
 
 

@@ -46,6 +46,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
     bl_idname = "tactile.import_contacts"
     bl_label = "Import Contact Data"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
+    stopped = "Stopped: nothing was imported"
 
     if TYPE_CHECKING:  # At run time this would hide the property of ImportHelper.
         filepath: str
@@ -163,12 +164,7 @@ class TACTILE_OT_import_contacts(InSlices, FitSettings, bpy.types.Operator, Impo
         self._steps = self._object.steps()
 
     def _done(self) -> Progress:
-        return f"Joining {many(len(self._paths), 'file', 'files')}", self._object.share
-
-    def _stopped(self, context: bpy.types.Context) -> Outcome:
-        self._leave(context)
-        self.report({"INFO"}, "Stopped: nothing was imported")
-        return {"CANCELLED"}
+        return f"Joining {many(len(self._paths), 'file', 'files')}", self._share
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         more = f" and {len(self._paths) - 1} more" if len(self._paths) > 1 else ""

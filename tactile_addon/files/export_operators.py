@@ -13,7 +13,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ... import core
 from ..probes import probe
-from ..probes.operators import report_error
+from ..probes.operators import polls, report_error
 from ..scene import patch_record
 from ..touch.types import Object, OperatorMixin, Outcome
 from . import contact_file, patch_table
@@ -35,10 +35,7 @@ class ObjectExport(ExportHelper, OperatorMixin):  # type: ignore[misc]  # of `in
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if cls.written(context) is None:
-            cls.poll_message_set(cls.hint)
-            return False
-        return True
+        return polls(cls, cls.written(context), cls.hint)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if not self.filepath:
@@ -100,10 +97,8 @@ class TACTILE_OT_export_table(bpy.types.Operator, ExportHelper):  # type: ignore
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not patch_table.patches_of(context.view_layer.objects):
-            cls.poll_message_set("There is no patch to export: pick a reference point first")
-            return False
-        return True
+        patches = patch_table.patches_of(context.view_layer.objects)
+        return polls(cls, patches, "There is no patch to export: pick a reference point first")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         objects = context.view_layer.objects

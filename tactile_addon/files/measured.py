@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ... import core
+from ...core.steps import part_of
 from ..touch.single_precision import require_single
 from ..touch.touch_object import Touched, reference_axes
 from ..touch.touch_report import TouchReport, measures, reconstruction_report, suggestion_report
@@ -57,7 +58,6 @@ def read(paths: Iterable[str | Path], unit: str, meters: float, whole: bool = Fa
 class MeasuredObject:
     """Measured contacts that are covered with patches and joined to a surface, step by step.
 
-    share : share of the work that is done
     whole : the WholeSurface, once the steps are done
     """
 
@@ -65,10 +65,10 @@ class MeasuredObject:
         self,
         contacts: core.Contacts,
         *,
-        outward: Sequence[float] | None = None,
-        flip: bool = False,
-        tolerance: float = 0.0,
-        noise: float = 0.0,
+        outward: Sequence[float] | None,
+        flip: bool,
+        tolerance: float,
+        noise: float,
     ) -> None:
         """Prepares core.Contacts.
 
@@ -92,26 +92,18 @@ class MeasuredObject:
             for c in felt
         ]
         self._outward = None if outward is None else sign * np.array(outward)
-        self._tolerance, self._noise, self.share = tolerance, noise, 0.0
+        self._tolerance, self._noise = tolerance, noise
 
-    def steps(self) -> Iterator[None]:
-        """Does everything, as a generator. Raises ValueError with a sentence for the user."""
+    def steps(self) -> Iterator[float]:
+        """Does everything, and yields the share that is done. Raises ValueError with a sentence."""
         steps = core.cover_contacts(
             self._felt,
             outward=self._outward,
             tolerance=self._tolerance or None,
             noise=self._noise or None,
         )
-        while True:
-            try:
-                self.share = 0.5 * next(steps)
-            except StopIteration as end:
-                self.whole = WholeSurface(end.value, self._origin)
-                break
-            yield
-        for share in self.whole.steps(0.0):
-            self.share = 0.5 + 0.5 * share
-            yield
+        self.whole = WholeSurface((yield from part_of(steps, 0.0, 0.5)), self._origin)
+        yield from part_of(self.whole.steps(0.0), 0.5, 1.0)
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values."""
@@ -190,25 +182,14 @@ def _fit(
     if flip is not (unknown and bulges > FLAT):
         result = reconstruct(outward=-result.frame.axes[:, 2])
     require_single("patch", result.radius, result.frame.origin)
+    axes = reference_axes(result.frame.axes[:, 2])
     report: TouchReport = {
         "source": source,
         "unit": unit,
         "curves": len(contours),
         "strokes": len(strokes),
         "given_contacts": sum(len(contour.points) for contour in felt),
-        **_report(result, options["method"]),
-    }
-    if distances is not None:
-        report["misses"] = distances.tolist()
-    report["seconds"] = {"fit": perf_counter() - start}
-    return Touched(None, result, report)
-
-
-def _report(result: core.Reconstruction, method: str) -> TouchReport:
-    """What a fit has found, in the form of a touch's report."""
-    axes = reference_axes(result.frame.axes[:, 2])
-    return {
-        "method": method,
+        "method": options["method"],
         "degree": result.patch.degree,
         **reconstruction_report(result),
         "axes": axes.tolist(),
@@ -216,6 +197,10 @@ def _report(result: core.Reconstruction, method: str) -> TouchReport:
         **measures(result),
         "suggested_plane": suggestion_report(result, axes),
     }
+    if distances is not None:
+        report["misses"] = distances.tolist()
+    report["seconds"] = {"fit": perf_counter() - start}
+    return Touched(None, result, report)
 
 
 def _mean_normal(contours: Sequence[core.Contour]) -> Array:

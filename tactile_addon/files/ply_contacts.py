@@ -35,7 +35,9 @@ PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">
 
 def read(name: str, path: Path) -> Contacts:
     """The Contacts of a file. Raises ValueError, with its name and the place, if it holds none."""
-    table = _vertices(name, path.read_bytes())
+    rows, fields, first = vertex_rows(name, path.read_bytes())
+    rows = _ply_rows(name, first, rows, fields) if first else rows
+    table = {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
     points = np.column_stack([table[key] for key in POINT_COLUMNS])
     wild = ~(np.abs(points.astype(float)) <= LARGEST).all(axis=1)  # NaN counts as wild.
     if wild.any():
@@ -49,13 +51,6 @@ def read(name: str, path: Path) -> Contacts:
     if not {"curve", "time"} & set(table):  # These are bare points without an order.
         return Contacts([], "", strokes=tuple(contours))
     return Contacts(contours, "")
-
-
-def _vertices(name: str, data: bytes) -> dict[str, Array]:
-    """The values of the vertices' properties, by name."""
-    rows, fields, first = vertex_rows(name, data)
-    rows = _ply_rows(name, first, rows, fields) if first else rows
-    return {key: rows[key].astype(rows[key].dtype.newbyteorder("=")) for key in rows.dtype.names}
 
 
 def vertex_rows(name: str, data: bytes) -> tuple[Any, Fields, int]:

@@ -21,7 +21,7 @@ from ..scene.viewports import has_gesture
 from ..touch.settings import something_happened
 from ..touch.types import Object
 from . import anchor, deleted
-from .probe import forget_targets, is_free, is_probe, probe_of, record_of, targets
+from .probe import forget_targets, is_probe, lock_of, probe_of, record_of, targets
 from .touch_again import is_outdated, may_be_outdated, measure_shape, stand_by, update
 
 SETTLE = 0.25  # A gesture counts as ended after so many seconds without a change.
@@ -48,7 +48,7 @@ def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
     """Touches again if the last touch took at most `dearest` seconds; other patches say "outdated"."""
     global _unsure
     something_happened()
-    if not (targets() or deleted.has_contours() or _unsure):
+    if not (targets() or deleted.contour_owners or _unsure):
         return
     if depsgraph.mode == "RENDER" or bpy.app.is_job_running("RENDER"):
         return
@@ -67,7 +67,7 @@ def _bring_up_to_date(depsgraph: bpy.types.Depsgraph, dearest: float) -> None:
         if unsure:  # It may have been edited when no handler was told, as while the extension was off.
             reshaped |= {probe.tactile_probe.target: None for probe in concerned}
         end = perf_counter() + EVENT_SLICE
-        for probe in filter(is_free, concerned):
+        for probe in (probe for probe in concerned if lock_of(probe) is None):
             in_time = bpy.app.background or (perf_counter() < end and _seconds(probe) <= dearest)
             _look_at(probe, depsgraph, reshaped, in_time)
 
@@ -148,13 +148,12 @@ def _concerned(depsgraph: bpy.types.Depsgraph) -> tuple[list[Object], bool]:
         if unsure
         or obj in owners
         or obj.tactile_probe.target in updated
-        or ((scene or _name_of(obj.tactile_probe.target) in named) and may_be_outdated(obj, there))
+        or (
+            (scene or getattr(obj.tactile_probe.target, "name", None) in named)
+            and may_be_outdated(obj, there)
+        )
     ]
     return concerned, unsure
-
-
-def _name_of(target: Object | None) -> str | None:
-    return None if target is None else target.name
 
 
 def is_pending(probe: Object) -> bool:
@@ -184,7 +183,7 @@ def _settle() -> float | None:
             objects: list[Object] = list(window.view_layer.objects)
             for probe in filter(is_probe, objects):
                 late = probe.tactile_probe.live and is_outdated(probe, depsgraph)
-                if not is_free(probe):
+                if lock_of(probe) is not None:
                     continue
                 if late or is_pending(probe):
                     update(probe, depsgraph, complete=True)
@@ -193,12 +192,6 @@ def _settle() -> float | None:
                 else:
                     stand_by(probe, is_outdated(probe, depsgraph), complete=True)
     return None
-
-
-@persistent
-def before_undo(*_: Any) -> None:
-    """Takes out what no undo step has, so that nothing points to what undo frees."""
-    undo.take_out()
 
 
 @persistent
@@ -213,8 +206,8 @@ HANDLERS = {
     "frame_change_post": on_frame_change,
     "blend_import_post": on_blend_import,
     "load_post": on_other_data,
-    "undo_pre": before_undo,
-    "redo_pre": before_undo,
+    "undo_pre": undo.take_out,
+    "redo_pre": undo.take_out,
     "undo_post": after_undo,
     "redo_post": after_undo,
 }

@@ -14,9 +14,11 @@ from ..touch.types import Object
 from . import anchor
 from .probe import DIGEST, is_result
 
+# Datablocks that drop a deleted object by themselves.
+WINDOW_DATA = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
 LATER = 0.25  # After so many seconds it is checked again whether a gesture has ended.
 _deleted: set[int] = set()  # The session_uids of deleted targets.
-_owners: dict[int, int] = {}  # By those of contours, those of their last patches: undo may bring these back.
+contour_owners: dict[int, int] = {}  # By those of contours, those of their last patches.
 
 
 def forget_target(probe: Object) -> None:
@@ -86,31 +88,20 @@ def relink(probe: Object) -> None:
             anchor.attach(probe, target)
 
 
-def has_contours() -> bool:
-    """Whether any contours were seen that may lose their patch."""
-    return bool(_owners)
-
-
 def look_for_contours() -> None:
     """Deletes contours whose patch was deleted, because without its coordinates they mean nothing."""
     there: dict[int, Object] = {obj.session_uid: obj for obj in bpy.data.objects}
     for number, obj in there.items():
         if patch_record.CONTOURS in obj and obj.parent is not None:
-            _owners[number] = obj.parent.session_uid
+            contour_owners[number] = obj.parent.session_uid
     if any(_is_left(obj, there) for obj in there.values()) or _unused_meshes():
         _remove_soon()
 
 
 def _is_left(obj: Object, there: dict[int, Object]) -> bool:
     """Whether an object is contours whose patch was deleted."""
-    owner = _owners.get(obj.session_uid)
+    owner = contour_owners.get(obj.session_uid)
     return owner is not None and owner not in there and obj.parent is None and obj.is_editable
-
-
-def _is_data(datablock: bpy.types.ID) -> bool:
-    """Whether a datablock is an object or the like; scenes and windows drop a deleted one by themselves."""
-    kinds = bpy.types.Scene | bpy.types.Screen | bpy.types.WindowManager | bpy.types.WorkSpace
-    return not isinstance(datablock, kinds)
 
 
 def _unused_meshes() -> list[bpy.types.Mesh]:
@@ -127,7 +118,7 @@ def remove() -> float | None:
     # Children and modifiers point to an object without being its users. Undo may leave them as they are, and
     # would then bring back the object, but not these links.
     pointing = bpy.data.user_map(subset=gone) if gone else {}
-    gone = [obj for obj in gone if not any(map(_is_data, pointing.get(obj, ())))]
+    gone = [obj for obj in gone if all(isinstance(user, WINDOW_DATA) for user in pointing.get(obj, ()))]
     left = [obj for obj in there.values() if _is_left(obj, there) and is_result(obj)]
     _deleted.clear()
     patch_object.remove_objects(left)

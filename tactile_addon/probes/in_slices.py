@@ -39,13 +39,15 @@ class InSlices(OperatorMixin):
     if TYPE_CHECKING:  # At run time it is the property of operators that have one.
         target: str
     _steps: Iterator[Any]
+    _share: Any = 0.0  # What the steps yielded last: the share that is done, if they yield that.
     _begin: Callable[[bpy.types.Context], None]
     _done: Callable[[], Progress]
     _finish: Callable[[bpy.types.Context], Outcome]
     _timer: bpy.types.Timer | None = None  # There is one while it runs in a window.
     _worked = 0.0  # When the last slice ended.
     _in_window = False  # Whether a dialog was confirmed, after which it goes on in slices.
-    stop = "Stop"  # What Esc does.
+    stop = "Stop"  # What Esc does,
+    stopped = "Stopped: the patch stays as it was"  # and what is reported then.
     meanwhile = {"RUNNING_MODAL"}  # What modal() returns for all other events.
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -75,7 +77,8 @@ class InSlices(OperatorMixin):
                 return self._go_on(context)
             self._check(context)
             said = perf_counter()
-            for _ in self._steps:
+            for share in self._steps:
+                self._share = share
                 if self.progress and perf_counter() > said + SAY:
                     said = perf_counter()
                     print(self._done()[0], file=sys.stderr, flush=True)
@@ -113,9 +116,11 @@ class InSlices(OperatorMixin):
         """Works for some seconds, and returns whether all is done then."""
         self._check(context)
         end = perf_counter() + seconds
-        if any(perf_counter() > end for _ in self._steps):
-            self._worked = perf_counter()
-            return False
+        for share in self._steps:
+            self._share = share
+            if perf_counter() > end:
+                self._worked = perf_counter()
+                return False
         # `_finish` has a slice of its own, because the last step and the new object may take long together.
         return self._timer is None or perf_counter() < end - 0.5 * seconds
 
@@ -124,7 +129,7 @@ class InSlices(OperatorMixin):
 
     def _stopped(self, context: bpy.types.Context) -> Outcome:
         self._leave(context)
-        self.report({"INFO"}, "Stopped: the patch stays as it was")
+        self.report({"INFO"}, self.stopped)
         return {"CANCELLED"}
 
     def _leave(self, context: bpy.types.Context) -> None:

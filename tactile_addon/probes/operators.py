@@ -130,20 +130,22 @@ def waiting(context: bpy.types.Context) -> Iterator[None]:
         context.window.cursor_modal_restore()
 
 
+def polls(operator: type[Any], condition: object, message: str) -> bool:
+    """Whether a condition holds; if not, Blender shows the message as the reason for the gray button."""
+    if not condition:
+        operator.poll_message_set(message)
+    return bool(condition)
+
+
 def is_in_object_mode(operator: type[Any], context: bpy.types.Context, what: str) -> bool:
     """Whether the mode is Object Mode; if it is not, the operator's poll says so."""
-    if context.mode == "OBJECT":
-        return True
-    operator.poll_message_set(f"{what} in Object Mode: leave this mode first")
-    return False
+    return polls(operator, context.mode == "OBJECT", f"{what} in Object Mode: leave this mode first")
 
 
 def has_mesh(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the view layer has a mesh that can be touched; if not, the operator's poll says so."""
-    found = any(obj.type == "MESH" and not is_result(obj) for obj in context.view_layer.objects)
-    if not found:
-        operator.poll_message_set(NO_MESH)
-    return found
+    meshes = (obj for obj in context.view_layer.objects if obj.type == "MESH" and not is_result(obj))
+    return polls(operator, any(meshes), NO_MESH)
 
 
 def has_target(operator: type[Any], context: bpy.types.Context) -> bool:
@@ -153,28 +155,19 @@ def has_target(operator: type[Any], context: bpy.types.Context) -> bool:
     try:
         obj = target_object(context, "")
     except ValueError as error:
-        if has_mesh(operator, context):
-            operator.poll_message_set(sentence(error))
-        return False
-    if obj.type != "MESH":
-        operator.poll_message_set("Select the mesh object to touch")
-    return obj.type == "MESH"
+        return has_mesh(operator, context) and polls(operator, False, sentence(error))
+    return polls(operator, obj.type == "MESH", "Select the mesh object to touch")
 
 
 def has_patch(operator: type[Any], context: bpy.types.Context, hint: str) -> bool:
     """Whether the active object is a patch, its probe or its contours; if not, the poll gives a hint."""
-    found = patch_near(context.view_layer.objects.active) is not None
-    if not found:
-        operator.poll_message_set(hint)
-    return found
+    return polls(operator, patch_near(context.view_layer.objects.active), hint)
 
 
 def is_unlocked(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the active object's probe or patch can be changed; the operator's poll says why not."""
     lock = lock_of(context.view_layer.objects.active)
-    if lock is not None:
-        operator.poll_message_set(lock)
-    return lock is None
+    return polls(operator, lock is None, lock or "")
 
 
 def make_active(context: bpy.types.Context, obj: Object) -> None:

@@ -213,11 +213,6 @@ def lock_of(obj: Object) -> str | None:
     return None
 
 
-def is_free(probe: Object) -> bool:
-    """Whether the probe can be kept up to date: no library has any of it, and nobody edits its patch."""
-    return lock_of(probe) is None
-
-
 def make(context: bpy.types.Context, target: Object) -> Object:
     """A new probe, which touches nothing until `is_probe` is set."""
     probe: Object = bpy.data.objects.new(f"{target.name} Probe", None)

@@ -16,7 +16,7 @@ from ..touch.settings import MOST_PLANES, length_property
 from ..touch.types import OperatorMixin, Outcome
 from ..touch.wording import added_planes, verdict
 from . import probe, touch_again
-from .operators import has_patch, is_in_object_mode, is_unlocked, report_error, waiting
+from .operators import has_patch, is_in_object_mode, is_unlocked, polls, report_error, waiting
 
 SUBDIVISIONS = 3  # A target gets so many levels at once,
 MOST_FACES = 500_000  # as long as it has no more faces then.
@@ -29,10 +29,12 @@ class _ProbeOperator(OperatorMixin):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if probe.probe_of(context.view_layer.objects.active) is None:
-            cls.poll_message_set("Select a probe, or pick a reference point first")
-            return False
-        return is_in_object_mode(cls, context, "Probes are changed") and is_unlocked(cls, context)
+        active = probe.probe_of(context.view_layer.objects.active)
+        return (
+            polls(cls, active, "Select a probe, or pick a reference point first")
+            and is_in_object_mode(cls, context, "Probes are changed")
+            and is_unlocked(cls, context)
+        )
 
 
 class _PlaneOperator(_ProbeOperator):
@@ -42,12 +44,10 @@ class _PlaneOperator(_ProbeOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if probe.probe_of(context.view_layer.objects.active).tactile_probe.plane_count == cls.limit:
-            cls.poll_message_set(cls.why_not)
-            return False
-        return True
+        active = probe.probe_of(context.view_layer.objects.active)
+        return super().poll(context) and polls(
+            cls, active.tactile_probe.plane_count != cls.limit, cls.why_not
+        )
 
 
 class TACTILE_OT_add_plane(_PlaneOperator, bpy.types.Operator):
@@ -199,13 +199,9 @@ class TACTILE_OT_show_colors(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         space = context.space_data
-        if space is None or space.type != "VIEW_3D":
-            cls.poll_message_set("Use it in a 3D viewport")
-            return False
-        if shows_colors(space):
-            cls.poll_message_set("This viewport shows the colors of the patch already")
-            return False
-        return True
+        return polls(cls, space and space.type == "VIEW_3D", "Use it in a 3D viewport") and polls(
+            cls, not shows_colors(space), "This viewport shows the colors of the patch already"
+        )
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         space: Any = context.space_data

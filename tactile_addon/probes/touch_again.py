@@ -56,7 +56,7 @@ def update(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool) -> Non
         if patch is not None:
             anchor.carry(probe, patch)
             patch_record.hold(patch)
-            patch_record.mark_failed(patch, settings.message)
+            patch_record.mark_outdated(patch, f"because the last one failed. {settings.message}")
         _sign(probe, depsgraph)
     else:
         adopt(probe, touched, depsgraph, complete)
@@ -93,7 +93,7 @@ def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
     if settings.message and record is not None and patch_record.VERDICT not in patch:
         settings.message = ""  # There was no patch, and undo has brought it back.
     if outdated:
-        patch_record.mark_stale(patch)
+        patch_record.mark_outdated(patch, "and the probe or its target has changed since: touch again.")
     elif not settings.message:
         patch_record.mark_current(patch)
 

@@ -16,7 +16,7 @@ BINS, BAR_WIDTH, HEIGHT = 41, 12, 150  # A histogram has so many bars, this wide
 
 def triangles(points: Array, corners: Array, colors: Array, marks: ArrayLike = ()) -> str:
     """A picture of triangles (m, 3) between points (n, 2), in colors (m, 3 or 4), with marks (k, 2)."""
-    place = _fitted(points)
+    place = fitted(points, PIXELS, 5.0)
     shapes = [
         f'<path d="M{_pairs(place(points[three]), "L")}Z" fill="{_hex(color)}" stroke="{_hex(color)}"/>'
         for three, color in zip(corners, colors, strict=True)
@@ -67,11 +67,11 @@ def _picture(shapes: Sequence[str]) -> str:
     return f'<svg viewBox="0 0 {PIXELS} {PIXELS}" width="{PIXELS}">{"".join(shapes)}</svg>'
 
 
-def _fitted(points: Array) -> Callable[[Array], Array]:
-    """A function that takes points (n, 2) to the middle of a picture, with y upward."""
+def fitted(points: Array, pixels: float, border: float) -> Callable[[Array], Array]:
+    """A function that takes points (n, 2) into the middle of a square picture, with y upward."""
     low, high = points.min(axis=0), points.max(axis=0)
-    factor = (PIXELS - 10.0) / max((high - low).max(), 1e-300)
-    return lambda at: PIXELS / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
+    factor = (pixels - 2.0 * border) / max((high - low).max(), 1e-300)
+    return lambda at: pixels / 2.0 + factor * (at - 0.5 * (low + high)) * (1.0, -1.0)
 
 
 def _pairs(points: Iterable[Sequence[float]], between: str) -> str:

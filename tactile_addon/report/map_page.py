@@ -15,7 +15,8 @@ from ..stability_map import map_object
 from ..stability_map.map_report import map_summary, map_table_rows
 from ..stability_map.stability import NOTHING
 from ..touch import units
-from ..touch.types import Array, Object
+from ..touch.arrays import read_array
+from ..touch.types import Object
 from ..touch.units import Unit
 from . import page, parts, views
 
@@ -29,7 +30,9 @@ def map_page(painted: Object) -> str:
         page.section(
             "Pictures",
             _legend(painted, record, unit),
-            *views.three_sides(painted.data, _screen_colors(painted.data)),
+            *views.three_sides(
+                painted.data, read_array(painted.data.attributes[MAP_COLOR].data, "color_srgb", 4)
+            ),
         ),
         *_errors(painted.data, record, unit),
         *parts.ending(map_table_rows(record), record),
@@ -67,11 +70,3 @@ def _errors(mesh: bpy.types.Mesh, record: Mapping[str, Any], unit: Unit) -> list
             parts.bands(errors[known], weights, std, unit, parts.shares_of(*size)),
         ),
     ]
-
-
-def _screen_colors(mesh: bpy.types.Mesh) -> Array:
-    """The colors of the vertices in sRGB, (n, 4)."""
-    attribute: Any = mesh.attributes[MAP_COLOR]
-    rgba = np.empty((len(attribute.data), 4), dtype=np.float32)
-    attribute.data.foreach_get("color_srgb", rgba.ravel())
-    return rgba

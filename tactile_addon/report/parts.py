@@ -13,6 +13,7 @@ import numpy as np
 
 from ..scene.colors import symmetric_range
 from ..touch import units
+from ..touch.arrays import read_array
 from ..touch.types import Array
 from ..touch.units import Unit
 from . import drawing, page
@@ -96,9 +97,7 @@ def _versions() -> list[tuple[str, str]]:
 
 def corners(mesh: bpy.types.Mesh) -> Array:
     """The triangles (m, 3) of a mesh that has no other faces."""
-    indices = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", indices)
-    return indices.reshape(-1, 3)
+    return read_array(mesh.loops, "vertex_index", dtype=np.int32).reshape(-1, 3)
 
 
 def vertex_areas(points: Array, triangles: Array) -> Array:

@@ -10,19 +10,20 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..touch.types import Array
+from . import drawing
 
 PIXELS, BORDER = 480, 4  # A picture has so many pixels on each side, so many of them free around its mesh.
 APART = 0.7  # Samples of a triangle are at most so many pixels apart.
 AT_ONCE = 500_000  # So many samples fit into memory at once.
 
 
-def picture(points: Array, depths: Array, corners: Array, colors: Array, shown: float) -> str:
-    """An HTML image, `shown` pixels wide, of triangles (m, 3) between points (n, 2), on a clear ground.
+def picture(points: Array, depths: Array, corners: Array, colors: Array) -> str:
+    """An HTML image of triangles (m, 3) between points (n, 2), on a clear ground.
 
     depths : (n,), larger ones are nearer
     colors : (n, 3), from 0 to 1, at the points
     """
-    values = np.column_stack([_fitted(points), depths, colors])
+    values = np.column_stack([drawing.fitted(points, PIXELS, BORDER)(points), depths, colors])
     found = np.zeros((PIXELS * PIXELS, 4), dtype=np.uint8)
     nearest = np.full(PIXELS * PIXELS, -np.inf)
     for samples in _samples(values, corners):
@@ -34,14 +35,9 @@ def picture(points: Array, depths: Array, corners: Array, colors: Array, shown: 
         found[place[ahead], :3] = np.rint(255.0 * samples[ahead, 3:].clip(0.0, 1.0))
         found[place[ahead], 3] = 255
     text = base64.b64encode(_png(found.reshape(PIXELS, PIXELS, 4))).decode()
-    return f'<img width="{shown}" height="{shown}" alt="" src="data:image/png;base64,{text}">'
-
-
-def _fitted(points: Array) -> Array:
-    """Points (n, 2) in the pixels of a picture, with y downward."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    factor = (PIXELS - 2.0 * BORDER) / max((high - low).max(), 1e-300)
-    return PIXELS / 2.0 + factor * (points - 0.5 * (low + high)) * (1.0, -1.0)
+    return (
+        f'<img width="{drawing.PIXELS}" height="{drawing.PIXELS}" alt="" src="data:image/png;base64,{text}">'
+    )
 
 
 def _samples(values: Array, corners: Array) -> Iterator[Array]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..scene.attributes import POSITION
 from ..scene.mesh_data import values
+from ..touch.arrays import read_array
 from ..touch.types import Array
-from . import drawing, page, raster
+from . import page, raster
 
 DARKEST = 0.45  # Where the surface turns away, it is this bright.
 # Words, the axes to the right and up, the axis of sight and its sign toward the viewer.
@@ -23,14 +24,12 @@ VIEWS = (
 
 def three_sides(mesh: bpy.types.Mesh, colors: Array) -> Iterator[str]:
     """Three figures of the mesh, in sRGB colors (n, 3 or 4) of its vertices."""
-    points = values(mesh, POSITION).astype(float)
-    normals = np.empty(points.shape, dtype=np.float32)
-    mesh.vertices.foreach_get("normal", normals.ravel())
+    points = values(mesh, POSITION)
+    normals = read_array(mesh.vertices, "normal", 3)
     mesh.calc_loop_triangles()
-    corners = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", corners.ravel())
+    corners = read_array(mesh.loop_triangles, "vertices", 3, np.int32)
     for words, axes, sight, sign in VIEWS:
         # Shading shows the shape where colors are pale.
         light = DARKEST + (1.0 - DARKEST) * np.abs(normals[:, sight, None])
         found = points[:, axes], sign * points[:, sight], corners, light * colors[:, :3]
-        yield page.figure(raster.picture(*found, drawing.PIXELS), words)
+        yield page.figure(raster.picture(*found), words)

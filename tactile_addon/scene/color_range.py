@@ -27,7 +27,10 @@ def share(patch: Object, patches: Iterable[Object]) -> int:
     same = [
         other
         for other in patches
-        if RECORD in other and other.tactile_colors == patch.tactile_colors and _is_whole(other)
+        if RECORD in other
+        and other.tactile_colors == patch.tactile_colors
+        and is_colored(other)
+        and other.is_editable
     ]
     for other in same:
         set_range(other, 0.0)
@@ -42,12 +45,8 @@ def set_range(patch: Object, limit: float) -> None:
     patch[RANGE] = limit
     if limit <= 0.0:
         del patch[RANGE]
-    if _is_whole(patch):
+    if is_colored(patch) and patch.is_editable:
         shown.recolor(patch)
-
-
-def _is_whole(obj: Object) -> bool:
-    return is_colored(obj) and obj.is_editable
 
 
 def _record(obj: Object) -> Any:
@@ -66,9 +65,9 @@ def _set(obj: Object, value: float) -> None:
     set_range(obj, value * unit[1] ** power)
 
 
-def register() -> None:
-    objects: Any = bpy.types.Object
-    objects.tactile_range = FloatProperty(
+# Properties of objects, by name.
+PROPERTIES = {
+    "tactile_range": FloatProperty(
         name="Range",
         description="Value at which the colors end, in the unit of the legend; 0 chooses it by the values",
         min=0.0,
@@ -77,8 +76,4 @@ def register() -> None:
         get=_get,
         set=_set,
     )
-
-
-def unregister() -> None:
-    objects: Any = bpy.types.Object
-    del objects.tactile_range
+}

@@ -12,8 +12,8 @@ import numpy as np
 from ... import core
 from ..touch.touch_object import Touched
 from ..touch.types import Array
-from .attributes import CONTACT, CONTOUR, POSITION, attribute_of
-from .mesh_data import fill, write
+from .attributes import CONTACT, CONTOUR
+from .mesh_data import fill
 
 RIM_CORNERS, RIM_THICKNESS = 96, 0.6  # The rim has so many points and this share of a contour's thickness.
 TIP = 3.6  # The tips of a contact are so many times a contour's thickness away from it,
@@ -56,21 +56,7 @@ def fill_contours(mesh: bpy.types.Mesh, touched: Touched) -> None:
     sizes = np.repeat(thickness * np.array([*(1.0 for _ in contours), RIM_THICKNESS]), lengths)
     tubes = _tubes(np.vstack(paths), np.repeat([*across, (0.0, 0.0, 1.0)], lengths, axis=0), sizes, form)
     points = np.vstack([tubes, _octahedra(contours, frame.to_local(strokes), thickness)])
-    if _has_form(mesh, form):
-        write(mesh, POSITION, points)
-        mesh.update()
-    else:
-        fill(mesh, points, form.triangles, [(CONTOUR, form.contour), (CONTACT, form.contact)])
-
-
-def _has_form(mesh: bpy.types.Mesh, form: _Form) -> bool:
-    """Whether the mesh shows contours with as many contacts, so that only its points have to change."""
-    contact = attribute_of(mesh, CONTACT)
-    if contact is None or (len(contact.data), len(mesh.loops)) != (len(form.contact), form.triangles.size):
-        return False
-    found = np.empty(len(form.contact), dtype=np.int32)
-    contact.data.foreach_get("value", found)
-    return np.array_equal(found, form.contact)
+    fill(mesh, points, form.triangles, [(CONTOUR, form.contour), (CONTACT, form.contact)])
 
 
 def _octahedra(contours: Sequence[Array], strokes: Array, thickness: float) -> Array:

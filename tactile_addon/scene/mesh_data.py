@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ..touch.arrays import read_array
 from ..touch.types import Array, Object
 from .attributes import DOMAIN, KEYS, POSITION, TYPES, attribute_of
 from .undo import note_copied
@@ -50,9 +51,7 @@ def values(mesh: bpy.types.Mesh, name: str) -> Array:
     """The values of an attribute, (n,) or (n, 3)."""
     attribute: Any = mesh.attributes[name]
     key = KEYS[attribute.data_type]
-    values = np.empty((len(attribute.data), 3) if key == "vector" else len(attribute.data))
-    attribute.data.foreach_get(key, values.ravel())
-    return values
+    return read_array(attribute.data, key, 3 if key == "vector" else 1, float)
 
 
 def own_mesh(obj: Object) -> None:
@@ -66,9 +65,7 @@ def own_mesh(obj: Object) -> None:
 def _has_triangles(mesh: bpy.types.Mesh, count: int, triangles: Array) -> bool:
     if (len(mesh.vertices), len(mesh.loops)) != (count, triangles.size):
         return False
-    corners = np.empty(triangles.size, dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    return np.array_equal(corners, triangles.ravel())
+    return np.array_equal(read_array(mesh.loops, "vertex_index", dtype=np.int32), triangles.ravel())
 
 
 def emission(

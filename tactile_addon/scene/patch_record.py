@@ -113,29 +113,14 @@ def _is_whole(mesh: bpy.types.Mesh) -> bool:
     return len(mesh.vertices) > 0 and all(attribute_of(mesh, name) is not None for name in names)
 
 
-def mark_failed(patch: Object, why: str) -> None:
-    """Lets the record say that the patch is from an earlier touch, because the last one failed."""
-    _outdate(patch, {"message": f"This patch is from an earlier touch, because the last one failed. {why}"})
-
-
-def mark_stale(patch: Object) -> None:
-    """Lets the record say that the patch is from an earlier touch, and that nothing was felt since."""
-    _outdate(
-        patch,
-        {
-            "message": "This patch is from an earlier touch, and the probe or its target has "
-            "changed since: touch again."
-        },
-    )
-
-
-def _outdate(patch: Object, verdict: TouchReport) -> None:
+def mark_outdated(patch: Object, why: str) -> None:
+    """Has the record say that the patch is from an earlier touch, and why; VERDICT keeps what it was."""
     report = report_of(patch)
     if report is None:
         return
     if VERDICT not in patch:
         patch[VERDICT] = {key: report[key] for key in ("status", "message")}
-    report.update({"status": "outdated", **verdict})
+    report.update({"status": "outdated", "message": f"This patch is from an earlier touch, {why}"})
 
 
 def mark_current(patch: Object) -> None:

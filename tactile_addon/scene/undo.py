@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ..touch.types import Object
 
@@ -48,7 +49,8 @@ def note_copied(obj: Object, mesh: bpy.types.Mesh) -> None:
         _replaced[obj.data.session_uid] = mesh.session_uid
 
 
-def take_out() -> None:
+@persistent
+def take_out(*_: Any) -> None:
     """Unlinks what was added. It must be called before undo and redo."""
     _links.clear()
     if not (_added or _replaced):

@@ -35,7 +35,7 @@ from ..touch.units import Unit
 from ..touch.wording import registration_summary, verdict
 from ..viewport.pick import TACTILE_OT_pick
 from ..whole_object.object_operator import TACTILE_OT_touch_all_over
-from ..whole_object.object_report import farthest, object_rows, object_verdict
+from ..whole_object.object_report import deviation, object_rows, object_verdict
 from ..whole_object.surface_operators import TACTILE_OT_look_farthest, TACTILE_OT_mesh_again
 from .dots import dot
 from .patch_rows import found_values, main_rows, other_rows, plane_rows
@@ -192,7 +192,7 @@ class TACTILE_PT_object(_Sidebar, bpy.types.Panel):
         draw_rows(context, layout.box(), object_rows(record))
         if "touches" not in record:  # Measured contacts have no mesh to touch.
             return
-        text = f"Largest Deviation: {farthest(record)}"
+        text = f"Largest Deviation: {deviation(record, 'max')}"
         layout.operator(TACTILE_OT_look_farthest.bl_idname, text=text, icon="ZOOM_SELECTED", translate=False)
         layout.operator(TACTILE_OT_mesh_again.bl_idname, icon="MOD_REMESH")
         row = layout.operator(TACTILE_OT_pick.bl_idname, text="Probe on the Surface", icon="EYEDROPPER")

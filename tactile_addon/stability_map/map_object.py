@@ -14,6 +14,7 @@ from ..scene.attributes import HEIGHT_STD, MAP_COLOR, MEASURES, POSITION, REASON
 from ..scene.mesh_data import emission, write
 from ..scene.shown import LEAST_RANGE
 from ..scene.viewports import show_colors
+from ..touch.arrays import read_array
 from ..touch.settings import MOST_PLANES
 from ..touch.types import Array, Object
 from .stability import NOTHING, REASON_KEYS, REASONS, StabilityMap
@@ -78,8 +79,9 @@ def insert(context: bpy.types.Context, obj: Object, touched: StabilityMap) -> Ob
 
 def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
     """Gives each vertex the values of the nearest touch."""
-    for name in (*MEASURES, REASON):
-        write(mesh, name, getattr(touched, name)[touched.nearest])
+    for name in MEASURES:
+        write(mesh, name, touched.measures[name][touched.nearest])
+    write(mesh, REASON, touched.reason[touched.nearest])
     is_touched = np.zeros(len(mesh.vertices), dtype=bool)
     is_touched[touched.chosen[: touched.done]] = True
     write(mesh, TOUCHED, is_touched)
@@ -90,8 +92,9 @@ def _paint(mesh: bpy.types.Mesh, touched: StabilityMap) -> None:
 def recolor(painted: Object) -> None:
     """Colors the map by the quantity that it is set to show, and keeps the range in its record."""
     shown, mesh, record = painted.tactile_map_colors, painted.data, painted[patch_record.MAP_RECORD]
-    values = np.empty(len(mesh.vertices), dtype=np.int32 if shown == REASON else np.float32)
-    mesh.attributes[shown].data.foreach_get("value", values)
+    values = read_array(
+        mesh.attributes[shown].data, "value", dtype=np.int32 if shown == REASON else np.float32
+    )
     if shown == REASON:
         rgba, limit = colors.linear(REASON_COLORS)[values], len(REASON_KEYS) - 1.0
     else:
@@ -133,12 +136,11 @@ def touched_near(painted: Object, location: list[float]) -> list[float]:
 
     It is the location itself if that point is farther away than the spacing, as where the target was moved.
     """
-    mesh, count = painted.data, len(painted.data.vertices)
+    mesh = painted.data
     if TOUCHED not in mesh.attributes:
         return location
-    is_touched, co = np.empty(count, dtype=bool), np.empty((count, 3), dtype=np.float32)
-    mesh.attributes[TOUCHED].data.foreach_get("value", is_touched)
-    mesh.attributes[POSITION].data.foreach_get("vector", co.ravel())
+    is_touched = read_array(mesh.attributes[TOUCHED].data, "value", dtype=bool)
+    co = read_array(mesh.attributes[POSITION].data, "vector", 3)
     matrix = np.array(painted.matrix_world, dtype=float)
     places = co[is_touched] @ matrix[:3, :3].T + matrix[:3, 3]
     away = np.linalg.norm(places - np.array(location), axis=1)
@@ -166,16 +168,12 @@ def _show(obj: Object, context: bpy.types.Context) -> None:
         recolor(obj)
 
 
-def register() -> None:
-    objects: Any = bpy.types.Object
-    objects.tactile_map_colors = EnumProperty(
+# Properties of objects, by name.
+PROPERTIES = {
+    "tactile_map_colors": EnumProperty(
         name="Colors",
         description="What the colors of the map show",
         items=[item[:3] for item in MAP_QUANTITIES],
         update=_show,
     )
-
-
-def unregister() -> None:
-    objects: Any = bpy.types.Object
-    del objects.tactile_map_colors
+}

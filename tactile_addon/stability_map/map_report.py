@@ -9,14 +9,8 @@ import bpy
 
 from ..touch import units
 from ..touch.units import Unit
-from ..touch.wording import table
 from . import map_object
 from .stability import REASONS
-
-
-def map_readable(record: Mapping[str, Any]) -> str:
-    """Lines of label and value, with lengths in the unit of the scene or file."""
-    return table(map_table_rows(record))
 
 
 def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ... import core
 from ..scene.attributes import MEASURES
+from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
 from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
@@ -44,9 +45,8 @@ def expected_count(obj: Object, depsgraph: bpy.types.Depsgraph, extent: float, s
     """
     evaluated, linear, _ = evaluated_object(obj, depsgraph)
     extent = extent or EXTENT_SHARE * size_of(evaluated, linear)
-    areas = np.empty(len(evaluated.data.polygons), dtype=np.float32)
-    evaluated.data.polygons.foreach_get("area", areas)
-    area = float(areas.sum()) * abs(np.linalg.det(linear)) ** (2.0 / 3.0)
+    area = float(read_array(evaluated.data.polygons, "area").sum())
+    area *= abs(np.linalg.det(linear)) ** (2.0 / 3.0)
     return min(len(evaluated.data.vertices), core.spaced_count(area, spacing or SPACING_SHARE * extent))
 
 
@@ -55,15 +55,9 @@ class StabilityMap:
 
     chosen : indices of the n vertices to touch, in random order
     done : how many of these have been touched
-    error, height_std, reach, condition_number, blind_share, reason : (n,), what was found by each touch
+    measures, reason : (n,), what was found by each touch; the fields of `measures` are MEASURES
     nearest : index of the touch that is nearest to each vertex of the mesh, once the steps are done
     """
-
-    error: Array
-    height_std: Array
-    reach: Array
-    condition_number: Array
-    blind_share: Array
 
     def __init__(
         self,
@@ -112,8 +106,7 @@ class StabilityMap:
                 self.chosen.append(int(candidates[index]))
             yield
         count = len(self.chosen)
-        for name in MEASURES:
-            setattr(self, name, np.full(count, NOTHING))
+        self.measures = np.full(count, NOTHING, dtype=[(name, float) for name in MEASURES])
         self.reason = np.full(count, REASON_KEYS.index("nothing"), dtype=np.int32)
         batch = BATCH if self.extent else GROWING_BATCH
         size = batch if self.fit["method"] == "bayes" else 1
@@ -176,10 +169,13 @@ class StabilityMap:
         status, _ = core.judged_by_mesh(result, off or 0.0)
         is_sure = status == "ok" and not core.has_few_facets(result, surface.face_near, surface.corners_of)
         self.reason[number] = REASON_KEYS.index("patch" if is_sure else "doubt")
-        self.error[number] = NOTHING if off is None else off
-        self.height_std[number], self.reach[number] = result.mean_height_std, touch.extent
-        self.condition_number[number] = result.condition_number
-        self.blind_share[number] = result.blind_share
+        self.measures[number] = (
+            NOTHING if off is None else off,
+            result.mean_height_std,
+            touch.extent,
+            result.condition_number,
+            result.blind_share,
+        )
 
     def report(self) -> dict[str, Any]:
         """What was found, as a dict of plain values; medians are over the patches."""
@@ -193,7 +189,7 @@ class StabilityMap:
             "refused": counts,
         }
         for name in MEASURES:
-            values = getattr(self, name)[: self.done]
+            values = self.measures[name][: self.done]
             known = values[values != NOTHING].tolist()
             if known:
                 report[f"{name}_median"] = median(known)

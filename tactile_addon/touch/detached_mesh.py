@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
+from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object
 from .types import Array, Object, Point, Triple
 
@@ -43,7 +44,12 @@ class DetachedMesh(PlacedMesh):
         self._compared_until = 0.0
         farthest = float(np.abs(co).max()) * np.linalg.norm(linear, axis=0).max()
         self.spacing = farthest * np.finfo(np.float32).eps
-        normals, corners, starts, self.triangles = _arrays_of(evaluated.data)
+        mesh = evaluated.data
+        mesh.calc_loop_triangles()
+        normals = read_array(mesh.vertex_normals, "vector", 3)
+        corners = read_array(mesh.loops, "vertex_index", dtype=np.int32)
+        starts = read_array(mesh.polygons, "loop_start", dtype=np.int32)
+        self.triangles = read_array(mesh.loop_triangles, "vertices", 3, np.int32)
         self.faces = corners[starts[:, None] + np.arange(3)]
         self._corners, self._starts = corners, np.append(starts, len(corners))
         if np.linalg.det(linear) < 0.0:
@@ -114,17 +120,3 @@ class DetachedMesh(PlacedMesh):
         """The corners (k, 3) of a face, in order."""
         start, end = self._starts[number : number + 2]
         return self.points[self._corners[start:end]]
-
-
-def _arrays_of(mesh: bpy.types.Mesh) -> tuple[Array, Array, Array, Array]:
-    """Normals (n, 3) of a mesh's vertices, those of its corners, its faces' first corners, its triangles."""
-    normals = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertex_normals.foreach_get("vector", normals.ravel())
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    starts = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", starts)
-    mesh.calc_loop_triangles()
-    triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return normals, corners, starts, triangles

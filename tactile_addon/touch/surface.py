@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from .arrays import read_array
 from .evaluated_mesh import PlacedMesh, coordinates, disabled, evaluated_object, size_of
 from .types import Array, Object, Point, Triple
 
@@ -48,10 +49,8 @@ class MeshSurface(PlacedMesh):
     def _co(self) -> Array:
         return coordinates(self._object.name, self._object)
 
-    def vertices_near(
-        self, point: Point, radius: float, most: int | None = None
-    ) -> tuple[Array, Array, Array]:
-        """Indices, world coordinates and normals (any length) of vertices within `radius` of a world point.
+    def vertices_near(self, point: Point, radius: float, most: int | None = None) -> tuple[Array, Array]:
+        """World coordinates and normals (any length) of vertices within `radius` of a world point.
 
         If these are more than `most`, only each second, third, ... of them is returned.
         """
@@ -65,21 +64,8 @@ class MeshSurface(PlacedMesh):
                 near = near[:: math.ceil(len(near) / most)]
                 break
         # These are all normals, because one by one a few thousand take longer than a million at once.
-        normals = np.empty_like(self._co)
-        self._mesh.vertex_normals.foreach_get("vector", normals.ravel())
-        return (
-            near,
-            self._co[near] @ self._linear.T + self._origin,
-            normals[near] @ self._inverse,
-        )
-
-    def triangles(self) -> tuple[Array, Array]:
-        """The vertices (n, 3) in the world, and triangles (m, 3), counterclockwise from outside."""
-        self._mesh.calc_loop_triangles()
-        faces = np.empty((len(self._mesh.loop_triangles), 3), dtype=np.int32)
-        self._mesh.loop_triangles.foreach_get("vertices", faces.ravel())
-        mirrored = np.linalg.det(self._linear) < 0.0
-        return self._co @ self._linear.T + self._origin, faces[:, ::-1] if mirrored else faces
+        normals = read_array(self._mesh.vertex_normals, "vector", 3)
+        return self._co[near] @ self._linear.T + self._origin, normals[near] @ self._inverse
 
     def project(self, location: Point) -> tuple[Triple, Triple, float]:
         """The (point, unit normal) of the mesh nearest to the world `location`, and the distance.
@@ -150,6 +136,4 @@ class MeshSurface(PlacedMesh):
     def _nearest(self, local: Array) -> Any:
         """The nearest (point, normal) in object coordinates."""
         found, point, normal, _ = self._object.closest_point_on_mesh(local, depsgraph=self._depsgraph)
-        if not found:
-            raise ValueError("The location is too far away to be measured: set it on the surface")
-        return point, normal
+        return (point, normal) if found else (None, None)

@@ -19,7 +19,6 @@ from .single_precision import require_single
 from .surface import MeshSurface
 from .touch_report import (
     TouchReport,
-    early_ends,
     ends,
     judgment,
     measures,
@@ -79,21 +78,28 @@ def touch(
     clock = [perf_counter()]
     surface = MeshSurface(obj, depsgraph, sound)
     require_lengths(obj.name, surface.size, extent, step, noise)
-    point, surface_normal = _reference_point(obj.name, surface, location, extent, step)
+    point, surface_normal = nearest_point(obj.name, surface, location, extent or AWAY * surface.size)
+    require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
     outward = unit_vector("outward", surface_normal if outward is None else outward)
     if toward is not None and np.dot(outward, toward) < 0.0:
         outward = [-v for v in outward]
     axes = reference_axes(outward, tangent)
     clock.append(perf_counter())
-    given: dict[str, Any] = {
-        "farthest": FARTHEST_SHARE * surface.size,
-        "step": step or "auto",
-        "noise": noise,
+    found = _explored(
+        surface,
+        point,
+        outward,
+        planes,
+        farthest=FARTHEST_SHARE * surface.size,
+        extent=extent or "auto",
+        step=step or "auto",
+        noise=noise,
+        rng=seed,
+        tangent=axes[:, 0],
+        tolerance=tolerance,
+        most_planes=MOST_PLANES,
         **fit,
-    }
-    given |= {"rng": seed, "tangent": axes[:, 0], "extent": extent or "auto"}
-    given |= {"tolerance": tolerance, "most_planes": MOST_PLANES}
-    found = _explored(surface, point, outward, planes, **given)
+    )
     clock.append(perf_counter())
     require_single("patch", found.result.radius, found.result.frame.origin)
     report: TouchReport = {
@@ -104,7 +110,7 @@ def touch(
         **_exploration_report(
             found,
             len(planes),
-            (early_ends if extent else ends)(found.result.contours),
+            ends(found.result.contours, extent > 0.0),
             core.has_few_facets(found.result, surface.face_near, surface.corners_of),
         ),
         "axes": axes.tolist(),
@@ -185,15 +191,6 @@ def require_lengths(name: str, size: float, extent: float, step: float, noise: f
         )
 
 
-def _reference_point(
-    name: str, surface: MeshSurface, location: Point, extent: float, step: float
-) -> tuple[Triple, Triple]:
-    """The point of the surface nearest to the location, and its normal. Raises ValueError if that is far."""
-    point, normal = nearest_point(name, surface, location, extent or AWAY * surface.size)
-    require_fine(surface.spacing(point), step or extent / LEAST_STEPS or FINEST_STEP * surface.size)
-    return point, normal
-
-
 def nearest_point(
     name: str, surface: MeshSurface | DetachedMesh, location: Point, farthest: float
 ) -> tuple[Triple, Triple]:
@@ -246,7 +243,8 @@ def _verification_report(
     surface: MeshSurface | None, result: core.Reconstruction, most: int | None
 ) -> TouchReport:
     """The report of distances from the patch to the vertices over it that a finger can reach, if any."""
-    _, over = reachable(surface, result, most)
+    vertices, normals = surface.vertices_near(result.frame.origin, 2.0 * result.radius, most)
+    over = vertices[core.reachable(result.geometry, surface, vertices, normals)]
     misses = core.distances(result.geometry, result.frame.to_local(over))
     if not len(misses):
         return {"vertices": 0}
@@ -255,10 +253,3 @@ def _verification_report(
         "vertex_distance_mean": float(misses.mean()),
         "vertex_distance_max": float(misses.max()),
     }
-
-
-def reachable(surface: MeshSurface, r: core.Reconstruction, most: int | None = None) -> tuple[Array, Array]:
-    """The vertices over a patch that a finger can reach: indices in the evaluated mesh, world coordinates."""
-    near, vertices, normals = surface.vertices_near(r.frame.origin, 2.0 * r.radius, most)
-    over = core.reachable(r.geometry, surface, vertices, normals)
-    return near[over], vertices[over]

@@ -111,28 +111,19 @@ class TouchReport(TypedDict, total=False):
     verification: dict[str, Any]  # The name of the mesh as `target`, and what core.verify has found.
 
 
-def ends(contours: Sequence[core.Contour]) -> str:
-    """A sentence on what has ended curves that were free to grow."""
-    counts = Counter(stop for contour in contours for stop in contour.stops).most_common()
-    if len(counts) == 1:
-        return f" All half curves end {core.WHERE[counts[0][0]]}."
-    return f" {_counted(counts, 2 * len(contours))}."
-
-
-def early_ends(contours: Sequence[core.Contour]) -> str:
-    """A sentence on what has ended curves before the extent that was asked for, or ""."""
+def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
+    """A sentence on what ended half curves, or, if an extent was given, those that end before it; or ""."""
     counts = Counter(stop for contour in contours for stop in contour.stops)
-    del counts[core.EXTENT]
+    if has_extent:
+        del counts[core.EXTENT]
+    elif len(counts) == 1:
+        return f" All half curves end {core.WHERE[next(iter(counts))]}."
     if not counts:
         return ""
-    return f" {_counted(counts.most_common(), 2 * len(contours))}, before the extent."
-
-
-def _counted(counts: list[tuple[str, int]], total: int) -> str:
-    (most, first), *others = [(count, core.WHERE[stop]) for stop, count in counts]
-    return ", ".join(
-        [f"{most} of {total} half curves end {first}", *(f"{count} {end}" for count, end in others)]
-    )
+    (first, most), *others = counts.most_common()
+    words = [f"{most} of {2 * len(contours)} half curves end {core.WHERE[first]}"]
+    words += [f"{count} {core.WHERE[stop]}" for stop, count in others]
+    return f" {', '.join(words)}{', before the extent' if has_extent else ''}."
 
 
 def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: bool = False) -> TouchReport:

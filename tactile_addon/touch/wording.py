@@ -18,13 +18,8 @@ FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that 
 EARLY = ("edge", "crease", "turns away")  # These end a curve early.
 
 
-def readable(report: TouchReport) -> str:
-    """Lines of label and value, with lengths in the unit of the scene or file."""
-    return table(readable_rows(report))
-
-
 def readable_rows(report: TouchReport) -> list[tuple[str, str]]:
-    """(label, value) of everything there is to say of a patch."""
+    """(label, value) of everything there is to say of a patch, with lengths in the unit of scene or file."""
     seconds, unit = report["seconds"], unit_of(bpy.context.scene, report["radius"])
     contacts = _measured_contacts(report) if "curves" in report else _tracked(report)
     return [

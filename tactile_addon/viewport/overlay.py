@@ -3,7 +3,7 @@
 """What is drawn over the viewport: the preview of a pick, the active sampling plane, and the legend."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import blf
@@ -44,20 +44,6 @@ def preview_lines(touched: Touched) -> list[tuple[Array, tuple[float, ...]]]:
     pairs = zip(r.contours, PLANE_COLORS, strict=False)
     curves = [(contour.points, (*color, 1.0)) for contour, color in pairs]
     return [(np.vstack([edge, edge[:1]]), WHITE), (normal, WHITE), *curves]
-
-
-def draw_pick(seen: dict[str, Any]) -> list[Any]:
-    """Draws what a pick has in `seen` from now on; returns the handles of the drawings.
-
-    touched : the touch whose preview is drawn, or None
-    refusal : why there is none, a sentence, or None
-    mouse : where the mouse is in the window
-    """
-    add = bpy.types.SpaceView3D.draw_handler_add
-    return [
-        add(draw_preview, (seen,), "WINDOW", "POST_VIEW"),
-        add(draw_key, (seen,), "WINDOW", "POST_PIXEL"),
-    ]
 
 
 def draw_key(seen: dict[str, Any]) -> None:
@@ -293,8 +279,14 @@ def _free_strip(context: bpy.types.Context, high: float) -> tuple[float, float, 
     return left, right, bottom
 
 
-def draw_handlers() -> list[Any]:
-    """Adds the drawings that are always there, and returns the handles by which to remove them."""
+# Functions that draw and when they do so: those that are always there, and those of a pick. The latter get a
+# dict with the keys touched, the touch whose preview is drawn, or None; refusal, a sentence on why there is
+# none, or None; and mouse, where the mouse is in the window.
+DRAWINGS = ((draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
+PICK_DRAWINGS = ((draw_preview, "POST_VIEW"), (draw_key, "POST_PIXEL"))
+
+
+def add_drawings(drawings: Iterable[tuple[Callable[..., None], str]], *given: Any) -> list[Any]:
+    """Adds drawings to all 3D viewports, and returns the handles by which to remove them."""
     add = bpy.types.SpaceView3D.draw_handler_add
-    kinds = ((draw_plane, "POST_VIEW"), (draw_legend, "POST_PIXEL"))
-    return [add(draw, (), "WINDOW", kind) for draw, kind in kinds]
+    return [add(draw, given, "WINDOW", kind) for draw, kind in drawings]

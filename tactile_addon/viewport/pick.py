@@ -29,7 +29,7 @@ from ..touch.settings import (
     draw_all,
     touch_arguments,
 )
-from ..touch.touch_object import Touched, touch
+from ..touch.touch_object import touch
 from ..touch.types import Object, Outcome
 from ..touch.wording import curvatures, sentence, verdict
 from . import overlay
@@ -92,12 +92,8 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         if self.at_once:
             return self._click(context, event)
         # The drawing may outlive this operator by a redraw, so it gets a dict and not the operator.
-        self._seen: dict[str, Any] = {
-            "touched": None,
-            "refusal": None,
-            "mouse": (event.mouse_x, event.mouse_y),
-        }
-        self._drawings = overlay.draw_pick(self._seen)
+        self._seen: dict[str, Any] = {}
+        self._drawings = overlay.add_drawings(overlay.PICK_DRAWINGS, self._seen)
         context.window.cursor_modal_set("EYEDROPPER")
         context.workspace.status_text_set(lambda header, _: draw_hints(header.layout, HINTS))
         context.window_manager.modal_handler_add(self)
@@ -150,8 +146,15 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         depsgraph = context.evaluated_depsgraph_get()
         try:
             moved = self._inherit(context)
-            target = self._target(context, moved)
-            touched = self._touch(context, target, depsgraph)
+            target = target_object(context, self.target)
+            given = self.properties.is_property_set
+            touched = touch(
+                target,
+                depsgraph,
+                list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
+                toward=list(self.outward) if given("outward") else None,
+                **touch_arguments(self),
+            )
         except ValueError as error:
             return report_error(self, error)
         found = moved or probe.make(context, target)
@@ -172,21 +175,6 @@ class TACTILE_OT_pick(TouchSettings, bpy.types.Operator):
         unit = units.unit_of(context.scene, report["radius"])
         self.report({"INFO"} if report["status"] == "ok" else {"WARNING"}, verdict(report, unit))
         return {"FINISHED"}
-
-    def _target(self, context: bpy.types.Context, moved: Object | None) -> Object:
-        if moved is not None and not self.target and moved.tactile_probe.target is not None:
-            return moved.tactile_probe.target
-        return target_object(context, self.target)
-
-    def _touch(self, context: bpy.types.Context, target: Object, depsgraph: bpy.types.Depsgraph) -> Touched:
-        given = self.properties.is_property_set
-        return touch(
-            target,
-            depsgraph,
-            list(self.location) if given("location") else context.scene.cursor.location.to_tuple(),
-            toward=list(self.outward) if given("outward") else None,
-            **touch_arguments(self),
-        )
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

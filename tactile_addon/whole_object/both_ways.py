@@ -10,6 +10,7 @@ import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from ... import core
+from ...core.steps import part_of
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.types import Array
 
@@ -43,16 +44,14 @@ class BothWays:
         corners, triangles = self._mesh.vertices, self._mesh.triangles
         normals = self._mesh.normals
         yield 0.0
-        for share in self._off_target(corners, normals, self.deviation):
-            yield 0.3 * share
+        yield from part_of(self._off_target(corners, normals, self.deviation), 0.0, 0.3)
         a, b, c = corners[triangles].transpose(1, 0, 2)
         normals = np.cross(b - a, c - a)
         areas = np.linalg.norm(normals, axis=1)
         normals /= np.maximum(areas, 1e-300)[:, None]
         middles, off = (a + b + c) / 3.0, np.zeros(len(areas))
         yield 0.3
-        for share in self._off_target(middles, normals, off):
-            yield 0.3 + 0.4 * share
+        yield from part_of(self._off_target(middles, normals, off), 0.3, 0.7)
         there, places = np.average(np.abs(off), weights=areas), self._places()
         yield 0.7
         trees = yield from self._trees()
@@ -62,7 +61,7 @@ class BothWays:
             back.append(off.mean() if len(off) else 0.0)
         self.mean = 0.5 * float(there + back[0])
 
-    def _off_target(self, points: Array, normals: Array, off: Array) -> Iterator[float]:
+    def _off_target(self, points: Array, normals: Array, off: Array) -> Generator[float, None, None]:
         """Fills in the signed distances (n,) of points (n, 3) of the surface; yields the share done."""
         for start in range(0, len(points), AT_ONCE):
             some = slice(start, start + AT_ONCE)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..touch import units
 from ..touch.units import Unit
-from ..touch.wording import many, table, vector
+from ..touch.wording import many, vector
 
 LEAST_NUMBER = 10.0  # Lengths are in a unit that suits so many tolerances.
 ZERO = 1e-6  # A distance below this share of the size counts as 0.
@@ -21,14 +21,9 @@ def unit_of(record: Mapping[str, Any]) -> Unit:
     return units.unit_of(bpy.context.scene, LEAST_NUMBER * (record["tolerance"] or record["height_std"]))
 
 
-def object_readable(record: Mapping[str, Any]) -> str:
-    """Lines of label and value, with lengths in the unit of the scene or file."""
-    return table(object_table_rows(record))
-
-
 def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(label, value) of everything there is to say of a whole object."""
-    unit, off = unit_of(record), _off(record, "mean")
+    unit, off = unit_of(record), deviation(record, "mean")
     how = (
         many(record["touches"], "time", "times") if "touches" in record else f"{record['contacts']} contacts"
     )
@@ -41,7 +36,7 @@ def object_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("edges of their graph", record["edges"]),
         ("tolerance", _tolerance(record)),
         ("standard deviation of the height", units.say(record["height_std"], 1, unit)),
-        ("distance from the mesh", off and f"mean {off}; largest {_off(record, 'max')}"),
+        ("distance from the mesh", off and f"mean {off}; largest {deviation(record, 'max')}"),
         ("largest distance at", _place(record)),
         (
             "surface's mesh",
@@ -67,7 +62,7 @@ def object_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what was found of a whole object."""
     std = units.say(record["height_std"], 1, unit_of(record))
     if "touches" in record:
-        touches, off = many(record["touches"], "touch", "touches"), _off(record, "mean")
+        touches, off = many(record["touches"], "touch", "touches"), deviation(record, "mean")
         return f"{verdict_of(record)}: {touches}; {_surface(record)}; {off} off the mesh on average"
     patches = f"{record['patches']} patches of {record['contacts']} contacts"
     return f"{verdict_of(record)}: {patches}; {_surface(record)}; ± {std}"
@@ -78,21 +73,17 @@ def object_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     return _known(
         ("Touches", record.get("touches")),
         ("Contacts", record.get("contacts")),
-        ("Surface", _ends(record)),
+        # It is never "Closed" where touches could go on.
+        ("Surface", "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"),
         ("Rims Left", record.get("uncovered") or None),
         ("Tolerance", _tolerance(record)),
         ("Height", f"± {units.say(record['height_std'], 1, unit_of(record))}"),
-        ("Off the Mesh", _off(record, "mean")),
+        ("Off the Mesh", deviation(record, "mean")),
         ("Patches", record["patches"]),
         ("Edge Length", _edge(record)),
         ("Vertices", record["vertices"]),
         ("… without K", record.get("unknown_curvatures") or None),
     )
-
-
-def farthest(record: Mapping[str, Any]) -> str | None:
-    """The largest distance between surface and mesh in words, or None if there was no mesh."""
-    return _off(record, "max")
 
 
 def _known(*rows: tuple[str, Any]) -> list[tuple[str, str]]:
@@ -106,11 +97,6 @@ def _surface(record: Mapping[str, Any]) -> str:
     if record.get("uncovered"):
         return f"open, with {many(record['uncovered'], 'place', 'places')} to go on from"
     return "open where nothing was felt"
-
-
-def _ends(record: Mapping[str, Any]) -> str:
-    """In a word, whether the surface that is shown has no rim; never "Closed" where touches could go on."""
-    return "Closed" if record["is_closed"] else "Incomplete" if record.get("uncovered") else "Open"
 
 
 def _edge(record: Mapping[str, Any]) -> str | None:
@@ -128,7 +114,7 @@ def _tolerance(record: Mapping[str, Any]) -> str | None:
     return units.say(record["tolerance"], 1, unit_of(record)) if record["tolerance"] else None
 
 
-def _off(record: Mapping[str, Any], what: str) -> str | None:
+def deviation(record: Mapping[str, Any], what: str) -> str | None:
     """The mean or largest deviation from the mesh in words, or None if there was no mesh."""
     off = record.get(f"deviation_{what}")
     if off is None:

@@ -10,9 +10,10 @@ from mathutils import Vector
 
 from ..probes.in_slices import InSlices, Progress
 from ..probes.number_fields import dragged, fields
-from ..probes.operators import is_in_object_mode, make_active, report_error
+from ..probes.operators import is_in_object_mode, make_active, polls, report_error
 from ..scene import patch_record
 from ..scene.mesh_data import own_mesh
+from ..touch.arrays import read_array
 from ..touch.settings import draw_chosen, length_property
 from ..touch.types import Object, Outcome, Point
 from . import kept, whole_mesh
@@ -37,10 +38,9 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         obj = surface_of(context)
-        if obj is None or "deviation_place" not in obj[patch_record.ATLAS_RECORD]:
-            cls.poll_message_set("Select the surface of a whole object that was touched")
-            return False
-        return is_in_object_mode(cls, context, "Surfaces are looked at")
+        was_touched = obj is not None and "deviation_place" in obj[patch_record.ATLAS_RECORD]
+        hint = "Select the surface of a whole object that was touched"
+        return polls(cls, was_touched, hint) and is_in_object_mode(cls, context, "Surfaces are looked at")
 
     def execute(self, context: bpy.types.Context) -> Outcome:
         obj = surface_of(context)
@@ -66,8 +66,7 @@ class TACTILE_OT_look_farthest(bpy.types.Operator):
 
 def _select_nearest(mesh: bpy.types.Mesh, place: Point) -> Any:
     """Selects the vertex nearest to a place, and nothing else, and returns it."""
-    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get("co", points.ravel())
+    points = read_array(mesh.vertices, "co", 3)
     nearest = int(np.argmin(((points - np.array(place)) ** 2).sum(axis=1)))
     for parts in (mesh.vertices, mesh.edges, mesh.polygons):
         parts.foreach_set("select", np.zeros(len(parts), dtype=bool))
@@ -90,14 +89,15 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         "chooses it by the curvature",
     )
 
-    stop = "Keep It as It Was"
+    stop, stopped = "Keep It as It Was", "Stopped: the surface stays as it was"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if kept.touches_of(surface_of(context)) is None:
-            cls.poll_message_set("Only the last surface that was touched has its touches in memory")
-            return False
-        return is_in_object_mode(cls, context, "Surfaces are made")
+        touches, hint = (
+            kept.touches_of(surface_of(context)),
+            "Only the last surface that was touched has its touches in memory",
+        )
+        return polls(cls, touches, hint) and is_in_object_mode(cls, context, "Surfaces are made")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         if bpy.app.background:
@@ -127,11 +127,6 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
     def _done(self) -> Progress:
         share = self._touches.share
         return f"{self._touches.words}: {share:.0%}", share
-
-    def _stopped(self, context: bpy.types.Context) -> Outcome:
-        self._leave(context)
-        self.report({"INFO"}, "Stopped: the surface stays as it was")
-        return {"CANCELLED"}
 
     def _finish(self, context: bpy.types.Context) -> Outcome:
         obj = self._object(context)

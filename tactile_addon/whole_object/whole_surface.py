@@ -3,12 +3,13 @@
 """The surface of an atlas, step by step, whether it was touched or measured; nothing in the scene changes."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Any
 
 import numpy as np
 
 from ... import core
+from ...core.steps import part_of
 from ..touch.types import Array
 
 CURVED_AT_ONCE = 1000  # A step computes the curvatures at so many vertices.
@@ -29,10 +30,10 @@ class WholeSurface:
         self.atlas, self.origin = atlas, np.array(origin, dtype=float)
         self._in_doubt = 0
 
-    def steps(self, edge: float) -> Iterator[float]:
+    def steps(self, edge: float) -> Generator[float, None, None]:
         """Does everything, as a generator that yields the share that is done; `edge` is a length or 0."""
         if edge:
-            yield from self._meshed(edge)
+            self.mesh = yield from part_of(self.atlas.meshing(edge), 0.0, 0.8)
         else:
             self.mesh = self.atlas.reference.mesh  # Its edges have the suggested length.
         if not len(self.mesh.triangles):
@@ -44,8 +45,7 @@ class WholeSurface:
             parts.append(self.atlas.curvatures_at(points[some], normals[some]))
             yield 0.8
         self.curvatures = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        for share in self.atlas.bounding():
-            yield 0.8 + 0.1 * share
+        yield from part_of(self.atlas.bounding(), 0.8, 0.9)
         for r in self.atlas.patches:
             self._in_doubt += r.status != "ok"  # The first time this takes a while.
             yield 0.9
@@ -53,16 +53,6 @@ class WholeSurface:
         yield 0.9
         self.graph = json.dumps(graph, allow_nan=False)
         yield 0.9
-
-    def _meshed(self, edge: float) -> Iterator[float]:
-        """Makes the mesh with edges of this length; yields the share of everything that is done."""
-        steps = self.atlas.meshing(edge)
-        while True:
-            try:
-                yield 0.8 * next(steps)
-            except StopIteration as end:
-                self.mesh = end.value
-                return
 
     def _graph(self) -> dict[str, Any]:
         """The graph of Atlas.to_dict, moved to the world."""

@@ -122,8 +122,8 @@ def test_touches_that_choose_their_extent_are_those_of_the_other_operator(empty,
         azimuths = (0.0, 1.0, 2.0, 0.0, 0.0, 0.0)
         empty.ops.tactile.reconstruct(target=ridge.name, location=place, outward=normal, azimuths=azimuths)
         report = empty.context.object["tactile"].to_dict()
-        assert touched.reach[number] == pytest.approx(report["extent"], rel=1e-3)
-        assert touched.height_std[number] == pytest.approx(report["height_std"], rel=0.02)
+        assert touched.measures["reach"][number] == pytest.approx(report["extent"], rel=1e-3)
+        assert touched.measures["height_std"][number] == pytest.approx(report["height_std"], rel=0.02)
 
 
 def test_an_automatic_extent_fits_the_place(empty, ridge):
