@@ -33,12 +33,16 @@ def sentences(node):
     """The nodes that are messages: of errors, of reports, of a status, of a probe."""
     if isinstance(node, ast.Call):
         name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
-        return node.args[:1] if name in ERRORS else node.args[1:2] if name == "report" else []
+        return (
+            node.args[:1] if name in ERRORS else node.args[1:2] if name in ("report", "mark_outdated") else []
+        )
     if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple):
         return node.value.elts[1:] if isinstance(node.value.elts[0], ast.Constant) else []
     if isinstance(node, ast.Yield):
         return [node.value]
     if isinstance(node, ast.Assign) and getattr(node.targets[0], "attr", None) == "message":
+        return [node.value]
+    if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", None) == "stopped":
         return [node.value]
     if isinstance(node, ast.AugAssign) and getattr(node.target, "id", None) == "message":
         return [node.value]

@@ -56,7 +56,8 @@ def update(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool) -> Non
         if patch is not None:
             anchor.carry(probe, patch)
             patch_record.hold(patch)
-            patch_record.mark_outdated(patch, f"because the last one failed. {settings.message}")
+            message = f"This patch is from an earlier touch, because the last one failed. {settings.message}"
+            patch_record.mark_outdated(patch, message)
         _sign(probe, depsgraph)
     else:
         adopt(probe, touched, depsgraph, complete)
@@ -93,7 +94,10 @@ def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
     if settings.message and record is not None and patch_record.VERDICT not in patch:
         settings.message = ""  # There was no patch, and undo has brought it back.
     if outdated:
-        patch_record.mark_outdated(patch, "and the probe or its target has changed since: touch again.")
+        patch_record.mark_outdated(
+            patch,
+            "This patch is from an earlier touch, and the probe or its target has changed since: touch again.",
+        )
     elif not settings.message:
         patch_record.mark_current(patch)
 

@@ -113,14 +113,14 @@ def _is_whole(mesh: bpy.types.Mesh) -> bool:
     return len(mesh.vertices) > 0 and all(attribute_of(mesh, name) is not None for name in names)
 
 
-def mark_outdated(patch: Object, why: str) -> None:
-    """Has the record say that the patch is from an earlier touch, and why; VERDICT keeps what it was."""
+def mark_outdated(patch: Object, message: str) -> None:
+    """Gives the record the status "outdated" and a message on why; VERDICT keeps what it had."""
     report = report_of(patch)
     if report is None:
         return
     if VERDICT not in patch:
         patch[VERDICT] = {key: report[key] for key in ("status", "message")}
-    report.update({"status": "outdated", "message": f"This patch is from an earlier touch, {why}"})
+    report.update({"status": "outdated", "message": message})
 
 
 def mark_current(patch: Object) -> None:

@@ -89,7 +89,8 @@ class TACTILE_OT_mesh_again(InSlices, bpy.types.Operator):
         "chooses it by the curvature",
     )
 
-    stop, stopped = "Keep It as It Was", "Stopped: the surface stays as it was"
+    stop = "Keep It as It Was"
+    stopped = "Stopped: the surface stays as it was"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

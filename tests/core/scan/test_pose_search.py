@@ -288,7 +288,7 @@ def test_the_polynomials_of_the_coarse_search_are_of_one_side_of_a_thin_sheet():
     slopes = np.column_stack([np.where(top, -0.2 * x, 0.0), np.where(top, 0.0, -0.6 * y), np.ones(len(x))])
     normals = slopes / np.linalg.norm(slopes, axis=1, keepdims=True) * np.where(top, 1.0, -1.0)[:, None]
     centers = np.column_stack([x, y, heights])
-    mesh = scanned_mesh.Mesh(None, normals, centers, normals, None)
+    mesh = scanned_mesh.ScanMesh(None, normals, centers, normals, None)
     places, fields = pose_search._fields(mesh, 0.8)
     inner = np.hypot(places[:, 0, 3], places[:, 1, 3]) < 1.0
     up = inner & (places[:, 2, 2] > 0.9)
