@@ -24,11 +24,10 @@ from .sextic import mean_given, posterior_given, sextics, with_scatter
 # The noise is at least this share of the radius, because no surface is a polynomial. With less the waviness
 # follows what polynomials leave, and automatic touches end earlier (benchmarks.model).
 MISFIT = 2e-3
-# benchmarks.accuracy judges the next six, and the outliers of benchmarks.stability the last two.
+# benchmarks.accuracy judges the next five, and the outliers of benchmarks.stability the last two.
 # There are at most so many passes: two turn the frame to what they found, others are for outliers.
 PASSES = 8
 SETTLED_WEIGHT = 0.1  # A fit is settled when no weight changes by more between passes.
-STALE_WEIGHT = 0.5  # Waviness and noise are found anew when a weight has changed by more since.
 ALIKE_CURVATURES = 1e-4  # Curvatures that differ by less count as alike; heights change by an eighth of it.
 LEVEL = 5e-3  # Axes are level when the slope is less: heights change by its product with slope and height.
 DECIMALS = 9  # Heights and distances count to so many decimals, so that rounding does not choose.
@@ -58,10 +57,7 @@ class Observations(NamedTuple):
 
 
 class _State(NamedTuple):
-    """What a pass changes: axes (b, 3, 3), k1 and k2 (b,), weights (b, n), typical and mean prior (b, 27).
-
-    noise : (b,); of_weights : (b, n), the weights that the hyperparameters were found with
-    """
+    """What a pass changes: axes (b, 3, 3), k1 and k2 (b,), weights (b, n), and hyperparameters."""
 
     axes: Array
     k1: Array
@@ -70,7 +66,6 @@ class _State(NamedTuple):
     typical: Array
     prior: Array
     noise: Array
-    of_weights: Array
 
 
 def joint_fit(
@@ -89,9 +84,7 @@ def joint_fit(
     """
     floor = np.maximum(given.noise, MISFIT)
     axes, usual = _first_axes(given.contacts, weights, k1, k2), np.full(len(k1), USUAL_WAVINESS)
-    state = _State(
-        axes, k1, k2, weights, prior_variances(usual), prior_variances(usual), floor.copy(), weights
-    )
+    state = _State(axes, k1, k2, weights, prior_variances(usual), prior_variances(usual), floor.copy())
     return _passes(given._replace(noise=floor), state, 0, through)
 
 
@@ -135,12 +128,10 @@ def _pass(
     expected = prior_mean(state.k1, state.k2)
     local, normals = given.contacts @ state.axes, given.normals @ state.axes
     data = sextics(local, state.weights, expected, normals, through)
-    stale = np.abs(state.weights - state.of_weights).max(axis=1) > STALE_WEIGHT
-    if step == 1:
-        stale[:] = True
+    # Outliers change waviness and noise, so both are found anew while there are any.
+    stale = ((state.weights > 0.0) & (state.weights < 1.0)).any(axis=1) | (step == 1)
     if stale.any():
-        anew = *data.hyperparameters(given.noise, stale)[:3], state.weights[stale]
-        for values, new in zip(state[-4:], anew, strict=True):
+        for values, new in zip(state[-3:], data.hyperparameters(given.noise, stale), strict=False):
             values[stale] = new
     hyper = Hyperparameters(state.typical, state.prior, state.noise)
     found = mean_given(data, hyper)
