@@ -37,12 +37,8 @@ POWER = 0.1
 
 
 class Hyperparameters(NamedTuple):
-    """Prior variances of the coefficients (..., 27), the noise (...), variances of the process (2,).
+    """Prior variances of the coefficients (..., 27), the noise (...), variances of the process (2,)."""
 
-    typical : (..., 27), the geometric mean of the prior variances over the grid; `prior` is their mean
-    """
-
-    typical: Array
     prior: Array
     noise: Array
     process: Array = np.zeros(2)
@@ -99,8 +95,7 @@ def hyperparameters(heights: Array, counts: Array, slopes: Array | None, floor: 
     p = likelihoods(np.concatenate(found) + unusual[:, None])
     by_noise = p.sum(axis=1)
     noise = np.sqrt(np.einsum("bn,bn->b", by_noise, noises**2))
-    by_waviness = p.sum(axis=2)
-    return Hyperparameters(np.exp(by_waviness @ np.log(prior)), by_waviness @ prior, noise)
+    return Hyperparameters(p.sum(axis=2) @ prior, noise)
 
 
 def likelihoods(neg2_log: Array, power: float = 1.0) -> Array:
@@ -130,7 +125,7 @@ def process_hyperparameters(
     without = neg2_log_evidence(*equations, sextics, np.array([[most]])) - 1.0
     best = min(found.min(), without.min())
     use_gp = np.exp(0.5 * (best - found)).mean() > ODDS * np.exp(0.5 * (best - without)).mean()
-    return Hyperparameters(prior, prior, noise, p.sum(axis=2) @ AMPLITUDES**2), bool(use_gp)
+    return Hyperparameters(prior, noise, p.sum(axis=2) @ AMPLITUDES**2), bool(use_gp)
 
 
 def process_neg2_log_evidence(rows: Array, kernels: list[Array], prior: Array, noises: Array) -> Array:

@@ -63,7 +63,6 @@ class _State(NamedTuple):
     k1: Array
     k2: Array
     weights: Array
-    typical: Array
     prior: Array
     noise: Array
 
@@ -84,7 +83,7 @@ def joint_fit(
     """
     floor = np.maximum(given.noise, MISFIT)
     axes, usual = _first_axes(given.contacts, weights, k1, k2), np.full(len(k1), USUAL_WAVINESS)
-    state = _State(axes, k1, k2, weights, prior_variances(usual), prior_variances(usual), floor.copy())
+    state = _State(axes, k1, k2, weights, prior_variances(usual), floor.copy())
     return _passes(given._replace(noise=floor), state, 0, through)
 
 
@@ -131,9 +130,9 @@ def _pass(
     # Outliers change waviness and noise, so both are found anew while there are any.
     stale = ((state.weights > 0.0) & (state.weights < 1.0)).any(axis=1) | (step == 1)
     if stale.any():
-        for values, new in zip(state[-3:], data.hyperparameters(given.noise, stale), strict=False):
+        for values, new in zip(state[-2:], data.hyperparameters(given.noise, stale), strict=False):
             values[stale] = new
-    hyper = Hyperparameters(state.typical, state.prior, state.noise)
+    hyper = Hyperparameters(state.prior, state.noise)
     found = mean_given(data, hyper)
     if data.slopes is not None:
         data = with_scatter(data, found, normals)
@@ -177,7 +176,7 @@ def posteriors_of(
     expected, local = prior_mean(np.full(b, k1), np.full(b, k2)), contacts[None].repeat(b, axis=0)
     data = sextics(local, weights, expected, local[:, :0])
     floor, usual = np.full(b, max(noise, MISFIT)), prior_variances(np.full(b, USUAL_WAVINESS))
-    hyper = data.hyperparameters(floor) if by_evidence else Hyperparameters(usual, usual, floor)
+    hyper = data.hyperparameters(floor) if by_evidence else Hyperparameters(usual, floor)
     return posterior_given(expected + mean_given(data, hyper), data, hyper)
 
 

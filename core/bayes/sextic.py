@@ -86,9 +86,8 @@ def sextics(local: Array, weights: Array, expected: Array, normals: Array, throu
 
 def mean_given(data: Sextics, hyper: Hyperparameters) -> Array:
     """The mean of the coefficients less the prior's mean, (b, 27) (Rasmussen and Williams 2006, eq. 2.8)."""
-    # Heights are nearest with the typical prior, and intervals are true with the averaged one.
     bordered = data.equations(hyper.noise)
-    precision = _with_prior(bordered[:, :-1, :-1].copy(), hyper.typical)
+    precision = _with_prior(bordered[:, :-1, :-1].copy(), hyper.prior)
     return np.array([solved_definite(*each) for each in zip(precision, bordered[:, :-1, -1], strict=True)])
 
 
@@ -106,7 +105,7 @@ def with_scatter(data: Sextics, coefficients: Array, normals: Array) -> Sextics:
 
 
 def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> SurfacePosterior:
-    """The posteriors about the means (b, 27), under the averaged prior."""
+    """The posteriors about the means (b, 27)."""
     gram = data.equations(hyper.noise)[:, :-1, :-1]
     visibility = _visibility(gram)
     root = np.zeros((len(mean), len(TERMS) + 1, len(TERMS) + 1))

@@ -435,7 +435,7 @@ def test_normals_show_the_slopes_of_the_process_too():
     normals = np.column_stack([-0.15 * np.cos(3.0 * flat[:, 0]), np.zeros(40), np.ones(40)]) / 0.03
     touch = touch_of(contacts, np.ones(40), normals, np.arange(40))
     of_terms = prior.prior_variances(np.array(prior.USUAL_WAVINESS))
-    hyper = evidence.Hyperparameters(of_terms, of_terms, noise, variances)
+    hyper = evidence.Hyperparameters(of_terms, noise, variances)
     found = process_posterior(touch, hyper, np.zeros((22, 22)))
 
     def features(p):

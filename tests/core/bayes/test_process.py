@@ -117,7 +117,7 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     sizes = np.array([4e-4, 9e-4])
     touch = touch_of(contacts, np.ones(len(x)), contacts[:0], np.arange(len(x)))
     variances = np.minimum(prior_variances(np.array(USUAL_WAVINESS)), evidence.MOST_VARIANCE)
-    hyper = evidence.Hyperparameters(variances, variances, noise, sizes)
+    hyper = evidence.Hyperparameters(variances, noise, sizes)
     surface = process_posterior(touch, hyper, np.zeros((22, 22)))
     places, points = contacts[:, :2], over(r) / r.radius
     basis, wanted = monomials(x, y, TERMS), monomials(*points.T, TERMS)
