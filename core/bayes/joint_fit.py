@@ -148,8 +148,8 @@ def _pass(
         settled &= (np.abs(weights - state.weights).max(axis=1) <= SETTLED_WEIGHT) | (step == PASSES - 1)
     # Axes follow the first curve in the end only, because the prior depends on them.
     tangent = np.where(settled[:, None], given.tangent, state.axes[..., 0])
-    found_axes = [turned(*touch) for touch in zip(state.axes, mean, tangent, strict=True)]
-    axes, k1, k2, angle = (np.array(values) for values in zip(*found_axes, strict=True))
+    updates = [frame_update(*touch) for touch in zip(state.axes, mean, tangent, strict=True)]
+    axes, k1, k2, angle = (np.array(values) for values in zip(*updates, strict=True))
     state = state._replace(axes=axes, k1=k1, k2=k2, weights=weights)
     if not settled.any():
         return state, settled, None
@@ -190,7 +190,7 @@ def _student_weights(residuals: Array, present: NDArray[np.bool_], floor: Array)
     return found
 
 
-def turned(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:
+def frame_update(axes: Array, mean: Array, tangent: Array) -> tuple[Array, float, float, float]:
     """The axes tilted to a surface's normal and turned to its principal directions; k1, k2; the angle turned.
 
     mean : coefficients of the surface in the axes (3, 3); tangent : (3,), which d1 is to follow

@@ -260,7 +260,7 @@ class SurfacePosterior(HeightField):
         variances = np.einsum("ni,ni->n", bent @ self.covariance[2:FREE, 2:FREE], bent)
         return math.sqrt(max(float(variances.max()), 0.0))
 
-    def blind(self, degree: int) -> int:
+    def null_space_dimension(self, degree: int) -> int:
         """How many directions among the terms of degree 1 to `degree` keep 90 % of their prior variance."""
         last = terms_to(degree) - FREE
         singular = np.linalg.svd(self.visibility[:last, :last], compute_uv=False)
@@ -286,9 +286,9 @@ def _turn(angle: Array) -> Array:
     A turn only changes the phase of the terms z^i z'^j in z = x + iy and its conjugate z'.
     """
     (parts, from_complex), angles = _complex_terms(), np.asarray(angle)[..., None]
-    turned = from_complex * np.exp(angles * WINDING)[..., None, :]
+    rotated = from_complex * np.exp(angles * WINDING)[..., None, :]
     # Only the real part of the product is needed, so real matrices suffice.
-    turn: Array = np.concatenate([turned.real, turned.imag], axis=-1) @ parts
+    turn: Array = np.concatenate([rotated.real, rotated.imag], axis=-1) @ parts
     return turn
 
 

@@ -18,7 +18,7 @@ from ..arguments import Array
 from ..lapack import cholesky, inverse_lower, solved, solved_definite
 from ..patch.monge import TERMS, monomials
 from .evidence import Hyperparameters, process_hyperparameters
-from .joint_fit import MISFIT, Observations, turned
+from .joint_fit import MISFIT, Observations, frame_update
 from .kernel import kernel_slopes, kernels, places_factor
 from .normals import slope_equations, term_slopes
 from .posterior import SurfacePosterior, nearest_quartic
@@ -102,7 +102,7 @@ def process_fit(
         quartic = nearest_quartic(
             *_mean_given(touch, hyper, *carried), touch.contacts[places, :2], hyper.process
         )
-        turns[i] = turned(np.eye(3), quartic, given.tangent[i])[0]
+        turns[i] = frame_update(np.eye(3), quartic, given.tangent[i])[0]
         scales[i] = np.hypot(*(touch.contacts @ turns[i])[:, :2].T).max()
         hyper = hyper._replace(noise=hyper.noise / scales[i], process=hyper.process / scales[i] ** 2)
         found[i] = process_posterior(touch.moved(turns[i], scales[i]), hyper, posterior.visibility[i])

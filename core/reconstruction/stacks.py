@@ -38,7 +38,7 @@ def fitted_stack(
     points: Array, touches: Sequence[Given], outward: Array, options: FitOptions
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """The results of touches whose arguments are checked, and which are all of strokes alone or none is."""
-    if touches[0].is_of_strokes:
+    if touches[0].strokes_only:
         start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
     else:
         start, contours, errors = curves_start(points, touches, outward, options.noise)
@@ -69,26 +69,26 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
     normals = given.normals[rows, kept] if given.normals.size else given.normals
     given = given._replace(contacts=contacts[rows, kept], normals=normals)
     k1, k2 = start.kappas.T
-    turns, posteriors, found = joint_fit(given, weights[rows, kept], k1, k2, not start.alone)
+    turns, posteriors, found = joint_fit(given, weights[rows, kept], k1, k2, not start.strokes_only)
     weights[rows, kept] = found
-    turned = contacts @ turns
+    local = contacts @ turns
     if options.degree == "auto":
-        degrees = [posteriors.at(i).degree_shown(turned[i][present[i]]) for i in range(len(degrees))]
+        degrees = [posteriors.at(i).degree_shown(local[i][present[i]]) for i in range(len(degrees))]
     if options.method != "bayes":
         return plain._replace(degrees=degrees)
-    joint = plain._replace(axes=start.axes @ turns, contacts=turned, degrees=degrees)
+    joint = plain._replace(axes=start.axes @ turns, contacts=local, degrees=degrees)
     return _with_processes(start, joint, posteriors, weights)
 
 
 def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
     """The joint fit in unit radius; where contacts ask for a process, with it and in its frame."""
     points, axes, radii, contacts = fit[:4]
-    if start.alone:
-        level = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
-        contacts[..., 2] -= level[:, None]
-        points = points + (radii * level)[:, None] * axes[..., 2]
+    if start.strokes_only:
+        offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
+        contacts[..., 2] -= offset[:, None]
+        points = points + (radii * offset)[:, None] * axes[..., 2]
     # The radius is the distance of the farthest contact of curves, or of strokes alone.
-    places = contacts.shape[1] if start.alone else start.curves.present[0].size
+    places = contacts.shape[1] if start.strokes_only else start.curves.present[0].size
     farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, :places].max(axis=1)
     radii, contacts, posteriors = (
         radii * farthest,
@@ -96,7 +96,7 @@ def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weigh
         posteriors.scaled(1.0 / farthest),
     )
     given = _observations(start, axes, radii, contacts)
-    turns, scales, found = process_fit(given, weights, posteriors, start.ranks(), not start.alone)
+    turns, scales, found = process_fit(given, weights, posteriors, start.ranks(), not start.strokes_only)
     contacts = contacts @ turns / scales[:, None, None]
     return _Fit(points, axes @ turns, radii * scales, contacts, fit.degrees, found)
 

@@ -163,7 +163,7 @@ def test_height_and_its_deviation_are_those_of_the_surface_whatever_the_degree_o
 def test_blind_directions_are_counted_and_named(planes, degree, blind, terms):
     """m planes through the normal hide (d - m + 1)(d - m + 2) / 2 of the terms to degree d."""
     r = touched(surfaces.torus(40, 20, 0.6), planes, noise=0.02, degree=degree)
-    assert r.posterior.blind(degree) == blind
+    assert r.posterior.null_space_dimension(degree) == blind
     named = f"These planes cannot show {blind} of the {terms} shape terms"
     assert (named in r.message) == (blind > 0)
 
