@@ -24,7 +24,7 @@ from .sextic import mean_given, posterior_given, sextics, with_scatter
 # The noise is at least this share of the radius, because no surface is a polynomial. With less the waviness
 # follows what polynomials leave, and automatic touches end earlier (benchmarks.model).
 MISFIT = 2e-3
-# benchmarks.accuracy judges the next five, and the outliers of benchmarks.stability the last two.
+# benchmarks.accuracy judges these, and the outliers of benchmarks.stability the last two.
 # There are at most so many passes: two turn the frame to what they found, others are for outliers.
 PASSES = 8
 SETTLED_WEIGHT = 0.1  # A fit is settled when no weight changes by more between passes.

@@ -5,7 +5,9 @@
 A real surface has different curvatures at each scale, and those at the point itself belong to its texture.
 So its frame and curvatures are those of the quartic that is nearest to z over a disk (SurfacePosterior's
 `polynomial`). Compared with dense fits of the scans, they are off at most half as far as those of the sextic
-fitted to the contacts alone, and their intervals are true.
+fitted to the contacts alone, and their intervals are true. If contacts are off that sextic by less than
+MISFIT, as on a smooth surface whose mesh has facets, its frame and curvatures are kept, because it averages
+the facets.
 """
 
 from dataclasses import replace
