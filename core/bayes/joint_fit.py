@@ -19,7 +19,7 @@ from ..contours.local_geometry import UMBILIC
 from .evidence import Hyperparameters
 from .posterior import SurfacePosterior
 from .prior import FREE, USUAL_WAVINESS, prior_mean, prior_variances
-from .sextic import mean_given, posterior_given, sextics, with_scatter
+from .sextic import Sextics, mean_given, posterior_given, sextics, with_scatter
 
 # The noise is at least this share of the radius, because no surface is a polynomial. With less the waviness
 # follows what polynomials leave, and automatic touches end earlier (benchmarks.model).
@@ -127,12 +127,7 @@ def _pass(
     expected = prior_mean(state.k1, state.k2)
     local, normals = given.contacts @ state.axes, given.normals @ state.axes
     data = sextics(local, state.weights, expected, normals, through)
-    # Outliers change waviness and noise, so both are found anew while there are any.
-    stale = ((state.weights > 0.0) & (state.weights < 1.0)).any(axis=1) | (step == 1)
-    if stale.any():
-        for values, new in zip(state[-2:], data.hyperparameters(given.noise, stale), strict=False):
-            values[stale] = new
-    hyper = Hyperparameters(state.prior, state.noise)
+    hyper = _hyperparameters(state, data, given.noise, step)
     found = mean_given(data, hyper)
     if data.slopes is not None:
         data = with_scatter(data, found, normals)
@@ -157,6 +152,18 @@ def _pass(
     surface.mean[:, [0, 1, 3]] = 0.0
     surface.mean[:, 2], surface.mean[:, 4] = k1 / 2.0, k2 / 2.0
     return state, settled, surface
+
+
+def _hyperparameters(state: _State, data: Sextics, floor: Array, step: int) -> Hyperparameters:
+    """Waviness and noise, which are found anew after the first pass and while there are outliers.
+
+    Those of `state` are changed in place.
+    """
+    stale = ((state.weights > 0.0) & (state.weights < 1.0)).any(axis=1) | (step == 1)
+    if stale.any():
+        for values, new in zip(state[-2:], data.hyperparameters(floor, stale), strict=False):
+            values[stale] = new
+    return Hyperparameters(state.prior, state.noise)
 
 
 def posterior_of(k1: float, k2: float, contacts: Array, noise: float) -> SurfacePosterior:
