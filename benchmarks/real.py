@@ -359,7 +359,7 @@ def automatic_table(rows):
 SETTINGS = {
     f"lengths {lengths}, tempered to {temper}, {near} near the point": {
         "LENGTHS": np.array(lengths),
-        "TEMPER": temper,
+        "POWER": temper,
         "NEAR_POINT": near,
     }
     for lengths in ((0.4, 1.6), (0.3, 1.2), (0.4, 2.4))

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from core import reconstruct, reconstruct_many
-from core.bayes import joint_fit
+from core.bayes import joint_fit, sextic
 from core.paper import tagc
 from core.reconstruction import stacks, start
 from tools import blender
@@ -155,7 +155,7 @@ PARTS = {
     "curves through the point": (start, "curves_through"),
     "Darboux frame": (start, "darboux_frames"),
     "equations of the contacts": (joint_fit, "sextics"),
-    "waviness and noise": (joint_fit, "hyperparameters"),
+    "waviness and noise": (sextic, "hyperparameters"),
     "posterior": (joint_fit, "posterior_given"),
     "patch and domain": (stacks, "_result"),
 }

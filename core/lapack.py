@@ -75,9 +75,11 @@ def cholesky(matrix: Array) -> Array:
     return factor.T
 
 
-@on_one_thread
 def cholesky_in_place(matrix: Array) -> Array:
-    """The diagonal (m,) of a triangular factor, which overwrites the upper triangle of the matrix (m, m)."""
+    """The diagonal (m,) of a triangular factor, which overwrites the upper triangle of the matrix (m, m).
+
+    Whoever calls it many times is on one thread already.
+    """
     from scipy.linalg.lapack import dpotrf
 
     dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)

@@ -35,8 +35,8 @@ def contradicting_curve(
         return 0.0, 0.0
     others = (curve != numbers[numbers >= 0][:, None]).astype(float)
     k1, k2 = (2.0 * float(posterior.polynomial[i]) for i in (2, 4))  # The terms x^2 and y^2.
-    alone = posteriors_of(k1, k2, contacts, others, float(posterior.noise), by_evidence=False)
-    found = _most_off(contacts, others, alone)
+    usual = posteriors_of(k1, k2, contacts, others, float(posterior.noise), by_evidence=False)
+    found = _most_off(contacts, others, usual)
     if found[0] <= NOTICED:
         return found
     return _most_off(contacts, others, posteriors_of(k1, k2, contacts, others, noise))
@@ -47,8 +47,8 @@ def _most_off(contacts: Array, others: Array, posteriors: SurfacePosterior) -> t
     reach, found = np.hypot(contacts[:, 0], contacts[:, 1]), []
     for i, weights in enumerate(others):
         own = reach * (weights == 0.0)
-        outer, alone = contacts[own > OUTER * own.max()], posteriors.at(i)
-        off = outer[:, 2] - alone.height(*outer[:, :2].T)
-        std = np.hypot(alone.height_std(*outer[:, :2].T), alone.noise)
+        outer, predicted = contacts[own > OUTER * own.max()], posteriors.at(i)
+        off = outer[:, 2] - predicted.height(*outer[:, :2].T)
+        std = np.hypot(predicted.height_std(*outer[:, :2].T), predicted.noise)
         found.append((abs(float(np.median(off / std))), abs(float(np.median(off)))))
     return max(found)

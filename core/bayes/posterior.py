@@ -94,12 +94,12 @@ class SurfacePosterior(HeightField):
         root[..., :-1] = root[..., :-1] @ np.swapaxes(turn, -1, -2)
         return replace(self, mean=(turn @ self.mean[..., None])[..., 0], root=root)
 
-    def levels(self, contacts: Array, weights: Array) -> Array:
-        """The mean heights (b,) by which contacts (b, n, 3) with weights (b, n) are above b polynomials."""
+    def residuals(self, contacts: Array) -> Array:
+        """The heights (b, n) of contacts (b, n, 3) above b polynomials."""
         basis = monomials(contacts[..., 0].ravel(), contacts[..., 1].ravel(), TERMS)
-        off = contacts[..., 2] - (basis.reshape(*weights.shape, -1) @ self.mean[..., None])[..., 0]
-        found: Array = (weights * off).sum(axis=1) / weights.sum(axis=1)
-        return found
+        basis = basis.reshape(*contacts.shape[:2], -1)
+        residuals: Array = contacts[..., 2] - (basis @ self.mean[..., None])[..., 0]
+        return residuals
 
     # What follows is for a single posterior, not for a stack.
 
@@ -260,7 +260,7 @@ class SurfacePosterior(HeightField):
         variances = np.einsum("ni,ni->n", bent @ self.covariance[2:FREE, 2:FREE], bent)
         return math.sqrt(max(float(variances.max()), 0.0))
 
-    def blind(self, degree: int) -> int:
+    def null_space_dimension(self, degree: int) -> int:
         """How many directions among the terms of degree 1 to `degree` keep 90 % of their prior variance."""
         last = terms_to(degree) - FREE
         singular = np.linalg.svd(self.visibility[:last, :last], compute_uv=False)
@@ -286,9 +286,9 @@ def _turn(angle: Array) -> Array:
     A turn only changes the phase of the terms z^i z'^j in z = x + iy and its conjugate z'.
     """
     (parts, from_complex), angles = _complex_terms(), np.asarray(angle)[..., None]
-    turned = from_complex * np.exp(angles * WINDING)[..., None, :]
+    rotated = from_complex * np.exp(angles * WINDING)[..., None, :]
     # Only the real part of the product is needed, so real matrices suffice.
-    turn: Array = np.concatenate([turned.real, turned.imag], axis=-1) @ parts
+    turn: Array = np.concatenate([rotated.real, rotated.imag], axis=-1) @ parts
     return turn
 
 
@@ -352,7 +352,7 @@ def nodes() -> tuple[Array, Array, Array]:
     return x, y, np.repeat(weights, 14)
 
 
-def nearest_quartic(mean: Array, places: Array, variances: Array, alpha: Array) -> Array:
+def nearest_quartic(mean: Array, alpha: Array, places: Array, variances: Array) -> Array:
     """The terms of degree 1 and 2, (5,), of the quartic nearest to z over QUARTIC_SHARE of the radius."""
     (at, weights), half = _projection(), len(nodes()[2])
     found: Array = _projected_terms()[:FREE] @ mean

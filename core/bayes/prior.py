@@ -15,15 +15,17 @@ import numpy as np
 from ..arguments import Array
 from ..patch.monge import TERMS
 
-FREE = 5  # The terms x, y, x^2, xy and y^2 are free.
+FREE = 5  # The terms x, y, x^2, xy and y^2 come first.
+FREE_VARIANCE = 1e4  # Their prior variance is nearly infinite: it keeps matrices invertible.
 ORDERS = TERMS.sum(axis=1).astype(float)
 PRIOR_SCALE = 0.1  # Chosen with benchmarks.accuracy, as are the waviness's median and grid.
 USUAL_WAVINESS = 0.6
 
 
 def prior_variances(waviness: Array) -> Array:
-    """Prior variances of the coefficients of degree 3 to 6, (..., 22), for waviness (...)."""
-    return (PRIOR_SCALE * waviness[..., None] ** (ORDERS[FREE:] - 1.0)) ** 2
+    """Prior variances of the coefficients, (..., 27), for waviness (...)."""
+    higher = (PRIOR_SCALE * waviness[..., None] ** (ORDERS - 1.0)) ** 2
+    return np.where(ORDERS < 3.0, FREE_VARIANCE, higher)
 
 
 def prior_mean(k1: Array, k2: Array) -> Array:

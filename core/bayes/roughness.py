@@ -31,8 +31,8 @@ def roughness(contacts: Array, noise: float) -> float:
     if radius == 0.0:
         return 0.0
     local /= radius
-    nothing, usual = np.zeros((1, len(TERMS))), prior_variances(np.array([USUAL_WAVINESS]))
-    data = sextics(local[None], np.ones((1, len(local))), nothing, local[None, :0])
-    off = data.residuals(mean_given(data, Hyperparameters(usual, usual, np.array([MISFIT]))))[0]
+    data = sextics(local[None], np.ones((1, len(local))), np.zeros((1, len(TERMS))), local[None, :0])
+    usual = prior_variances(np.array([USUAL_WAVINESS]))
+    off = data.residuals(mean_given(data, Hyperparameters(usual, np.array([MISFIT]))))[0]
     variance = float(off @ off) / max(len(off) - EXPLAINED_TERMS, 1)
     return math.sqrt(max(variance - (NOISY * noise / radius) ** 2, 0.0))

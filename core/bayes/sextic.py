@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..lapack import cholesky, inverse_lower, solved_definite
 from ..patch.monge import TERMS, monomials
-from .evidence import FREE_PRECISION, ROUNDING, Hyperparameters, NormalEquations
+from .evidence import ROUNDING, Hyperparameters, hyperparameters
 from .normals import slope_equations
 from .posterior import SurfacePosterior
 from .prior import FREE, PRIOR_SCALE
@@ -26,33 +26,39 @@ class Sextics(NamedTuple):
 
     rows : (b, 28, n), the 27 terms and the heights
     weights : (b, n)
-    heights, slopes : the normal equations of contacts, and of measured normals in units of their deviations;
-        the latter are None without normals
+    heights, slopes : (b, 28, 28), normal equations [[gram, rhs], [rhs', y'y]] of contacts, and of measured
+        normals in units of their deviations; the latter are None without normals
     pivot : (b, 27), mean of the terms over the contacts, for surfaces that need not pass through the origin:
-        the rows are then less their means. None for surfaces that do
+        the rows are then less their means; 0 for surfaces that do
     """
 
     rows: Array
     weights: Array
-    heights: NormalEquations
-    slopes: NormalEquations | None = None
-    pivot: Array | None = None
+    heights: Array
+    slopes: Array | None
+    pivot: Array
 
-    def at(self, which: NDArray[np.bool_]) -> "Sextics":
-        """Those of some of the b touches."""
-        pivot = None if self.pivot is None else self.pivot[which]
-        equations = self.heights.at(which), self.slopes and self.slopes.at(which)
-        return Sextics(self.rows[which], self.weights[which], *equations, pivot)
+    @property
+    def counts(self) -> Array:
+        """The number of contacts, (b,)."""
+        return np.count_nonzero(self.weights, axis=1).astype(float)
 
     def residuals(self, coefficients: Array) -> Array:
         """What the coefficients (b, 27) do not explain of the heights, (b, n)."""
-        left: Array = self.rows[:, -1] - (coefficients[:, None] @ self.rows[:, :-1])[:, 0]
-        return left
+        residuals: Array = self.rows[:, -1] - (coefficients[:, None] @ self.rows[:, :-1])[:, 0]
+        return residuals
 
-    def precision(self, noise: Array) -> Array:
-        """What contacts and normals add to the precision of the coefficients, (b, 27, 27)."""
-        found: Array = self.heights.gram / (noise**2)[:, None, None]
-        return found if self.slopes is None else found + self.slopes.gram
+    def equations(self, noise: Array) -> Array:
+        """What contacts and normals add to the precision and to its product with the mean, (b, 28, 28)."""
+        found: Array = self.heights / (noise**2)[:, None, None]
+        return found if self.slopes is None else found + self.slopes
+
+    def hyperparameters(
+        self, floor: Array, which: slice | NDArray[np.bool_] = slice(None)
+    ) -> Hyperparameters:
+        """Waviness and noise of some of the touches, of which the latter is at least `floor` (b,)."""
+        slopes = None if self.slopes is None else self.slopes[which]
+        return hyperparameters(self.heights[which], self.counts[which], slopes, floor[which])
 
 
 def sextics(local: Array, weights: Array, expected: Array, normals: Array, through: bool = True) -> Sextics:
@@ -62,7 +68,7 @@ def sextics(local: Array, weights: Array, expected: Array, normals: Array, throu
     through : whether the surfaces pass through the origin
     """
     b, n = weights.shape
-    rows, pivot = np.empty((b, len(TERMS) + 1, n)), None
+    rows, pivot, slopes = np.empty((b, len(TERMS) + 1, n)), np.zeros((b, len(TERMS))), None
     terms = monomials(local[..., 0].ravel(), local[..., 1].ravel(), TERMS)
     rows[:, :-1] = terms.T.reshape(-1, b, n).transpose(1, 0, 2)
     np.subtract(local[..., 2], (expected[:, None] @ rows[:, :-1])[:, 0], out=rows[:, -1])
@@ -70,71 +76,61 @@ def sextics(local: Array, weights: Array, expected: Array, normals: Array, throu
         means = np.einsum("bin,bn->bi", rows, weights / weights.sum(axis=1)[:, None])
         rows -= means[..., None]
         pivot = means[:, :-1]
-    bordered = (rows * weights[:, None]) @ rows.transpose(0, 2, 1)
-    heights = NormalEquations(bordered, (weights > 0.0).sum(axis=1, dtype=float))
-    slopes = None
     if normals.shape[1]:
         partials, steepness = slope_equations(normals, local, weights)
         steepness = steepness - (partials @ expected[..., None])[..., 0]
         columns = np.concatenate([partials, steepness[..., None]], axis=2)
-        measured = normals.any(axis=2).sum(axis=1, dtype=float)
-        slopes = NormalEquations(columns.transpose(0, 2, 1) @ columns, measured)
-    return Sextics(rows, weights, heights, slopes, pivot)
+        slopes = columns.transpose(0, 2, 1) @ columns
+    return Sextics(rows, weights, (rows * weights[:, None]) @ rows.transpose(0, 2, 1), slopes, pivot)
 
 
 def mean_given(data: Sextics, hyper: Hyperparameters) -> Array:
     """The mean of the coefficients less the prior's mean, (b, 27) (Rasmussen and Williams 2006, eq. 2.8)."""
-    # Heights are nearest with the typical prior, and intervals are true with the averaged one.
-    precision = _with_prior(data.precision(hyper.noise), hyper.typical)
-    rhs = data.heights.rhs / (hyper.noise**2)[:, None]
-    if data.slopes is not None:
-        rhs = rhs + data.slopes.rhs
-    return np.array([solved_definite(*each) for each in zip(precision, rhs, strict=True)])
+    bordered = data.equations(hyper.noise)
+    precision = _with_prior(bordered[:, :-1, :-1].copy(), hyper.prior)
+    return np.array([solved_definite(*each) for each in zip(precision, bordered[:, :-1, -1], strict=True)])
 
 
-def with_scatter(data: Sextics, coefficients: Array) -> Sextics:
+def with_scatter(data: Sextics, coefficients: Array, normals: Array) -> Sextics:
     """The equations, where measured normals have at least the deviation by which they are off coefficients.
 
-    Normals of a texture scatter about the polynomial by more than their own deviation.
+    Normals (b, n, 3) of a texture scatter about the polynomial by more than their own deviation.
     """
     assert data.slopes is not None
     off = np.concatenate([coefficients, np.full((len(coefficients), 1), -1.0)], axis=1)
-    squares = np.einsum("bi,bij,bj->b", off, data.slopes.bordered, off)
-    spread = np.maximum(squares / np.maximum(2.0 * data.slopes.contacts - FREE, 1.0), 1.0)
-    bordered = data.slopes.bordered / spread[:, None, None]
-    return data._replace(slopes=data.slopes._replace(bordered=bordered))
+    squares = np.einsum("bi,bij,bj->b", off, data.slopes, off)
+    freedom = 2.0 * np.count_nonzero(normals.any(axis=2) & (data.weights > 0.0), axis=1) - FREE
+    spread = np.maximum(squares / np.maximum(freedom, 1.0), 1.0)
+    return data._replace(slopes=data.slopes / spread[:, None, None])
 
 
 def posterior_given(mean: Array, data: Sextics, hyper: Hyperparameters) -> SurfacePosterior:
-    """The posteriors about the means (b, 27), under the averaged prior."""
-    seen = data.precision(hyper.noise)
-    visibility = _visibility(seen)
-    terms, b = len(TERMS), len(mean)
-    root = np.zeros((b, terms + 1, terms + 1))
-    for each, precision in zip(root, _with_prior(seen, hyper.variances), strict=True):
+    """The posteriors about the means (b, 27)."""
+    gram = data.equations(hyper.noise)[:, :-1, :-1]
+    visibility = _visibility(gram)
+    root = np.zeros((len(mean), len(TERMS) + 1, len(TERMS) + 1))
+    for each, precision in zip(root, _with_prior(gram.copy(), hyper.prior), strict=True):
         each[:-1, :-1] = inverse_lower(cholesky(precision))
     # Waviness and noise are estimates, so deviations are those of a Student t of this freedom.
-    freedom = np.maximum(data.heights.contacts - FREE, LEAST_FREEDOM)
+    freedom = np.maximum(data.counts - FREE, LEAST_FREEDOM)
     root *= np.sqrt(freedom / (freedom - 2.0))[:, None, None]
-    if data.pivot is not None:  # The mean height of the contacts is that of the surface at the pivot.
+    if data.pivot.any():  # The mean height of the contacts is that of the surface at the pivot.
         root[:, :-1, -1] = -(root[:, :-1, :-1] @ data.pivot[..., None])[..., 0]
         root[:, -1, -1] = hyper.noise / np.sqrt(data.weights.sum(axis=1))
     return SurfacePosterior(mean, root, hyper.noise, visibility)
 
 
-def _visibility(seen: Array) -> Array:
+def _visibility(gram: Array) -> Array:
     """The visibility of a SurfacePosterior, given what contacts add to the precision, (b, 27, 27)."""
-    bordered = seen.copy()
-    diagonal = np.einsum("bii->bi", bordered)  # a view
+    gram = gram.copy()
+    diagonal = np.einsum("bii->bi", gram)  # a view
     # What is added exceeds what rounding takes from directions that no contact shows, and is far below noise.
     diagonal += ROUNDING * diagonal.sum(axis=1)[:, None]
-    found: Array = PRIOR_SCALE * np.linalg.cholesky(bordered)[:, FREE:, FREE:].transpose(0, 2, 1)
+    found: Array = PRIOR_SCALE * np.linalg.cholesky(gram)[:, FREE:, FREE:].transpose(0, 2, 1)
     return found
 
 
-def _with_prior(precision: Array, variances: Array) -> Array:
-    """A precision (b, 27, 27), to which that of the prior with these variances (b, 22) is added in place."""
-    diagonal = np.einsum("bii->bi", precision)  # a view
-    diagonal[:, :FREE] += FREE_PRECISION  # This keeps it invertible whatever the contacts are.
-    diagonal[:, FREE:] += 1.0 / variances
+def _with_prior(precision: Array, prior: Array) -> Array:
+    """A precision (b, 27, 27), to which that of the prior with these variances (b, 27) is added in place."""
+    np.einsum("bii->bi", precision)[:] += 1.0 / prior  # a view
     return precision

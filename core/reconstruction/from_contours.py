@@ -69,8 +69,8 @@ def reconstruct(
     """
     p, up = finite_array("point", point, (3,), LARGEST), unit_vector("outward", outward)
     options = FitOptions(method, degree, noise, weight, solver, radius)
-    p, touch = _felt(p, list_of("contours", contours, Contour), strokes, up, options)
-    return _alone(p, touch, up, options)
+    p, touch = _touch(p, list_of("contours", contours, Contour), strokes, up, options)
+    return _fitted_one(p, touch, up, options)
 
 
 def reconstruct_many(
@@ -92,17 +92,17 @@ def reconstruct_many(
     p = finite_array("points", points, (None, 3), LARGEST)
     fit = FitOptions(**options)
     lists = list_of("contours_list", contours_list, Sequence)  # type: ignore[type-abstract]
-    beside = [()] * len(lists) if strokes_list is None else list_of("strokes_list", strokes_list, Sequence)  # type: ignore[type-abstract]
-    for name, given in (("contours_list", lists), ("strokes_list", beside)):
+    strokes = [()] * len(lists) if strokes_list is None else list_of("strokes_list", strokes_list, Sequence)  # type: ignore[type-abstract]
+    for name, given in (("contours_list", lists), ("strokes_list", strokes)):
         if len(given) != len(p):
             raise ValueError(f"{name}: expected {len(p)} lists of {name[:-5]}, got {len(given)}")
     up = finite_array("outward", outward, (len(p), 3))
     up = np.array([unit_vector("outward", direction) for direction in up]).reshape(-1, 3)
     found: dict[int, Reconstruction | DegenerateCurvesError] = {}
     touches, places = {}, p.copy()
-    for i, (c, s) in enumerate(zip(lists, beside, strict=True)):
+    for i, (c, s) in enumerate(zip(lists, strokes, strict=True)):
         try:
-            places[i], touches[i] = _felt(p[i], list_of("contours", c, Contour), s, up[i], fit)
+            places[i], touches[i] = _touch(p[i], list_of("contours", c, Contour), s, up[i], fit)
         except DegenerateCurvesError as error:
             found[i] = error
     each = list(touches)
@@ -118,7 +118,7 @@ def fitted(
     sizes = [touch.size for touch in touches]
     results: dict[int, Reconstruction | DegenerateCurvesError] = {}
     # Measured normals of some would cost time in the fits of all, and strokes alone start differently.
-    kinds = [(has_measured_normals(touch.contours), touch.is_of_strokes) for touch in touches]
+    kinds = [(has_measured_normals(touch.contours), touch.strokes_only) for touch in touches]
     for kind in dict.fromkeys(kinds):
         order = [i for i in range(len(touches)) if kinds[i] == kind]
         order.sort(key=sizes.__getitem__, reverse=True)
@@ -130,7 +130,7 @@ def fitted(
     return [results[i] for i in range(len(touches))]
 
 
-def _felt(
+def _touch(
     p: Array, contours: list[Contour], strokes: Sequence[ArrayLike | Contour], up: Array, options: FitOptions
 ) -> tuple[Array, Given]:
     """The reference point (3,) and the contacts of a touch, below the centers of a ball if these are given.
@@ -141,13 +141,13 @@ def _felt(
     if not ball:
         return p, touch
     by_default = replace(options, method="bayes", degree="auto")
-    centers = _alone(p, touch, up, by_default)
-    beside = [stroke for stroke in strokes if isinstance(stroke, Contour)]
-    p, contours, beside = contacts_below(centers, contours, beside, ball)
-    return p, _given(contours, beside, options)
+    centers = _fitted_one(p, touch, up, by_default)
+    balls = [stroke for stroke in strokes if isinstance(stroke, Contour)]
+    p, contours, balls = contacts_below(centers, contours, balls, ball)
+    return p, _given(contours, balls, options)
 
 
-def _alone(p: Array, touch: Given, up: Array, options: FitOptions) -> Reconstruction:
+def _fitted_one(p: Array, touch: Given, up: Array, options: FitOptions) -> Reconstruction:
     """The result of one touch. Raises DegenerateCurvesError if it cannot carry the method."""
     (result,) = fitted_stack(p[None], [touch], up[None], options)
     if isinstance(result, DegenerateCurvesError):

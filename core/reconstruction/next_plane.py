@@ -61,13 +61,13 @@ def _lost(
 ) -> Array:
     """What contours at azimuths (k,), of `count` contacts with this noise^2, take off the variances, (k, n).
 
-    The heights of a contour have the covariance `seen`, and `shared` with those at the n points. It takes the
-    diagonal of shared' seen^-1 shared off their variances.
+    The heights of a contour have a `covariance`, and `shared` with those at the n points. It takes the
+    diagonal of shared' covariance^-1 shared off their variances.
     """
     directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
-    shared, seen = covariances(np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None])
-    seen += noise * np.eye(count)
-    lost: Array = np.einsum("kin,kin->kn", shared, np.linalg.solve(seen, shared))
+    shared, covariance = covariances(np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None])
+    covariance += noise * np.eye(count)
+    lost: Array = np.einsum("kin,kin->kn", shared, np.linalg.solve(covariance, shared))
     return lost
 
 

@@ -94,8 +94,8 @@ class Reconstruction:
     def contacts(self) -> Array:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
         curves = [contour.points - self.frame.origin for contour in self.contours]
-        beside = self.strokes - self.frame.origin
-        return np.vstack([*(r[besides_point(r)[1]] for r in curves), beside]) @ self.frame.axes
+        strokes = self.strokes - self.frame.origin
+        return np.vstack([*(r[besides_point(r)[1]] for r in curves), strokes]) @ self.frame.axes
 
     @cached_property
     def misses(self) -> Array:
@@ -217,7 +217,7 @@ class Reconstruction:
     @cached_property
     def blind(self) -> int:
         """Number of directions among the coefficients of degree 1 to d that the contacts do not show."""
-        return self.posterior.blind(self.patch.degree)
+        return self.posterior.null_space_dimension(self.patch.degree)
 
     @property
     def blind_share(self) -> float:
@@ -302,8 +302,8 @@ class Reconstruction:
         """The number of deviations, and the share of L, by which a curve is off what the others tell."""
         if self.method != "bayes":
             return 0.0, 0.0
-        beside = [besides_point(contour.points - self.frame.origin)[1] for contour in self.contours]
-        curve = np.repeat(np.arange(len(beside)), list(map(np.count_nonzero, beside)))
+        counted = [besides_point(contour.points - self.frame.origin)[1] for contour in self.contours]
+        curve = np.repeat(np.arange(len(counted)), list(map(np.count_nonzero, counted)))
         curve = np.append(curve, np.full(len(self.strokes), -1))
         return contradicting_curve(self.contacts / self.radius, curve, self.posterior, self.noise)
 
@@ -321,8 +321,8 @@ class Reconstruction:
         if not len(normals):
             return 0.0, 0.0
         k1, k2 = self.patch.k1 * self.radius, self.patch.k2 * self.radius
-        alone = posterior_of(k1, k2, self.contacts / self.radius, self.noise)
-        return contradiction(contacts, normals, alone)
+        of_contacts = posterior_of(k1, k2, self.contacts / self.radius, self.noise)
+        return contradiction(contacts, normals, of_contacts)
 
     @cached_property
     def normal_scatter(self) -> tuple[float, float]:

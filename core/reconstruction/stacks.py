@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..bayes.joint_fit import joint_fit
+from ..bayes.joint_fit import Observations, joint_fit
 from ..bayes.posterior import SurfacePosterior
 from ..bayes.process_fit import process_fit
 from ..contours.contour import Contour
@@ -39,7 +38,7 @@ def fitted_stack(
     points: Array, touches: Sequence[Given], outward: Array, options: FitOptions
 ) -> list[Reconstruction | DegenerateCurvesError]:
     """The results of touches whose arguments are checked, and which are all of strokes alone or none is."""
-    if touches[0].is_of_strokes:
+    if touches[0].strokes_only:
         start, contours, errors = strokes_start(points, touches, outward, options.noise, options.radius)
     else:
         start, contours, errors = curves_start(points, touches, outward, options.noise)
@@ -63,74 +62,54 @@ def _fit(start: Start, options: FitOptions) -> _Fit:
     plain = _Fit(start.points, start.axes, start.radii, contacts, degrees, None)
     if options.method != "bayes" and options.degree != "auto":
         return plain
-    turns, posteriors, weights = _joint(start, contacts, present)
-    turned = contacts @ turns
+    given = _observations(start, start.axes, start.radii, contacts)
+    # Short curves are filled up to the length of the longest, and fitting that too would take time.
+    kept = np.argsort(~present, axis=1, kind="stable")[:, : present.sum(axis=1).max()]
+    weights, rows = present.astype(float), np.arange(len(kept))[:, None]
+    normals = given.normals[rows, kept] if given.normals.size else given.normals
+    given = given._replace(contacts=contacts[rows, kept], normals=normals)
+    k1, k2 = start.kappas.T
+    turns, posteriors, found = joint_fit(given, weights[rows, kept], k1, k2, not start.strokes_only)
+    weights[rows, kept] = found
+    local = contacts @ turns
     if options.degree == "auto":
-        degrees = [posteriors.at(i).degree_shown(turned[i][present[i]]) for i in range(len(degrees))]
+        degrees = [posteriors.at(i).degree_shown(local[i][present[i]]) for i in range(len(degrees))]
     if options.method != "bayes":
         return plain._replace(degrees=degrees)
-    joint = plain._replace(axes=start.axes @ turns, contacts=turned, degrees=degrees)
+    joint = plain._replace(axes=start.axes @ turns, contacts=local, degrees=degrees)
     return _with_processes(start, joint, posteriors, weights)
 
 
 def _with_processes(start: Start, fit: _Fit, posteriors: SurfacePosterior, weights: Array) -> _Fit:
     """The joint fit in unit radius; where contacts ask for a process, with it and in its frame."""
     points, axes, radii, contacts = fit[:4]
-    if start.alone:
-        level = posteriors.levels(contacts, weights)
-        contacts[..., 2] -= level[:, None]
-        points = points + (radii * level)[:, None] * axes[..., 2]
-    places = 0 if start.alone else start.curves.present[0].size
-    radii, contacts, farthest = _in_unit_radius(radii, contacts, places)
-    found = process_fit(
-        contacts,
-        weights,
+    if start.strokes_only:
+        offset = (weights * posteriors.residuals(contacts)).sum(axis=1) / weights.sum(axis=1)
+        contacts[..., 2] -= offset[:, None]
+        points = points + (radii * offset)[:, None] * axes[..., 2]
+    # The radius is the distance of the farthest contact of curves, or of strokes alone.
+    places = contacts.shape[1] if start.strokes_only else start.curves.present[0].size
+    farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, :places].max(axis=1)
+    radii, contacts, posteriors = (
+        radii * farthest,
+        contacts / farthest[:, None, None],
         posteriors.scaled(1.0 / farthest),
-        start.stds / radii,
-        start.stds_are_known,
-        (start.tangents[:, None] @ axes)[:, 0],
-        start.ranks(),
-        _normals(start.curves, axes, contacts),
-        through=not start.alone,
     )
-    axes, contacts = axes @ found.turns, contacts @ found.turns / found.scales[:, None, None]
-    return _Fit(points, axes, radii * found.scales, contacts, fit.degrees, found.posteriors)
+    given = _observations(start, axes, radii, contacts)
+    turns, scales, found = process_fit(given, weights, posteriors, start.ranks(), not start.strokes_only)
+    contacts = contacts @ turns / scales[:, None, None]
+    return _Fit(points, axes @ turns, radii * scales, contacts, fit.degrees, found)
 
 
-def _in_unit_radius(radii: Array, contacts: Array, places: int) -> tuple[Array, Array, Array]:
-    """Radii and contacts, such that the farthest of the first `places`, or of all, is at 1; the factors."""
-    farthest = np.hypot(contacts[..., 0], contacts[..., 1])[:, : places or None].max(axis=1)
-    return radii * farthest, contacts / farthest[:, None, None], farthest
-
-
-def _joint(
-    start: Start, contacts: Array, present: NDArray[np.bool_]
-) -> tuple[Array, SurfacePosterior, Array]:
-    """The joint fit of all contacts of each touch: turns, posteriors, weights."""
-    normals = _normals(start.curves, start.axes, contacts)
-    tangent, noise = (start.tangents[:, None] @ start.axes)[:, 0], start.stds / start.radii
-    first, through = (start.kappas[:, 0], start.kappas[:, 1], tangent, noise), not start.alone
-    most = present.sum(axis=1).max()
-    if most == present.shape[1]:
-        return joint_fit(contacts, present.astype(float), *first, normals, through)
-    # Short curves are filled up to the length of the longest, and fitting that too would take time.
-    kept = np.argsort(~present, axis=1, kind="stable")[:, :most]
-    rows = np.arange(len(kept))[:, None]
-    few, some = contacts[rows, kept], present[rows, kept].astype(float)
-    normals = None if normals is None else normals[rows, kept]
-    turns, posteriors, found = joint_fit(few, some, *first, normals, through)
-    weights = np.zeros(present.shape)
-    weights[rows, kept] = found
-    return turns, posteriors, weights
-
-
-def _normals(curves: Curves, axes: Array, contacts: Array) -> Array | None:
-    """The measured normals in these axes, in the shape of the contacts, 0 for strokes; or None."""
-    if curves.normals is None:
-        return None
-    normals = np.zeros_like(contacts)
-    normals[:, : curves.present[0].size] = (curves.normals @ axes[:, None]).reshape(len(contacts), -1, 3)
-    return normals
+def _observations(start: Start, axes: Array, radii: Array, contacts: Array) -> Observations:
+    """What the touches have felt, in these axes and units, with their contacts (b, n, 3) there."""
+    normals = contacts[:, :0]
+    if start.curves.normals is not None:  # Strokes have none.
+        normals = np.zeros_like(contacts)
+        of_curves = (start.curves.normals @ axes[:, None]).reshape(len(contacts), -1, 3)
+        normals[:, : of_curves.shape[1]] = of_curves
+    tangent = (start.tangents[:, None] @ axes)[:, 0]
+    return Observations(contacts, normals, tangent, start.stds / radii, start.stds_are_known)
 
 
 def _result(

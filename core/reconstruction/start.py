@@ -36,7 +36,7 @@ class Given(NamedTuple):
     noise: float
 
     @property
-    def is_of_strokes(self) -> bool:
+    def strokes_only(self) -> bool:
         """Whether there are strokes only."""
         return len(self.strokes) > 0 and not self.contours
 
@@ -60,24 +60,24 @@ class Start(NamedTuple):
     stds_are_known: NDArray[np.bool_]  # (b,), to be all of the noise; of means it is more
 
     @property
-    def alone(self) -> bool:
+    def strokes_only(self) -> bool:
         """Whether there are strokes only."""
         return not self.curves.present.any()
 
     @property
     def tangents(self) -> Array:
         """The tangents (b, 3), in the world, which d1 is to follow."""
-        return self.axes[:, :, 0] if self.alone else self.curves.tangents[:, 0]
+        return self.axes[:, :, 0] if self.strokes_only else self.curves.tangents[:, 0]
 
     def contacts(self) -> tuple[Array, NDArray[np.bool_]]:
         """Contacts (b, n, 3) of curves, then strokes, in the axes and in unit radius; a mask (b, n)."""
         b, most = len(self.points), max(map(len, self.strokes))
         local = (self.curves.points @ self.axes[:, None] / self.radii[:, None, None, None]).reshape(b, -1, 3)
-        beside, there = np.zeros((b, most, 3)), np.zeros((b, most), dtype=bool)
+        strokes, there = np.zeros((b, most, 3)), np.zeros((b, most), dtype=bool)
         for i, stroke in enumerate(self.strokes):
-            beside[i, : len(stroke)], there[i, : len(stroke)] = stroke, True
+            strokes[i, : len(stroke)], there[i, : len(stroke)] = stroke, True
         present = self.curves.present.reshape(b, -1)
-        return np.concatenate([local, beside], axis=1), np.concatenate([present, there], axis=1)
+        return np.concatenate([local, strokes], axis=1), np.concatenate([present, there], axis=1)
 
     def ranks(self) -> NDArray[np.intp]:
         """How many contacts are farther out on the same half curve, or before it in the strokes, (b, n)."""
@@ -103,7 +103,7 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
     curves = curves.at(good)
     axes, k1, k2, radii = darboux_frames(curves, normals[good])
     strokes = [
-        _beside(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
+        _stroke_means(curves.at(row), touches[i], axes[row], radii[row], points[i], given[i])
         for row, i in enumerate(good)
     ]
     stds = [
@@ -115,11 +115,11 @@ def curves_start(points: Array, given: Sequence[Given], outward: Array, noise: f
         for i, (_, size) in zip(good, strokes, strict=True)
     ]
     known = [
-        not len(beside) and (noise is not None or None not in [c.noise for c in touches[i]])
-        for i, (beside, _) in zip(good, strokes, strict=True)
+        not len(contacts) and (noise is not None or None not in [c.noise for c in touches[i]])
+        for i, (contacts, _) in zip(good, strokes, strict=True)
     ]
     kappas, noises = np.stack([k1, k2], axis=1), (np.array(stds), np.array(known))
-    first = Start(points[good], axes, kappas, radii, curves, [beside for beside, _ in strokes], *noises)
+    first = Start(points[good], axes, kappas, radii, curves, [contacts for contacts, _ in strokes], *noises)
     return first, touches, errors
 
 
@@ -171,15 +171,15 @@ def _std(noise: float | None, size: int, known: list[float]) -> float:
     return max(known) if noise is None else noise / math.sqrt(size)
 
 
-def _beside(
+def _stroke_means(
     curves: Curves, contours: Sequence[Contour], axes: Array, radius: float, point: Array, given: Given
 ) -> tuple[Array, int]:
     """Strokes (n, 3) over the domain of curves as means, in unit radius; the least number in a mean."""
     if not len(given.strokes):
         return given.strokes, 1
     local = (given.strokes - point) @ axes / radius
-    turned = replace(curves, points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
-    over = _over(turned, contours, local)
+    local_curves = replace(curves, points=curves.points @ axes / radius, tangents=curves.tangents @ axes)
+    over = _over(local_curves, contours, local)
     return _means(local[over], given.when[over])
 
 
@@ -223,7 +223,7 @@ def strokes_start(
     kappas = np.array([(first.k1, first.k2) for first in firsts.values()])
     radii = np.array([first.radius for first in firsts.values()])
     curves = curves_through(*stacked(points[good], [[]] * len(good)))
-    strokes, known = [beside for beside, _ in thin], np.zeros(len(good), dtype=bool)
+    strokes, known = [contacts for contacts, _ in thin], np.zeros(len(good), dtype=bool)
     start = Start(points[good], axes, kappas, radii, curves, strokes, np.array(stds), known)
     return start, none, errors
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import LARGEST, SMALLEST, Array, finite_array, list_of
-from ..bayes.joint_fit import turned
+from ..bayes.joint_fit import frame_update
 from ..contours.contour import Contour, cross, equal_points
 from ..contours.local_geometry import DegenerateCurvesError
 from ..patch.monge import QUADRIC, QUARTIC, monomials
@@ -170,7 +170,7 @@ def first_frame(r: Array, outward: Array, radius: float | None) -> FirstFrame | 
             "the strokes run along a line, two lines or a ring, which leaves the surface beside "
             "them open: add strokes across and between them"
         )
-    axes, k1, k2, _ = turned(plane, quadric[1:], tangent)
+    axes, k1, k2, _ = frame_update(plane, quadric[1:], tangent)
     local = r @ axes
     flat = np.hypot(local[:, 0], local[:, 1])
     on_this_side = np.abs(local[:, 2] - quadric[0] * share * reach) <= flat.max()

@@ -11,10 +11,10 @@ import surfaces
 from scipy.spatial.transform import Rotation
 
 from core import Contour, reconstruct, reconstruct_many
-from core.bayes import evidence, posterior, sextic
+from core.bayes import evidence, posterior, prior, sextic
 from core.bayes.kernel import kernel, places_factor
 from core.bayes.normals import contradiction, measured_normals, scatter, slope_equations
-from core.bayes.process_fit import Observations, equations_of, process_posterior
+from core.bayes.process_fit import process_posterior, touch_of
 from core.contours.local_geometry import Frame
 from core.patch.monge import TERMS, monomials
 
@@ -186,17 +186,18 @@ def test_the_evidence_is_that_of_heights_and_slopes_under_a_normal_distribution(
     normals = np.array([0.0, 0.0, 50.0]) + rng.normal(size=(1, 60, 3))
     weights, noises = np.ones((1, 60)), np.array([[2e-3, 9e-3]])
     data = sextic.sextics(local, weights, np.zeros((1, 27)), normals)
-    precision = evidence.precision_of(np.array([0.4, 0.9]), 1e-2)
+    variances = np.minimum(prior.prior_variances(np.array([0.4, 0.9])), 100.0)
     slopes, steepness = (part[0] for part in slope_equations(normals, local, weights))
     x, y, heights = local[0].T
     basis = np.vstack([monomials(x, y, TERMS), slopes])
     for both in (True, False):
         count = 180 if both else 60
-        found = evidence.neg2_log_evidence(data.heights, data.slopes if both else None, precision, noises)[0]
+        some = data.heights, data.counts, data.slopes if both else None
+        found = evidence.neg2_log_evidence(*some, variances, noises)[0]
         wanted = np.empty((2, 2))
         for (w, i), _ in np.ndenumerate(wanted):
             white = np.repeat([noises[0, i] ** 2, 1.0], [60, 120])
-            covariance = ((basis / precision[w]) @ basis.T + np.diag(white))[:count, :count]
+            covariance = ((basis * variances[w]) @ basis.T + np.diag(white))[:count, :count]
             felt = np.append(heights, steepness)[:count]
             wanted[w, i] = np.linalg.slogdet(covariance)[1] + felt @ np.linalg.solve(covariance, felt)
         assert found - found[0, 0] == pytest.approx(wanted - wanted[0, 0], rel=1e-6, abs=1e-4)
@@ -432,9 +433,10 @@ def test_normals_show_the_slopes_of_the_process_too():
     flat, noise, variances = rng.uniform(-0.7, 0.7, (40, 2)), 2e-3, np.array([4e-4, 9e-4])
     contacts = np.column_stack([flat, 0.05 * np.sin(3.0 * flat[:, 0])])
     normals = np.column_stack([-0.15 * np.cos(3.0 * flat[:, 0]), np.zeros(40), np.ones(40)]) / 0.03
-    touch = Observations(contacts, np.ones(40), noise, noise, normals, np.arange(40))
-    hyper = evidence.ProcessHyperparameters(variances, noise, True)
-    found = process_posterior(touch, equations_of(touch), hyper, np.zeros((22, 22)))
+    touch = touch_of(contacts, np.ones(40), normals, np.arange(40))
+    of_terms = prior.prior_variances(np.array(prior.USUAL_WAVINESS))
+    hyper = evidence.Hyperparameters(of_terms, noise, variances)
+    found = process_posterior(touch, hyper, np.zeros((22, 22)))
 
     def features(p):
         """Terms and whitened covariances with the contacts: the places carry the process."""
@@ -450,8 +452,7 @@ def test_normals_show_the_slopes_of_the_process_too():
     rows, steepness = slope_equations(normals[None], contacts[None], np.ones((1, 40)), partials)
     basis = np.vstack([features(flat) / noise, rows[0]])
     felt = np.append(contacts[:, 2] / noise, steepness[0])
-    prior = np.append(1.0 / evidence.process_prior(), np.ones(40))
-    covariance = np.linalg.inv(basis.T @ basis + np.diag(prior))
+    covariance = np.linalg.inv(basis.T @ basis + np.diag(np.append(1.0 / of_terms, np.ones(40))))
     over = rng.uniform(-0.7, 0.7, (30, 2))
     assert found.height(*over.T) == pytest.approx(features(over) @ covariance @ basis.T @ felt, abs=1e-6)
     left = kernel(over, over, variances) - (f := features(over))[:, 27:] @ f[:, 27:].T + f @ covariance @ f.T

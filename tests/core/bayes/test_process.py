@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The process of real surfaces: its algebra, its intervals, and that exact surfaces have none."""
 
+import itertools
 import json
 
 import numpy as np
@@ -18,11 +19,10 @@ from core import (
     to_dict,
 )
 from core.bayes import evidence, kernel, process_fit
-from core.bayes.evidence import FREE_VARIANCE
 from core.bayes.kernel import weighted_kernel
 from core.bayes.posterior import DISK, QUARTIC_SHARE, nodes
-from core.bayes.prior import FREE, USUAL_WAVINESS, prior_variances
-from core.bayes.process_fit import Observations, equations_of, process_posterior
+from core.bayes.prior import USUAL_WAVINESS, prior_variances
+from core.bayes.process_fit import process_posterior, touch_of
 from core.patch.monge import TERMS, exponents, monomials
 from core.reconstruction.deviations import mean_height_stds
 from core.reconstruction.next_plane import TRIED, _lost
@@ -79,14 +79,13 @@ def test_the_mean_alone_is_that_of_the_posterior(weight):
     flat = np.vstack([np.outer(REACHES[::2], [np.cos(a), np.sin(a)]) for a in np.radians([0, 60, 120])])
     contacts = np.column_stack([flat, rough(3)(flat)])
     weights = np.where(np.arange(len(flat)) % 5, 1.0, weight)
-    touch = Observations(contacts, weights, 1e-3, 4e-3, None, np.arange(len(weights)))
-    equations = equations_of(touch)
-    hyper = evidence.process_hyperparameters(*equations.at_places(), 1e-3, 4e-3)
-    mean, alpha = process_fit._mean_given(touch, equations, hyper)
-    whole = process_posterior(touch, equations, hyper, np.zeros((22, 22)))
+    touch = touch_of(contacts, np.sqrt(weights), contacts[:0], np.arange(len(weights)))
+    hyper, _ = evidence.process_hyperparameters(*touch.at_places(), 1e-3, 4e-3)
+    mean, alpha = process_fit._mean_given(touch, hyper, *touch.at_places())
+    whole = process_posterior(touch, hyper, np.zeros((22, 22)))
     over = np.random.default_rng(1).uniform(-0.6, 0.6, (50, 2))
     heights = monomials(*over.T, TERMS) @ mean
-    heights += weighted_kernel(over, contacts[:, :2], hyper.variances, alpha)
+    heights += weighted_kernel(over, contacts[:, :2], hyper.process, alpha)
     assert whole.height(*over.T) == pytest.approx(heights, abs=1e-4)
 
 
@@ -116,10 +115,10 @@ def test_mean_and_deviation_are_those_of_a_dense_gaussian_process(noise):
     _, r = touched(noise=noise)
     contacts, (x, y, z) = r.contacts / r.radius, r.contacts.T / r.radius
     sizes = np.array([4e-4, 9e-4])
-    touch = Observations(contacts, np.ones(len(x)), noise, noise, None, np.arange(len(x)))
-    hyper = evidence.ProcessHyperparameters(sizes, noise, True)
-    surface = process_posterior(touch, equations_of(touch), hyper, np.zeros((22, 22)))
-    variances = np.concatenate([np.full(FREE, FREE_VARIANCE), prior_variances(np.array(USUAL_WAVINESS))])
+    touch = touch_of(contacts, np.ones(len(x)), contacts[:0], np.arange(len(x)))
+    variances = np.minimum(prior_variances(np.array(USUAL_WAVINESS)), evidence.MOST_VARIANCE)
+    hyper = evidence.Hyperparameters(variances, noise, sizes)
+    surface = process_posterior(touch, hyper, np.zeros((22, 22)))
     places, points = contacts[:, :2], over(r) / r.radius
     basis, wanted = monomials(x, y, TERMS), monomials(*points.T, TERMS)
 
@@ -350,29 +349,27 @@ def test_the_likelihoods_are_those_of_the_heights_under_a_normal_distribution():
     def neg2_log(covariance):
         return np.linalg.slogdet(covariance)[1] + heights @ np.linalg.solve(covariance, heights)
 
-    def prior(waviness):
-        return (basis / evidence.precision_of(np.array(waviness), 1.0 / FREE_VARIANCE)) @ basis.T
-
+    variances = np.minimum(prior_variances(np.array([0.3, USUAL_WAVINESS])), evidence.MOST_VARIANCE)
     rows = np.vstack([basis.T, heights])
-    found = evidence.process_neg2_log_evidence(rows, kernel.kernels(flat, flat), noises)
-    assert found.shape == (2, 5, 3) and np.isfinite(found).sum() > 6
-    for (length, at, i), value in np.ndenumerate(found):
-        if np.isfinite(value):
-            within = evidence.AMPLITUDES[at] ** 2 * kernel.kernels(flat, flat)[length]
-            white = noises[i] ** 2 * np.eye(len(flat))
-            assert value == pytest.approx(neg2_log(prior(USUAL_WAVINESS) + within + white), rel=1e-6)
-    equations = evidence.NormalEquations((rows @ rows.T)[None], np.array([len(flat)]))
-    precision = evidence.precision_of(evidence.SEXTIC_WAVINESS, 1.0 / FREE_VARIANCE)
-    sextics = evidence.neg2_log_evidence(equations, None, precision, np.array([[4e-3]]))[0, :, 0]
-    for value, waviness in zip(sextics, evidence.SEXTIC_WAVINESS, strict=True):
-        assert value - 1.0 == pytest.approx(neg2_log(prior(waviness) + 4e-3**2 * np.eye(len(flat))), rel=1e-6)
+    of_terms = [(basis * each) @ basis.T for each in variances]
+    bordered = evidence._bordered(rows, kernel.kernels(flat, flat), variances[1])
+    for length, amplitude, noise in itertools.product(range(2), (0.0, 0.01, 0.14), noises):
+        found = evidence._neg2_log_at(*bordered, length, amplitude, noise)
+        within = amplitude**2 * kernel.kernels(flat, flat)[length]
+        white = noise**2 * np.eye(len(flat))
+        assert found == pytest.approx(neg2_log(of_terms[1] + within + white), rel=1e-6)
+    normal_equations = (rows @ rows.T)[None], np.array([len(flat)]), None
+    sextics = evidence.neg2_log_evidence(*normal_equations, variances, noises[None])[0]
+    for (w, i), value in np.ndenumerate(sextics):
+        wanted = neg2_log(of_terms[w] + noises[i] ** 2 * np.eye(len(flat)))
+        assert value - 1.0 == pytest.approx(wanted, rel=1e-6)
 
 
 def test_the_noise_may_be_all_that_a_sextic_leaves_over():
     rng = np.random.default_rng(6)
     contacts = np.column_stack([rng.uniform(-0.7, 0.7, (120, 2)), rng.normal(0.0, 0.008, 120)])
-    touch = Observations(contacts, np.ones(120), 1e-3, 8e-3, None, np.arange(120))
-    found = evidence.process_hyperparameters(*equations_of(touch).at_places(), 1e-3, 8e-3)
+    touch = touch_of(contacts, np.ones(120), contacts[:0], np.arange(120))
+    found, _ = evidence.process_hyperparameters(*touch.at_places(), 1e-3, 8e-3)
     assert found.noise > 6e-3
 
 

@@ -413,7 +413,7 @@ def test_importing_core_imports_neither_blender_nor_scipy():
 def test_short_curves_beside_a_long_one_cost_the_fit_what_they_have(monkeypatch):
     module = importlib.import_module("core.reconstruction.stacks")
     seen, fit = [], module.joint_fit
-    monkeypatch.setattr(module, "joint_fit", lambda c, *rest: seen.append(c.shape) or fit(c, *rest))
+    monkeypatch.setattr(module, "joint_fit", lambda c, *rest: seen.append(c.contacts.shape) or fit(c, *rest))
     s = surfaces.pear()
     contours = s.track(surfaces.planes((0, 60, 120)))
     short = [replace(c, points=c.points[len(c.points) // 2 - 4 :][:8], normals=None) for c in contours[1:]]
