@@ -56,8 +56,9 @@ def update(probe: Object, depsgraph: bpy.types.Depsgraph, complete: bool) -> Non
         if patch is not None:
             anchor.carry(probe, patch)
             patch_record.hold(patch)
-            message = f"This patch is from an earlier touch, because the last one failed. {settings.message}"
-            patch_record.mark_outdated(patch, message)
+            patch_record.mark_outdated(
+                patch, f"This patch is from an earlier touch, because the last one failed. {settings.message}"
+            )
         _sign(probe, depsgraph)
     else:
         adopt(probe, touched, depsgraph, complete)
@@ -96,7 +97,8 @@ def stand_by(probe: Object, outdated: bool, complete: bool) -> None:
     if outdated:
         patch_record.mark_outdated(
             patch,
-            "This patch is from an earlier touch, and the probe or its target has changed since: touch again.",
+            "This patch is from an earlier touch, and the probe or its target has changed since: "
+            "touch again.",
         )
     elif not settings.message:
         patch_record.mark_current(patch)
