@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from .charts import Charts
-from .field import sheet_facing
+from .field import least_of, sheet_facing
 from .tetrahedra import Indices, sides_of, split_sides
 
 # python -m benchmarks.atlas judges these.
@@ -142,14 +142,30 @@ def _intersections(charts: Charts, places: Array, normals: Array, edge: float) -
         steps, apart = _steps(normals, distance)
         tip = ~met & apart & (np.linalg.norm(steps, axis=1) < near)
         points, met, felt = np.where(tip[:, None], middle + steps, points), met | tip, felt & ~tip
+    met &= ~_rounded(charts, points, normals, edge)
+    met &= np.linalg.norm(points - middle, axis=1) < near
+    return _Met(points, np.where(felt, 0.0, np.linalg.norm(points - middle, axis=1)), met)
+
+
+def _rounded(charts: Charts, points: Array, normals: Array, edge: float) -> NDArray[np.bool_]:
+    """Which creases (n,) are rounded by patches between their sheets; points on flat strips move onto these.
+
+    points, normals : (n, 3), changed in place, and (n, k, 3), those of the sheets
+    """
     between = normals.sum(axis=1)
     between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), LEAST)
     pairs = charts.pairs(points, edge)
     toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.place])
     own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.place]).max(axis=1)
     rounded = (toward > own) & (pairs.rho < 1.0) & (np.abs(pairs.distance) > ROUND * edge)
-    met[pairs.place[rounded]] = False
-    return _Met(points, np.where(felt, 0.0, np.linalg.norm(points - middle, axis=1)), met)
+    flat = pairs.chosen(rounded & charts.is_flat[pairs.node])
+    strip = least_of(flat.place, np.abs(flat.distance), len(points))
+    some = np.flatnonzero(strip >= 0)
+    onto = flat.chosen(strip[some])
+    points[some] -= onto.distance[:, None] * onto.normal
+    found = np.zeros(len(points), dtype=bool)
+    found[pairs.place[rounded & ~charts.is_flat[pairs.node]]] = True
+    return found
 
 
 def _steps(normals: Array, distance: Array) -> tuple[Array, NDArray[np.bool_]]:
