@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Generators that do long work in short steps and return its result."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 R = TypeVar("R")
 
@@ -25,3 +28,17 @@ def part_of(steps: Generator[float, None, R], start: float, end: float) -> Gener
         except StopIteration as stop:
             return stop.value
         yield start + (end - start) * share
+
+
+def chunked(
+    function: Callable[..., tuple[Any, ...]], size: int, share: float, *arrays: NDArray[Any]
+) -> Generator[float, None, tuple[Any, ...]]:
+    """The arrays that a function returns for arrays of n rows, computed for `size` rows at a time.
+
+    Yields `share` after each chunk. The function is called once if there are no rows.
+    """
+    parts = []
+    for start in range(0, max(len(arrays[0]), 1), size):
+        parts.append(function(*(array[start : start + size] for array in arrays)))
+        yield share
+    return tuple(np.concatenate(values) for values in zip(*parts, strict=True))

@@ -8,6 +8,7 @@ al. 2001) in the plane.
 """
 
 from collections.abc import Callable, Generator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import vector_of
+from ..contours.finger import Contact
+from ..triangles import LEAST_DIVISOR, normalized, row_dot
 from .finger import Finger
-from .meshing import LEAST_DIVISOR, Mesh
+from .meshing import Mesh
 from .tetrahedra import Indices, split_sides
 
 # python -m benchmarks.atlas judges these.
@@ -59,12 +62,22 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
 
     def off(points: Array, which: Indices) -> Generator[float, None, Array]:
         """How far the surface is above points (k, 3) beside some of the places, (k,)."""
-        return _above(finger, near, points, normals[which])
+        up = normals[which]
+        contacts = yield from _contacts(partial(finger.near, length=near), points, up)
+        return np.array(
+            [
+                np.nan if contact is None else np.dot(n, np.subtract(contact[0], p))
+                for contact, p, n in zip(contacts, points, up, strict=True)
+            ]
+        )
 
     lengths, ended = yield from _lengths(off, places, ways, STEP * mesh.edge)
     places = places + lengths[:, None] * ways
     places += np.nan_to_num((yield from off(places, np.arange(len(at)))))[:, None] * normals
-    ended &= ~(yield from _bends_away(finger, places, normals, ways, STEP * mesh.edge))
+    step = STEP * mesh.edge
+    ahead = partial(finger.ahead, radius=2.0 * step, s=step)
+    beyond = yield from _contacts(ahead, places, normals, ways)
+    ended &= [contact is None for contact in beyond]  # Elsewhere the surface bends away.
     some = ended[before] & ended[after]
     before, after = before[some], after[some]
     corners, sharp = _corners(places, before, after, mesh.edge)
@@ -77,20 +90,20 @@ def felt_border(finger: Finger, near: float, mesh: Mesh) -> Generator[float, Non
     yield 0.0
     c, one, two = corners[sharp], ways[before], ways[after]
     starts, ends = np.concatenate([a[~sharp], a[sharp], c]), np.concatenate([b[~sharp], c, b[sharp]])
-    beyond = np.concatenate([(one + two)[~sharp], one[sharp], two[sharp]])
-    return Border(np.stack([starts, ends], axis=1), beyond, c)
+    outward = np.concatenate([(one + two)[~sharp], one[sharp], two[sharp]])
+    return Border(np.stack([starts, ends], axis=1), outward, c)
 
 
-def _above(finger: Finger, near: float, points: Array, normals: Array) -> Generator[float, None, Array]:
-    """How far the surface is above points (k, 3) along normals (k, 3), (k,); NaN where it is not."""
-    found = np.full(len(points), np.nan)
-    for i, (p, n) in enumerate(zip(points.tolist(), normals.tolist(), strict=True)):
-        contact = finger.near(vector_of(p), vector_of(n), near)
-        if contact is not None:
-            found[i] = np.dot(n, np.subtract(contact[0], p))
+def _contacts(
+    touch: Callable[..., Contact | None], *vectors: Array
+) -> Generator[float, None, list[Contact | None]]:
+    """The contact of each touch, which takes a row of all the vectors (k, 3); yields 0 between its steps."""
+    contacts = []
+    for i, rows in enumerate(zip(*vectors, strict=True)):
+        contacts.append(touch(*map(vector_of, rows)))
         if i % PLACES_AT_ONCE == PLACES_AT_ONCE - 1:
             yield 0.0
-    return found
+    return contacts
 
 
 def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array, Array]:
@@ -107,7 +120,7 @@ def _rim_of(mesh: Mesh) -> tuple[Indices, Indices, Indices, Array, Array]:
         mean = along.copy()
         np.add.at(mean, before, along[after])
         np.add.at(mean, after, along[before])
-        along = _unit(mean)
+        along = normalized(mean)
     normals = mesh.normals[at]
     return at, before, after, np.cross(along, normals), normals
 
@@ -134,25 +147,13 @@ def _lengths(
     return low, ended
 
 
-def _bends_away(
-    finger: Finger, places: Array, normals: Array, ways: Array, step: float
-) -> Generator[float, None, NDArray[np.bool_]]:
-    """Whether a finger that goes a step beyond places (n, 3) still feels the surface, which bends away."""
-    found = np.zeros(len(places), dtype=bool)
-    for i, (p, n, t) in enumerate(zip(places.tolist(), normals.tolist(), ways.tolist(), strict=True)):
-        found[i] = finger.ahead(vector_of(p), vector_of(n), vector_of(t), 2.0 * step, step) is not None
-        if i % PLACES_AT_ONCE == PLACES_AT_ONCE - 1:
-            yield 0.0
-    return found
-
-
 def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tuple[Array, NDArray[np.bool_]]:
     """Where the lines of a border on both sides of its segments meet, (k, 3), and whether they do, (k,)."""
     leading, following = (np.arange(len(places)) for _ in range(2))
     leading[after], following[before] = before, after
     a, b, first, last = places[before], places[after], leading[before], following[after]
-    u, v = _unit(a - places[leading[first]]), _unit(b - places[following[last]])
-    cosine, along_u, along_v = _dot(u, v), _dot(b - a, u), _dot(b - a, v)
+    u, v = normalized(a - places[leading[first]]), normalized(b - places[following[last]])
+    cosine, along_u, along_v = row_dot(u, v), row_dot(b - a, u), row_dot(b - a, v)
     area = np.maximum(1.0 - cosine**2, LEAST_DIVISOR)
     s, t = (along_u - cosine * along_v) / area, (cosine * along_u - along_v) / area
     meet = (
@@ -160,7 +161,7 @@ def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tup
     )
     for at, way, middle in ((a, u, first), (b, v, last)):
         off = at - places[middle]
-        meet &= np.linalg.norm(off - _dot(off, way)[:, None] * way, axis=1) < STRAIGHT * edge
+        meet &= np.linalg.norm(off - row_dot(off, way)[:, None] * way, axis=1) < STRAIGHT * edge
     corners = 0.5 * (a + s[:, None] * u + b + t[:, None] * v)
     return np.where(meet[:, None], corners, a), meet
 
@@ -175,7 +176,7 @@ def bordered(mesh: Mesh, border: Border) -> Mesh:
     edge = mesh.edge
     feet, ways = _feet(border, mesh.vertices)
     off = mesh.vertices - feet
-    beyond, away = _dot(off, ways), np.linalg.norm(off, axis=1)
+    beyond, away = row_dot(off, ways), np.linalg.norm(off, axis=1)
     out = (beyond > np.maximum(STRAIGHT * edge, ALONG * away)) & (away < REACH * edge)
     mesh = mesh.chosen(~out[mesh.triangles].any(axis=1))
     for _ in range(EARS):
@@ -184,7 +185,7 @@ def bordered(mesh: Mesh, border: Border) -> Mesh:
     vertices = mesh.vertices.copy()
     feet, ways = _feet(border, vertices[at])
     # Where the mesh ends though the surface goes on, the way beyond is another.
-    on = (np.linalg.norm(feet - vertices[at], axis=1) < REACH * edge) & (_dot(toward, ways) > ALONG)
+    on = (np.linalg.norm(feet - vertices[at], axis=1) < REACH * edge) & (row_dot(toward, ways) > ALONG)
     vertices[at[on]] = feet[on]
     return _cornered(_welded(mesh._replace(vertices=vertices)), border.corners)
 
@@ -226,22 +227,11 @@ def _feet(border: Border, points: Array) -> tuple[Array, Array]:
     near = cKDTree(segments.mean(axis=1)).query(points, min(NEAREST, len(segments)))[1]
     near = near.reshape(len(points), -1)
     a, along = segments[near, 0], segments[near, 1] - segments[near, 0]
-    shares = _dot(points[:, None] - a, along) / np.maximum(_dot(along, along), LEAST_DIVISOR)
+    shares = row_dot(points[:, None] - a, along) / np.maximum(row_dot(along, along), LEAST_DIVISOR)
     feet = a + np.clip(shares, 0.0, 1.0)[..., None] * along
     away = np.linalg.norm(points[:, None] - feet, axis=2)
     best = np.argmin(away, axis=1)
     # At a corner the ways beyond both of its segments count.
     as_near = away <= (1.0 + SAME) * away.min(axis=1, keepdims=True)
     ways = np.where(as_near[..., None], border.ways[near], 0.0).sum(axis=1)
-    return feet[np.arange(len(points)), best], _unit(ways)
-
-
-def _dot(u: Array, v: Array) -> Array:
-    """Products (...) of vectors (..., 3)."""
-    found: Array = np.einsum("...i,...i->...", u, v)
-    return found
-
-
-def _unit(vectors: Array) -> Array:
-    """Vectors (n, 3) over their lengths."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), LEAST_DIVISOR)
+    return feet[np.arange(len(points)), best], normalized(ways)

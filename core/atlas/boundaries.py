@@ -44,16 +44,6 @@ class Edge(NamedTuple):
         return {"nodes": list(self.nodes), "curve": self.curve.tolist(), "angle": self.angle.tolist()}
 
 
-class _Crossing(NamedTuple):
-    """Where patches give way to others along rays: both indices, ray, point, angle between the normals."""
-
-    node: NDArray[np.intp]
-    other: NDArray[np.intp]
-    ray: NDArray[np.intp]
-    point: Array
-    angle: Array
-
-
 def node_dict(r: Reconstruction, std: float) -> dict[str, Any]:
     """A patch of mean deviation `std` as a node of the graph, in plain values: its place and its shape."""
     return {
@@ -75,15 +65,17 @@ def edges_of(charts: Charts) -> Generator[float, None, list[Edge]]:
     for node in range(count):
         parts.append(_crossings(charts, node))
         yield 0.9 * (node + 1) / count
-    found = _Crossing(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    nodes, others, rays, points, angles = (np.concatenate(values) for values in zip(*parts, strict=True))
     pairs: dict[tuple[int, int], list[int]] = {}
-    for i, pair in enumerate(zip(found.node.tolist(), found.other.tolist(), strict=True)):
+    for i, pair in enumerate(zip(nodes.tolist(), others.tolist(), strict=True)):
         pairs.setdefault(pair, []).append(i)
     edges = []
     for pair in sorted({(min(p), max(p)) for p in pairs}):
         which = max(pairs.get(pair, []), pairs.get(pair[::-1], []), key=len)
-        which = _in_turn(which, found.ray)
-        edges.append(Edge(pair, found.point[which], found.angle[which]))
+        # In the order of their rays, beginning after the widest gap between two.
+        gaps = np.diff(rays[which], append=rays[which[0]] + RAYS)
+        turned = np.roll(which, -1 - int(np.argmax(gaps)))
+        edges.append(Edge(pair, points[turned], angles[turned]))
         yield 1.0
     return edges
 
@@ -111,16 +103,14 @@ def gaussian_curvature_of(r: Reconstruction, points: Array) -> tuple[Array, Arra
     return curvature, wider * np.sqrt(np.maximum(variance, 0.0)) / r.radius**2
 
 
-def _in_turn(which: list[int], ray: NDArray[np.intp]) -> list[int]:
-    """Crossings in the order of their rays, beginning after the widest gap between two rays."""
-    rays = ray[which]
-    gaps = np.diff(rays, append=rays[0] + RAYS)
-    start = int(np.argmax(gaps)) + 1
-    return which[start:] + which[:start]
+def _crossings(
+    charts: Charts, node: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Array, Array]:
+    """Where one patch gives way to others, on k rays from its middle.
 
-
-def _crossings(charts: Charts, node: int) -> _Crossing:
-    """Where one patch gives way to others, on rays from its middle."""
+    Returns its index and that of the other patch, the ray, (k,) each, the point (k, 3), and the angle between
+    both normals (k,), in radians.
+    """
     turns = 2.0 * np.pi * np.arange(RAYS) / RAYS
     out = MARGIN * np.arange(1, RAY_PLACES + 1) / (RAY_PLACES + 1)
     rays = np.stack([np.cos(turns), np.sin(turns)], axis=1)
@@ -149,4 +139,4 @@ def _crossings(charts: Charts, node: int) -> _Crossing:
     flat = (1.0 - share)[:, None] * xy[ray, before] + share[:, None] * xy[ray, at]
     point, _ = charts.world(np.full(len(ray), node), *flat.T)
     angle = np.arccos(np.clip(cosine[which[place]], -1.0, 1.0))
-    return _Crossing(np.full(len(ray), node), pairs.node[which[place]], ray, point, angle)
+    return np.full(len(ray), node), pairs.node[which[place]], ray, point, angle

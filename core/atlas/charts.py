@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..triangles import normalized, row_dot
 from .cubic_spline import CUBIC, SIDE, cubics, weights_at
 
 # python -m benchmarks.atlas judges these.
@@ -103,8 +104,7 @@ class Charts:
         """Places in the frames of patches and in unit radius, (3, m)."""
         origins, axes = self._frames
         off = points.T.take(place, axis=1) - origins.take(node, axis=1)
-        found: Array = np.einsum("im,ijm->jm", off, axes.take(node, axis=2))
-        return found
+        return np.einsum("im,ijm->jm", off, axes.take(node, axis=2))
 
     @cached_property
     def _frames(self) -> tuple[Array, Array]:
@@ -161,8 +161,7 @@ class Charts:
 
     def _turned(self, node: NDArray[np.intp], local: Array) -> Array:
         """Directions (3, m) in the frames of patches, as the caller sees them, (m, 3)."""
-        found: Array = np.einsum("mij,jm->mi", self.axes[node], local)
-        return found
+        return np.einsum("mij,jm->mi", self.axes[node], local)
 
     def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
         """Heights, and slopes in x and y, (3, m), at local (x, y)."""
@@ -214,8 +213,7 @@ class Charts:
         inside, pitch = self.inside(1.0), (2.0 * self.halves / (SIDE - 1))[:, None, None]
         steps = np.stack([self.heights[:, 1:, :-1], self.heights[:, :-1, 1:]]) - self.heights[:, :-1, :-1]
         steep = (np.hypot(*steps) > FLAT * pitch) & inside[:, :-1, :-1]
-        flat: NDArray[np.bool_] = ~steep.any(axis=(1, 2))
-        return flat
+        return ~steep.any(axis=(1, 2))
 
     def knots(self) -> Array:
         """Local x and y of all knots, (2, n, SIDE, SIDE)."""
@@ -244,8 +242,7 @@ class Charts:
     def rim_at(self, azimuths: NDArray[np.intp]) -> Array:
         """Local x and y (2, k) of the first patch's rim, at some of its AZIMUTHS."""
         turns = 2.0 * np.pi * azimuths / AZIMUTHS
-        found: Array = self.rims[0, azimuths] * np.stack([np.cos(turns), np.sin(turns)])
-        return found
+        return self.rims[0, azimuths] * np.stack([np.cos(turns), np.sin(turns)])
 
     def rim(self, count: int, out: float) -> tuple[Array, Array, Array]:
         """Points around the first patch at the share `out` of its domain's radius, (count, 3).
@@ -255,9 +252,7 @@ class Charts:
         xy = out * self.rim_at(np.arange(0, AZIMUTHS, AZIMUTHS // count)).T
         points, normals = self.world(np.zeros(count, dtype=np.intp), *xy.T)
         ahead = (xy / np.linalg.norm(xy, axis=1, keepdims=True)) @ self.axes[0, :, :2].T
-        ahead -= np.einsum("ki,ki->k", ahead, normals)[:, None] * normals
-        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
-        return points, normals, ahead
+        return points, normals, normalized(ahead - row_dot(ahead, normals)[:, None] * normals)
 
     def world(self, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
         """Points and normals (m, 3) of patches above local (x, y), which are in unit radius."""

@@ -8,12 +8,13 @@ At a corner one triangle has its vertices on three sheets.
 """
 
 from collections.abc import Generator, Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..steps import chunked
+from ..triangles import normalized
 from .charts import Charts
 from .field import least_of, sheet_facing
 from .tetrahedra import Indices, sides_of, split_sides
@@ -28,35 +29,16 @@ SIDES_AT_ONCE = 1000  # A step intersects this many sheets.
 LEAST = 1e-12  # Sheets are parallel below this share of their squared sines.
 
 
-class Creased(NamedTuple):
-    """A mesh with creases.
-
-    vertices, triangles : (n, 3) and (m, 3)
-    parents : (k,), a vertex beside each of the last k vertices
-    unfelt : (n,), how far from what patches reach the vertices are that moved or came
-    """
-
-    vertices: Array
-    triangles: Indices
-    parents: Indices
-    unfelt: Array
-
-
-class _Met(NamedTuple):
-    """Points (n, 3) where sheets meet, how far patches are from there (n,), and whether they meet (n,)."""
-
-    points: Array
-    unfelt: Array
-    met: NDArray[np.bool_]
-
-
 def creased(
     charts: Charts, vertices: Array, triangles: Indices, normals: Array, edge: float
-) -> Generator[float, None, Creased]:
+) -> Generator[float, None, tuple[Array, Indices, Indices, Array]]:
     """The mesh with vertices on all creases and corners; yields the share that is done.
 
     normals : (n, 3), those of the sheets on which the vertices (n, 3) lie
     edge : the length of the edges
+
+    Returns vertices (n + k, 3) and triangles (m, 3); for each of the k new vertices an old one beside it,
+    (k,); and how far from what patches reach the vertices are that moved or came, (n + k,).
     """
     vertices, free, unfelt = vertices.copy(), np.ones(len(vertices), dtype=bool), np.zeros(len(vertices))
     sides = sides_of(triangles, len(vertices))
@@ -73,18 +55,20 @@ def creased(
         vertices[at], unfelt[at], free[at] = corner, beyond, False
     yield 0.9
     sides = sides[free[sides].all(axis=1)]
-    parts = []
-    for few in np.array_split(sides, len(sides) // SIDES_AT_ONCE + 1):
-        parts.append(_intersections(charts, vertices[few], normals[few], edge))
-        yield 0.9
-    points, off, met = (np.concatenate(values) for values in zip(*parts, strict=True))
+    points, off, met = yield from chunked(
+        lambda places, ups: _intersections(charts, places, ups, edge),
+        SIDES_AT_ONCE,
+        0.9,
+        vertices[sides],
+        normals[sides],
+    )
     sides, points, off = sides[met], points[met], off[met]
     moved, to = _nearest(vertices, sides, points, edge)
     vertices[moved], unfelt[moved], free[moved] = points[to], off[to], False
     left = free[sides].all(axis=1)
     split = split_sides(triangles, sides[left], len(vertices))
     unfelt = np.concatenate([unfelt, off[left]])
-    return Creased(np.vstack([vertices, points[left]]), split, sides[left, 0], unfelt)
+    return np.vstack([vertices, points[left]]), split, sides[left, 0], unfelt
 
 
 def _nearest(vertices: Array, sides: Indices, points: Array, edge: float) -> tuple[Indices, Indices]:
@@ -115,8 +99,10 @@ def _corners(
         corners, off, triangles = corners[left], off[left], triangles[left]
 
 
-def _intersections(charts: Charts, places: Array, normals: Array, edge: float) -> _Met:
-    """Where sheets meet.
+def _intersections(
+    charts: Charts, places: Array, normals: Array, edge: float
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """The points (n, 3) where sheets meet, how far patches are from there (n,), and whether they meet (n,).
 
     places, normals : (n, 2 or 3, 3), a place on each sheet, and its normal there
     """
@@ -144,7 +130,7 @@ def _intersections(charts: Charts, places: Array, normals: Array, edge: float) -
         points, met, felt = np.where(tip[:, None], middle + steps, points), met | tip, felt & ~tip
     met &= ~_rounded(charts, points, normals, edge)
     met &= np.linalg.norm(points - middle, axis=1) < near
-    return _Met(points, np.where(felt, 0.0, np.linalg.norm(points - middle, axis=1)), met)
+    return points, np.where(felt, 0.0, np.linalg.norm(points - middle, axis=1)), met
 
 
 def _rounded(charts: Charts, points: Array, normals: Array, edge: float) -> NDArray[np.bool_]:
@@ -152,8 +138,7 @@ def _rounded(charts: Charts, points: Array, normals: Array, edge: float) -> NDAr
 
     points, normals : (n, 3), changed in place, and (n, k, 3), those of the sheets
     """
-    between = normals.sum(axis=1)
-    between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), LEAST)
+    between = normalized(normals.sum(axis=1))
     pairs = charts.pairs(points, edge)
     toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.place])
     own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.place]).max(axis=1)

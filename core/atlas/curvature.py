@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import Array
+from ..triangles import LEAST_DIVISOR, normalized, triangle_cross
 from .creases import SHARP
-from .meshing import LEAST_DIVISOR, Mesh
+from .meshing import Mesh
 from .tetrahedra import Indices
 
 # python -m benchmarks.atlas --only ring and --only egg chose these.
@@ -54,14 +55,6 @@ class Curvatures(NamedTuple):
     mean_std: Array
 
 
-class _Fit(NamedTuple):
-    """Gaussian and mean curvature, and the misfit of the normals as a root mean square, (n,) each."""
-
-    gauss: Array
-    mean: Array
-    misfit: Array
-
-
 def sheets_of(mesh: Mesh) -> Sheets:
     """The places and the ends of a mesh."""
     from scipy.spatial import cKDTree
@@ -81,9 +74,7 @@ def _ends(mesh: Mesh, normals: Array) -> Indices:
     order = np.argsort(keys, kind="stable")  # It is the fastest here.
     first = np.flatnonzero(np.diff(keys[order]) == 0)
     pairs = np.stack([order[first], order[first + 1]])
-    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
-    across = np.cross(b - a, c - a)
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), LEAST_DIVISOR)
+    across = normalized(triangle_cross(mesh.vertices[mesh.triangles]))
     beside = np.roll(mesh.triangles, -2, axis=1).ravel()[pairs]  # The corners that are not on the side.
     is_end = np.ones(len(sides), dtype=bool)
     is_end[pairs] = (np.einsum("ni,ni->n", *across[pairs // 3]) < SHARP) & (
@@ -103,12 +94,11 @@ def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
     distance, local = _around(sheets, points, normals, distance, at)
     std = sheets.stds[at[:, 0]]
     near = np.minimum(2.0 * least, most)
-    first = _fitted(distance, local, near)
-    largest = np.abs(first.mean) + np.sqrt(np.maximum(first.mean**2 - first.gauss, 0.0))
+    gauss, mean, _ = _fitted(distance, local, near)
+    largest = np.abs(mean) + np.sqrt(np.maximum(mean**2 - gauss, 0.0))
     radius = np.sqrt(2.0 * SAGITTA * std / np.maximum(largest, LEAST_DIVISOR)).clip(least, most)
-    fit = _fitted(distance, local, radius)
     determined = (ends >= least) & ((distance < near[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
-    gauss, mean, misfit = (np.where(determined, values, 0.0) for values in fit)
+    gauss, mean, misfit = (np.where(determined, values, 0.0) for values in _fitted(distance, local, radius))
     mean_std = np.where(determined, np.hypot(BY_STD * std / radius, BY_MISFIT * misfit) / radius, np.inf)
     # For errors of heights that are alike in all directions, the variances of z_xx, z_yy and z_xy are as
     # 3 : 3 : 1 and the covariance of the first two as 1, so that of H is as 2.
@@ -124,15 +114,17 @@ def _around(sheets: Sheets, points: Array, normals: Array, distance: Array, at: 
     off, ups = sheets.tree.data[at] - points[:, None], sheets.normals[at]
     alike = np.einsum("nki,ni->nk", ups, normals) > SAME_SHEET_COSINE
     across = np.abs(np.einsum("nki,nki->nk", off, ups + normals[:, None]))
-    x = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-    x /= np.maximum(np.linalg.norm(x, axis=1, keepdims=True), LEAST_DIVISOR)
+    x = normalized(np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)]))
     plane = np.stack([x, np.cross(normals, x)], axis=2)
     same = alike & (across <= ACROSS * distance)
     return np.where(same, distance, np.inf), np.concatenate([off @ plane, ups @ plane], axis=2)
 
 
-def _fitted(distance: Array, local: Array, radius: Array) -> _Fit:
-    """Quadrics of the radii (n,) fitted to places at distances (n, k) with local terms (n, k, 4)."""
+def _fitted(distance: Array, local: Array, radius: Array) -> tuple[Array, Array, Array]:
+    """Gaussian and mean curvatures of quadrics, and the root mean square misfit of the normals, (n,) each.
+
+    They are fitted to places at distances (n, k) within radii (n,), with local terms (n, k, 4).
+    """
     inside: Array = np.maximum(1.0 - (distance / radius[:, None]) ** 2, 0.0)
     weights = inside * inside
     weights /= np.maximum(weights.sum(axis=1, keepdims=True), LEAST_DIVISOR)
@@ -143,4 +135,4 @@ def _fitted(distance: Array, local: Array, radius: Array) -> _Fit:
     slopes = np.linalg.solve(square, mixed)
     left = np.einsum("nii->n", moments[:, 2:, 2:]) - np.einsum("nij,nij->n", slopes, mixed)
     (a, b), (c, d) = -np.moveaxis(slopes, 0, -1) / radius
-    return _Fit(a * d - 0.25 * (b + c) ** 2, 0.5 * (a + d), np.sqrt(np.maximum(left, 0.0)))
+    return a * d - 0.25 * (b + c) ** 2, 0.5 * (a + d), np.sqrt(np.maximum(left, 0.0))

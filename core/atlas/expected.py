@@ -50,15 +50,11 @@ def expected_touches(
             continue
         normal = vector_of(n)
         side = first_contact(surface, vector_of(point), normal, tangent_of(normal, None), e.step)[2]
-        felt.append(_area(e.result.radius * felt_rim(e.result, Finger(surface, side), NEAR * tolerance)))
+        radii = e.result.radius * felt_rim(e.result, Finger(surface, side), NEAR * tolerance)
+        felt.append(float(np.pi * np.mean(radii**2)))
     if not any(felt):
         raise ValueError("points: expected some where a patch can be felt, got none")
     return max(1.0, OVERLAP * area * float(np.mean([1.0 / each for each in felt if each])))
-
-
-def _area(radii: Array) -> float:
-    """The area inside radii (n,) all round."""
-    return float(np.pi * np.mean(radii**2))
 
 
 def covered_by(r: Reconstruction, rim: Array, points: Array, tolerance: float) -> NDArray[np.bool_]:

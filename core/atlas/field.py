@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..triangles import normalized
 from .charts import MARGIN, Charts, Pairs
 from .indicator import Indicator
 
@@ -50,7 +51,7 @@ class Blend(NamedTuple):
 
     def chosen(self, which: NDArray[np.intp]) -> "Blend":
         """The sheet near some of the places."""
-        return Blend(self.distance[which], self.std[which], self.normal[which], self.node[which])
+        return Blend._make(values[which] for values in self)
 
     def where(self, which: NDArray[np.bool_], other: "Blend") -> "Blend":
         """These at places (k,) where `which` holds, and those of another elsewhere."""
@@ -79,8 +80,7 @@ class Surface(NamedTuple):
 
     def chosen(self, which: NDArray[np.intp]) -> "Surface":
         """The surface near some of the places."""
-        distance, std, normal, node, rho, creases = self
-        return Surface(distance[which], std[which], normal[which], node[which], rho[which], creases[which])
+        return Surface._make(values[which] for values in self)
 
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
@@ -91,8 +91,7 @@ def node_weights(charts: Charts, pairs: Pairs) -> Array:
 def weights_of(rho: Array, std: Array, radius: Array) -> Array:
     """w = (1 - u)^2 (1 + 2 u) / (std^2 + floor^2), (m,), where u is how far out a foot is, 1 at MARGIN."""
     u = np.minimum(rho / MARGIN, OUTERMOST)
-    weights: Array = (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (std**2 + (FLOOR * radius) ** 2)
-    return weights
+    return (1.0 - u) ** 2 * (1.0 + 2.0 * u) / (std**2 + (FLOOR * radius) ** 2)
 
 
 def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius: Array) -> Array:
@@ -203,11 +202,9 @@ def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) 
 def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
     """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3)."""
     pairs = charts.pairs(points)
-    on = pairs.rho < INSIDE
-    on &= np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
-    on &= _facing(charts, pairs, normals[pairs.place]) > 0.0
-    found: NDArray[np.bool_] = np.bincount(pairs.place[on], minlength=len(points)) > 0
-    return found
+    near = np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
+    on = (pairs.rho < INSIDE) & near & (_facing(charts, pairs, normals[pairs.place]) > 0.0)
+    return np.bincount(pairs.place[on], minlength=len(points)) > 0
 
 
 def least_of(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
@@ -237,8 +234,7 @@ def _mean(pairs: Pairs, w: Array, count: int) -> Blend:
     scale = 1.0 / np.where(there, some, 1.0)
     mean = scale * total(pairs.distance)
     variance = scale * total(pairs.std**2 + (pairs.distance - mean[place]) ** 2)
-    up = np.stack([total(pairs.normal[:, i]) for i in range(3)], axis=1)
-    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
+    up = normalized(np.stack([total(pairs.normal[:, i]) for i in range(3)], axis=1))
     best = least_of(place, -w, count)
     return Blend(
         mean,

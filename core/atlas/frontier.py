@@ -19,11 +19,12 @@ from ..arguments import Array
 from ..contours.contour import Contour, Vector, cross, dot, vector_of
 from ..contours.finger import Contact
 from ..reconstruction.result import Reconstruction
+from ..triangles import normalized
 from .charts import AZIMUTHS, Charts
 from .field import INSIDE, covered
 from .finger import DISK_PLACES, Finger
 from .join import stacked, table_of
-from .meshing import LEAST_DIVISOR, Mesh
+from .meshing import Mesh
 from .reference_mesh import ReferenceMesh
 from .rims import felt_rim
 
@@ -99,7 +100,7 @@ class Frontier:
     rng: np.random.Generator = field(default_factory=np.random.default_rng)
     taps: list[Contour] = field(default_factory=list)
     in_vain: list[Vector] = field(default_factory=list)
-    charts: Charts | None = None
+    charts: Charts = field(init=False)
     queue: list[tuple[float, int, Place]] = field(default_factory=list)
     pushed: int = 0
 
@@ -113,24 +114,20 @@ class Frontier:
         if radius <= least:
             return False
         chart = stacked([r], [table_of(r, rim, deviations=False)])
+        self.charts = self.charts.joined(chart) if self.taps else chart
         self.taps.append(self._felt_between(chart))
-        self.charts = chart if self.charts is None else self.charts.joined(chart)
         for p, n, t in zip(*chart.rim(RIM, 1.01 * INSIDE), strict=True) if radius >= goes_on else ():
             self.push(Place(vector_of(p), vector_of(n), vector_of(t), r.radius), np.pi * r.radius**2)
         return True
-
-    def _taps(self, chart: Charts, xy: Array) -> list[Contact | None]:
-        """What the finger feels of a patch at local places (2, k)."""
-        points, normals = chart.world(np.zeros(xy.shape[1], dtype=np.intp), *xy)
-        each = zip(points.tolist(), normals.tolist(), strict=True)
-        return [self.finger.near(tuple(p), tuple(n), self.near) for p, n in each]
 
     def _felt_between(self, chart: Charts) -> Contour:
         """Contacts between the curves of a patch, where the finger taps it."""
         around = np.arange(0, AZIMUTHS, AZIMUTHS // RIM)
         xy = np.hstack([share * chart.rim_at(around[::step]) for share, step in BETWEEN])
-        contacts = np.array([contact for contact in self._taps(chart, xy) if contact is not None])
-        points, normals = contacts.reshape(-1, 2, 3).transpose(1, 0, 2)
+        places = np.stack(chart.world(np.zeros(xy.shape[1], dtype=np.intp), *xy), axis=1)
+        contacts = [self.finger.near(vector_of(p), vector_of(n), self.near) for p, n in places]
+        felt = np.array([contact for contact in contacts if contact is not None])
+        points, normals = felt.reshape(-1, 2, 3).transpose(1, 0, 2)
         offsets = self.rng.normal(0.0, self.noise, len(points))
         return Contour(points + offsets[:, None] * normals, normals=normals)
 
@@ -255,7 +252,6 @@ class Frontier:
 
     def _free(self, contacts: Array) -> NDArray[np.bool_]:
         """Which of the contacts (k, 2, 3) no patch covers."""
-        assert self.charts is not None
         return ~covered(self.charts, contacts[:, 0], contacts[:, 1])
 
     def _touch(self, place: Place, share: float) -> Next | None:
@@ -302,8 +298,6 @@ def border_places(mesh: Mesh) -> Iterator[Place]:
         if taken[i]:
             continue
         taken |= ((middles - middles[i]) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2
-        up = normals[a] + normals[b]
-        up /= max(float(np.linalg.norm(up)), LEAST_DIVISOR)
-        beyond = np.cross(corners[b] - corners[a], up)
-        beyond /= max(float(np.linalg.norm(beyond)), LEAST_DIVISOR)
+        up = normalized(normals[a] + normals[b])
+        beyond = normalized(np.cross(corners[b] - corners[a], up))
         yield Place(vector_of(middles[i]), vector_of(up), vector_of(beyond), radius)

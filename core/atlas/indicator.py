@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..triangles import normalized
 
 # python -m benchmarks.atlas judges these.
 LAYERS = 3.0  # This many cells across a wall resolve it.
@@ -51,16 +52,16 @@ class Indicator(NamedTuple):
         """The indicator less its level at points (n, 3); outside of the grid it is that at its faces."""
         from scipy.ndimage import map_coordinates
 
-        found: Array = map_coordinates(
+        return map_coordinates(
             self.values, (points - self.low).T / self.cell, order=1, mode="nearest", output=np.float64
         )
-        return found
 
     def outward(self, points: Array) -> Array:
         """Unit vectors (n, 3) along which the indicator falls at points (n, 3)."""
         steps = self.cell * np.eye(3)
-        falls = np.stack([self.at(points - step) - self.at(points + step) for step in steps], axis=1)
-        return falls / np.maximum(np.linalg.norm(falls, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        return normalized(
+            np.stack([self.at(points - step) - self.at(points + step) for step in steps], axis=1)
+        )
 
 
 def solved(points: Array, areas: Array, cell: float, thinnest: float) -> Generator[float, None, Indicator]:

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from ..arguments import Array
 from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
+from ..triangles import normalized
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
 from .cubic_spline import SIDE, between
 from .field import LAYER, sheet_facing
 from .finger import FACING
-from .smoothing_spline import preparing, smoothing_spline
+from .smoothing_spline import ROUGHNESS, penalty, smoothing_spline
 
 # python -m benchmarks.atlas chose these.
 ALIGNED = 0.75  # A contact is on a patch if the cosine of the angle between their normals is at least this.
@@ -54,7 +55,8 @@ def joined(
         part = charts.pairs(points[start : start + PLACES_AT_ONCE])
         parts.append(part._replace(place=start + part.place))
         yield 0.0
-    for _ in preparing():
+    for order in ROUGHNESS:  # Otherwise the first spline would take ten times as long as the others.
+        penalty(order)
         yield 0.0
     columns = []
     for values in zip(*parts, strict=True):
@@ -136,8 +138,7 @@ def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[
     """All contacts and their unit normals, (n, 3) each, and the indices (n,) of the patches they are of."""
     flat = [(i, contour) for i, some in enumerate(contours) for contour in some]
     points = np.vstack([contour.points for _, contour in flat])
-    normals = np.vstack([contour.normals for _, contour in flat])  # type: ignore[misc]
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    normals = normalized(np.vstack([contour.normals for _, contour in flat]))  # type: ignore[misc]
     owner = np.repeat([i for i, _ in flat], [len(contour.points) for _, contour in flat])
     return points, normals, owner
 

@@ -14,7 +14,7 @@ from ..contours.contour import Contour
 from ..reconstruction.from_contours import reconstruct_many
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
-from ..steps import result_of
+from ..steps import part_of, result_of
 from .charts import AZIMUTHS, Charts
 from .finger import FACING
 from .join import stacked, table_of
@@ -61,9 +61,7 @@ def atlas_of(
     unfelt, and where normals or contacts contradict each other. Raises ValueError for bad arguments, for
     measured normals many of which face opposite ways in one place, and if no contacts carry a patch.
     """
-    steps = cover_contacts(contours_or_strokes, outward=outward, tolerance=tolerance, noise=noise)
-    atlas: Atlas = result_of(steps)
-    return atlas
+    return result_of(cover_contacts(contours_or_strokes, outward=outward, tolerance=tolerance, noise=noise))
 
 
 def cover_contacts(
@@ -85,15 +83,10 @@ def cover_contacts(
     yield 0.0
     cloud = _Cloud(contacts, cKDTree(contacts.points), _linked(contacts.links), noise, largest)
     found, charts = yield from _patches(cloud)
-    steps = surfaced(found, charts, largest, contacts)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            places = uncovered_places(end.value, charts)
-            atlas = Atlas(tuple(found), charts, end.value, largest, places, contacts=contacts)
-            return replace(atlas, doubt=doubt or _off_contacts(atlas, contacts, noise))
-        yield 1.0
+    reference = yield from part_of(surfaced(found, charts, largest, contacts), 1.0, 1.0)
+    places = uncovered_places(reference, charts)
+    atlas = Atlas(tuple(found), charts, reference, largest, places, contacts=contacts)
+    return replace(atlas, doubt=doubt or _off_contacts(atlas, contacts, noise))
 
 
 def _contacts(
@@ -203,8 +196,7 @@ class _Cloud(NamedTuple):
         near = np.array(self.tree.query_ball_point(self.contacts.points[i], radius))
         near = near[self.contacts.normals[near] @ self.contacts.normals[i] > FACING]
         wall = connected_components(self.links[near][:, near], directed=False)[1]
-        found: NDArray[np.intp] = near[wall == wall[np.flatnonzero(near == i)]]
-        return found
+        return near[wall == wall[np.flatnonzero(near == i)]]
 
     def patch(self, i: int, radius: float) -> Reconstruction | None:
         """The patch of those contacts around contact i that face the same way, or None if they carry none."""

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..steps import chunked
+from ..triangles import normalized, row_dot, triangle_cross
 from .charts import MARGIN, Charts
 from .creases import creased
 from .field import INSIDE, Surface, surface_at
@@ -41,7 +43,6 @@ LATTICE_AT_ONCE = 20_000  # A step takes this many points of the lattice,
 PLACES_AT_ONCE = 3000  # or the surface near this many places.
 # The squares of an edge and of a cube's side take so much memory, and a mesh takes at most so much.
 EDGE_BYTES, LATTICE_BYTES, MOST_BYTES = 900.0, 17_000.0, 2e9
-LEAST_DIVISOR = 1e-300  # No vector is divided by less.
 
 
 class Mesh(NamedTuple):
@@ -59,10 +60,10 @@ class Mesh(NamedTuple):
     @property
     def normals(self) -> Array:
         """Outward unit normals of the vertices, (n, 3): means of the triangles' normals, weighted by area."""
-        a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
-        across, count = np.repeat(np.cross(b - a, c - a), 3, axis=0), len(self.vertices)
-        normals = np.stack([np.bincount(self.triangles.ravel(), way, count) for way in across.T], axis=1)
-        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), LEAST_DIVISOR)
+        across, count = triangle_cross(self.vertices[self.triangles]).repeat(3, axis=0), len(self.vertices)
+        return normalized(
+            np.stack([np.bincount(self.triangles.ravel(), way, count) for way in across.T], axis=1)
+        )
 
     @property
     def edge(self) -> float:
@@ -81,8 +82,7 @@ class Mesh(NamedTuple):
     @property
     def sides_on_border(self) -> Indices:
         """The number of sides (m,) of each triangle that are on the border."""
-        found: Indices = self._sides[2].reshape(-1, 3).sum(axis=1)
-        return found
+        return self._sides[2].reshape(-1, 3).sum(axis=1)
 
     def chosen(self, which: NDArray[np.bool_]) -> "Mesh":
         """Some of the triangles, and their vertices."""
@@ -131,11 +131,9 @@ class Contacts(NamedTuple):
 
         away, at = cKDTree(self.points).query(points, BESIDE)
         alike = np.einsum("kbi,ki->kb", self.normals[at], normals) > FACING
-        ways = self.points[self.links[at]] - points[:, None, None]
-        ways /= np.maximum(np.linalg.norm(ways, axis=3, keepdims=True), LEAST_DIVISOR)
+        ways = normalized(self.points[self.links[at]] - points[:, None, None])
         between = np.linalg.norm(ways.mean(axis=2), axis=2) < ONE_SIDED
-        found: NDArray[np.bool_] = (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
-        return found
+        return (alike & between & (away < BETWEEN * self.reach[at])).any(axis=1)
 
 
 def memory_of(vertices: Array, triangles: Indices, edge: float, lattice: float = np.inf) -> float:
@@ -143,8 +141,7 @@ def memory_of(vertices: Array, triangles: Indices, edge: float, lattice: float =
 
     lattice : the length of the lattice's cubes, if it is known
     """
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    area = 0.5 * float(np.linalg.norm(triangle_cross(vertices[triangles]), axis=1).sum())
     return area * max(EDGE_BYTES / edge / edge, LATTICE_BYTES / lattice / lattice)
 
 
@@ -187,11 +184,14 @@ def meshed(
         yield 0.7
         vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, band)
     yield 0.9
-    found = yield from creased(charts, vertices, triangles, surface.normal, edge)
+    every = np.arange(len(vertices))
+    vertices, triangles, parents, unfelt = yield from creased(
+        charts, vertices, triangles, surface.normal, edge
+    )
     yield 0.9
-    surface = surface.chosen(np.append(np.arange(len(vertices)), found.parents))
-    surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * found.unfelt))
-    return (yield from _felt(found.vertices, found.triangles, surface, indicator, ended, contacts))
+    surface = surface.chosen(np.append(every, parents))
+    surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * unfelt))
+    return (yield from _felt(vertices, triangles, surface, indicator, ended, contacts))
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -201,12 +201,11 @@ def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Ar
     """
     cells = yield from _cells(indicator, size)
     lattice, tetrahedra = yield from tetrahedra_of(cells)
-    points, parts = 0.5 * size * lattice.astype(np.float64), []
+    points = 0.5 * size * lattice.astype(np.float64)
     smooth = max(0.0, size**2 - (SPREAD * indicator.cell) ** 2) ** 0.5
-    for some in np.array_split(points, len(points) // LATTICE_AT_ONCE + 1):
-        parts.append(-_mean_at(indicator, some, smooth))
-        yield 0.1
-    ends, triangles = cut(tetrahedra, np.concatenate(parts))
+    means = chunked(lambda some: (-_mean_at(indicator, some, smooth),), LATTICE_AT_ONCE, 0.1, points)
+    (values,) = yield from means
+    ends, triangles = cut(tetrahedra, values)
     yield 0.2
     found = []
     for few in np.array_split(ends, len(ends) // PLACES_AT_ONCE + 1):
@@ -299,8 +298,7 @@ def _again(
 
 def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.bool_]:
     """Which vertices (n,) are of triangles that face against the normals (n, 3) of the surface."""
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    against = np.einsum("mi,mi->m", np.cross(b - a, c - a), normals[triangles].sum(axis=1)) < 0.0
+    against = row_dot(triangle_cross(vertices[triangles]), normals[triangles].sum(axis=1)) < 0.0
     folded = np.zeros(len(vertices), dtype=bool)
     folded[triangles[against]] = True
     return folded
@@ -310,12 +308,17 @@ def _onto(
     charts: Charts, indicator: Indicator, vertices: Array, up: Array, band: float
 ) -> Generator[float, None, Surface]:
     """Moves vertices (k, 3) onto the surface, in place; returns the surface where they were before."""
-    parts = []
-    for start in range(0, max(len(vertices), 1), PLACES_AT_ONCE):
-        some = slice(start, start + PLACES_AT_ONCE)
-        parts.append(surface_at(charts, indicator, vertices[some], up[some], band))
-        yield 0.5
-    surface = Surface(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    surface = Surface._make(
+        (
+            yield from chunked(
+                lambda places, ups: surface_at(charts, indicator, places, ups, band),
+                PLACES_AT_ONCE,
+                0.5,
+                vertices,
+                up,
+            )
+        )
+    )
     vertices -= np.clip(surface.distance, -band, band)[:, None] * surface.normal
     return surface
 
@@ -347,9 +350,8 @@ def _felt(
     beside = np.bincount(piece[inside], minlength=count) > 0
     gone = ~inside & ~beside[piece]
     if ended is None:
-        a, b, c = vertices[beyond].transpose(1, 0, 2)
         # Each vertex has a third of its triangles' area, so that a hole is as large with any length of edges.
-        far = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
+        far = np.linalg.norm(triangle_cross(vertices[beyond]), axis=1) / 6.0 * (~near[beyond]).sum(axis=1)
         gone |= ~inside & (np.bincount(piece[beyond[:, 0]], far, count) > BRIDGED * indicator.cell**2)[piece]
     else:
         outer, off = np.flatnonzero(~inside & ~gone), np.zeros(count)

@@ -4,7 +4,7 @@
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,14 +14,15 @@ from ..arguments import LARGEST, Array, finite_array, number
 from ..contours.contour import Contour, SamplingPlane
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
-from ..steps import result_of
+from ..steps import chunked, result_of
+from ..triangles import LEAST_DIVISOR, triangle_cross
 from .borders import Border, bordered
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
 from .curvature import Sheets, curvatures_of, sheets_of
 from .frontier import Place
 from .indicator import Indicator
-from .meshing import LEAST_DIVISOR, MOST_BYTES, WALL, Contacts, Mesh, lattice_of, memory_of, meshed
+from .meshing import MOST_BYTES, WALL, Contacts, Mesh, lattice_of, memory_of, meshed
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
@@ -73,6 +74,9 @@ class Check(NamedTuple):
     at_random: int
 
 
+NO_CHECK = Check(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0)
+
+
 def suggested_edge(patches: Sequence[Reconstruction], charts: Charts, indicator: Indicator) -> float:
     """The edge at which triangles are off the surface by half its deviation, as a median of the patches.
 
@@ -115,7 +119,7 @@ class Atlas:
     reference : the joined surface as a mesh, and the inside of the object
     tolerance : mean deviation of the height that the touches were to reach, a length; None if there was none
     uncovered : places on rims beyond which the object goes on unfelt
-    check : contacts from outside that the patches do not have; None if there were none
+    check : contacts from outside that the patches do not have
     taps : contacts between the curves of each patch, to which the joined patches are fitted, too
     border : where a finger felt the surface end; None if there was none
     is_cut_short : whether touches ended because no more were allowed, or were stopped
@@ -128,7 +132,7 @@ class Atlas:
     reference: ReferenceMesh
     tolerance: float | None = None
     uncovered: tuple[Place, ...] = ()
-    check: Check | None = None
+    check: Check = NO_CHECK
     taps: tuple[Contour, ...] = ()
     border: Border | None = None
     is_cut_short: bool = False
@@ -148,8 +152,7 @@ class Atlas:
     @cached_property
     def edges(self) -> list[Edge]:
         """All pairs of patches that share a boundary, each with this boundary."""
-        edges: list[Edge] = result_of(edges_of(self.charts))
-        return edges
+        return result_of(edges_of(self.charts))
 
     def bounding(self) -> Generator[float, None, None]:
         """Finds `edges` in steps: yields the share that is done."""
@@ -224,15 +227,14 @@ class Atlas:
         mesh = self.reference.mesh
         if self.tolerance is None or not len(mesh.triangles):
             return 0.0, -1
-        a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
-        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        areas = np.linalg.norm(triangle_cross(mesh.vertices[mesh.triangles]), axis=1)
         rough = mesh.std[mesh.triangles].max(axis=1) > LIMIT * self.tolerance
         return float(areas[rough].sum() / areas.sum()), int(np.argmax(mesh.std))
 
     @cached_property
     def _contacts(self) -> tuple[Array, Array]:
         """Signed distances and deviations (n,) of the contacts of the check."""
-        if self.check is None or not len(self.check.points):
+        if not len(self.check.points):
             return np.zeros(0), np.zeros(0)
         return self.distance(self.check.points)
 
@@ -250,15 +252,13 @@ class Atlas:
         object is continued there.
         """
         far = np.flatnonzero(self._farther(IMPROVABLE * (self.tolerance or 0.0)))
-        if self.check is None or not len(far):
-            return far
         away = np.abs(self._contacts[0])
         chosen: list[int] = []
         for i in far[np.argsort(-away[far], kind="stable")].tolist():
             apart = np.linalg.norm(self.check.points[chosen] - self.check.points[i], axis=1)
             if (apart >= away[chosen]).all():
                 chosen.append(i)
-        return np.array(chosen)
+        return np.array(chosen, dtype=np.intp)
 
     def _farther(self, length: Array | float) -> NDArray[np.bool_]:
         """Which contacts of the check (n,) are farther from the surface than lengths (n,)."""
@@ -272,8 +272,6 @@ class Atlas:
         Those that contradict the surface do not count: they are of something else. What patches differ by is
         a part of a deviation and does not grow with theirs, so they grow more than once. Yields 1 each time.
         """
-        if self.check is None:
-            return self
         found, count = self, self.check.at_random
         within = ~self.contradicting[:count]
         for _ in range(WIDENINGS):
@@ -292,8 +290,8 @@ class Atlas:
 
     def _checked(self) -> tuple[str, str]:
         """The verdict of the check."""
-        missed = 0 if self.check is None else len(self.check.missed)
-        wrong, count = int(self.contradicting.sum()) + missed, len(self._contacts[0]) + missed
+        wrong = int(self.contradicting.sum()) + len(self.check.missed)
+        count = len(self.check.points) + len(self.check.missed)
         if wrong:
             advice = "allow more touches" if self.is_cut_short else "use a smaller tolerance"
             return "uncertain", (
@@ -328,19 +326,14 @@ class Atlas:
         something unfelt might be nearer, and the deviation is inf.
         """
         p = finite_array("points", points, (None, 3), LARGEST)
-        parts = [
-            self.reference.distances(self.charts, some) for some in np.array_split(p, len(p) // AT_ONCE + 1)
-        ]
-        distance, std = (np.concatenate(values) for values in zip(*parts, strict=True))
-        return distance, std
+        return result_of(chunked(partial(self.reference.distances, self.charts), AT_ONCE, 1.0, p))
 
     def mesh(self, edge: float) -> Mesh:
         """The surface as triangles whose edges are about of this length.
 
         It is closed if the object was felt all round, and open where it was not.
         """
-        mesh: Mesh = result_of(self.meshing(edge))
-        return mesh
+        return result_of(self.meshing(edge))
 
     def suggested_edge(self) -> float:
         """The length of the edges of the reference mesh."""
@@ -357,9 +350,8 @@ class Atlas:
         shape index and curvedness. Where they are unknown, which is beside creases and rims and where there
         is no surface, these are 0 and the deviations inf.
         """
-        parts = np.array_split(np.arange(len(points)), len(points) // CURVED_AT_ONCE + 1)
-        found = [curvatures_of(self._sheets, points[some], normals[some]) for some in parts]
-        gauss, mean, *stds = (np.concatenate(values) for values in zip(*found, strict=True))
+        steps = chunked(partial(curvatures_of, self._sheets), CURVED_AT_ONCE, 1.0, points, normals)
+        gauss, mean, *stds = result_of(steps)
         half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))  # half the difference of kappa1 and kappa2
         return {
             "gaussian_curvature": gauss,

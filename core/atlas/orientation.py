@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import Array
+from ..triangles import normalized
 from .tetrahedra import Indices
 
 # python -m benchmarks.measured --orientation judges these.
@@ -112,8 +113,7 @@ def mirrored(points: Array, normals: Array, i: Indices, j: Indices) -> tuple[Arr
 
     Also the larger absolute cosine between a normal and the way from one contact to the other, (m,).
     """
-    way = points[j] - points[i]
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
+    way = normalized(points[j] - points[i])
     a, b = (np.einsum("mi,mi->m", normals[k], way) for k in (i, j))
     return np.einsum("mi,mi->m", normals[i], normals[j]) - 2.0 * a * b, np.maximum(np.abs(a), np.abs(b))
 
@@ -146,10 +146,9 @@ def _links(points: Array, planes: Planes, lengths: Sequence[int]) -> tuple[Indic
     before = np.setdiff1d(np.arange(n - 1), ends)
     step = np.linalg.norm(points[before + 1] - points[before], axis=1)
     before = before[step < STEP * planes.reach[before]]
-    along = np.zeros(len(i) + len(before), dtype=bool)
-    along[len(i) :] = True
+    factor = np.repeat([1.0, STROKE], [len(i), len(before)])
     i, j = np.append(i, before), np.append(j, before + 1)
-    return i, j, np.where(along, STROKE, 1.0) * _weights(points, planes.normals, i, j)
+    return i, j, factor * _weights(points, planes.normals, i, j)
 
 
 def _weights(points: Array, normals: Array, i: Indices, j: Indices) -> Array:
@@ -242,8 +241,7 @@ def _flips(points: Array, normals: Array, areas: Array, region: Indices) -> tupl
     rng = np.random.default_rng(0)
     numbers, sizes = np.zeros((count, count)), np.bincount(region)
     for one in range(count):
-        some = np.flatnonzero(region == one)
-        some = rng.permutation(some)[:PROBES]
+        some = rng.permutation(np.flatnonzero(region == one))[:PROBES]
         for at in some:
             off = points - points[at]
             away = np.maximum(np.linalg.norm(off, axis=1), np.sqrt(areas[at]))

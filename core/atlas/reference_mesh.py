@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..contours.contour import Vector
+from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
 from .charts import Charts
 from .field import Surface, patched
 from .indicator import Indicator
-from .meshing import LEAST_DIVISOR, Mesh
+from .meshing import Mesh
 from .tetrahedra import Indices
 
 # python -m benchmarks.atlas judges these.
@@ -60,8 +61,7 @@ class ReferenceMesh:
             np.bincount(corners, minlength=len(self.mesh.vertices)),
         )
         start, steps = np.cumsum(counts) - counts, np.arange(counts.max())
-        found: Indices = order[start[:, None] + np.where(steps < counts[:, None], steps, 0)] // 3
-        return found
+        return order[start[:, None] + np.where(steps < counts[:, None], steps, 0)] // 3
 
     @cached_property
     def edge(self) -> float:
@@ -71,9 +71,7 @@ class ReferenceMesh:
     @cached_property
     def normals(self) -> Array:
         """Unit normals of the triangles, (m, 3)."""
-        a, b, c = self.mesh.vertices[self.mesh.triangles].transpose(1, 0, 2)
-        normals = np.cross(b - a, c - a)
-        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), LEAST_DIVISOR)
+        return normalized(triangle_cross(self.mesh.vertices[self.mesh.triangles]))
 
     @cached_property
     def is_open(self) -> NDArray[np.bool_]:
@@ -90,8 +88,7 @@ class ReferenceMesh:
         across = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)[:, None]
         angles = np.arctan2(across, -np.einsum("nki,nki->nk", sides, np.roll(sides, 1, axis=1)))
         count = len(self.mesh.vertices)
-        found: Array = np.bincount(self.mesh.triangles.ravel(), angles.ravel(), count).astype(np.float64)
-        return found
+        return np.bincount(self.mesh.triangles.ravel(), angles.ravel(), count).astype(np.float64)
 
     def widened(self, factor: float) -> "ReferenceMesh":
         """A mesh of the same triangles whose deviations are larger by a factor."""
@@ -110,8 +107,9 @@ class ReferenceMesh:
 
         Of triangles that are as near, it is the one that is most across the way to the place.
         """
-        nearest = self.tree.query(points, min(NEAREST, len(self.mesh.vertices)))[1].reshape(len(points), -1)
-        some = self.fans[nearest].reshape(len(points), -1)
+        count = min(NEAREST, len(self.mesh.vertices))
+        nearest = self.tree.query(points, count)[1].reshape(len(points), count)
+        some = self.fans[nearest].reshape(len(points), count * self.fans.shape[1])
         feet, weights = closest(self.mesh.vertices[self.mesh.triangles[some]], points[:, None])
         off = points[:, None] - feet
         away = np.linalg.norm(off, axis=2)
@@ -215,13 +213,8 @@ def closest(triangles: Array, points: Array) -> tuple[Array, Array]:
     a, b, c = np.moveaxis(triangles, -2, 0)
     ab, ac, ap = b - a, c - a, points - a
 
-    def dot(u: Array, v: Array) -> Array:
-        """Products (...) of vectors (..., 3)."""
-        found: Array = np.einsum("...i,...i->...", u, v)
-        return found
-
-    d1, d2 = dot(ab, ap), dot(ac, ap)
-    aa, bb, cc = dot(ab, ab), dot(ab, ac), dot(ac, ac)
+    d1, d2 = row_dot(ab, ap), row_dot(ac, ap)
+    aa, bb, cc = row_dot(ab, ab), row_dot(ab, ac), row_dot(ac, ac)
     area = np.maximum(aa * cc - bb * bb, LEAST_DIVISOR)
     v, w = (cc * d1 - bb * d2) / area, (aa * d2 - bb * d1) / area
     inside = (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)
@@ -234,7 +227,7 @@ def closest(triangles: Array, points: Array) -> tuple[Array, Array]:
         [np.stack(each, axis=-1) for each in ((on_ab, zero), (zero, on_ac), (1.0 - on_bc, on_bc))], axis=-2
     )
     off = ap[..., None, :] - tried[..., :1] * ab[..., None, :] - tried[..., 1:] * ac[..., None, :]
-    best = np.argmin(dot(off, off), axis=-1)[..., None, None]
+    best = np.argmin(row_dot(off, off), axis=-1)[..., None, None]
     side = np.take_along_axis(tried, best, axis=-2)[..., 0, :]
     v, w = np.where(inside, v, side[..., 0]), np.where(inside, w, side[..., 1])
     return a + v[..., None] * ab + w[..., None] * ac, np.stack([1.0 - v - w, v, w], axis=-1)

@@ -52,8 +52,7 @@ def felt_rim(r: Reconstruction, finger: Finger, near: float) -> Array:
     inverse = 1.0 / np.maximum(radii, LEAST_RIM * radii.max())
     around = np.append(azimuths, AZIMUTHS), np.append(inverse, inverse[0])
     straight = 1.0 / np.interp(np.arange(AZIMUTHS), *around)
-    corners, radii = _corners(inverse, ended), straight[1::2].copy()
-    radii[corners > radii] = corners[corners > radii]
+    radii = np.maximum(straight[1::2], _corners(inverse, ended))
     turns += np.pi / TAPS
     between = r.radius * radii * np.stack([np.cos(turns), np.sin(turns)])
     met = np.isfinite(_offsets(r, finger, near, INWARD * between))

@@ -3,12 +3,14 @@
 """Samples of the surface of many patches, each with its share of the area, and the indicator of these."""
 
 from collections.abc import Generator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
+from ..steps import chunked
 from .charts import STEEPEST, Charts
 from .field import facing_alike, node_weights, weights_of
 from .indicator import LAYERS, Indicator, solved
@@ -68,20 +70,12 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     half = charts.rims.max(axis=1)
     across = np.maximum(ACROSS, np.ceil(2.0 * half * charts.radii / pitch).astype(np.intp))
     node, x, y, middle, group = yield from _spread(charts, half, across)
-    parts = []
-    for start in range(0, len(middle), SAMPLES_AT_ONCE):
-        few = middle[start : start + SAMPLES_AT_ONCE]
-        parts.append(_others(charts, node[few], x[few], y[few]))
-        yield 0.0
-    others, thickness = (np.concatenate(values)[group] for values in zip(*parts, strict=True))
-    flat, found = (2.0 * half * charts.radii / across) ** 2, []
-    for start in range(0, len(node), SAMPLES_AT_ONCE):
-        some = slice(start, start + SAMPLES_AT_ONCE)
-        found.append(
-            _samples(charts, node[some], x[some], y[some], flat[node[some]], others[some], thickness[some])
-        )
-        yield 0.0
-    return Samples(*(np.concatenate(values) for values in zip(*found, strict=True)))
+    others, thickness = yield from chunked(
+        partial(_others, charts), SAMPLES_AT_ONCE, 0.0, node[middle], x[middle], y[middle]
+    )
+    flat = ((2.0 * half * charts.radii / across) ** 2)[node]
+    each = node, x, y, flat, others[group], thickness[group]
+    return Samples._make((yield from chunked(partial(_samples, charts), SAMPLES_AT_ONCE, 0.0, *each)))
 
 
 def _spread(

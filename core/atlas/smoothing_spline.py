@@ -10,7 +10,7 @@ weigh as under a Student t distribution. Equations are banded, however many cont
 radius.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from math import comb
 from typing import Any, NamedTuple
@@ -138,7 +138,7 @@ def _equations(columns: Sequence[_Columns], weights: Sequence[Array]) -> _Equati
         for some, w in zip(columns, weights, strict=True)
     ]
     bands, *others = (np.array(values) for values in zip(*sums, strict=True))
-    return _Equations(np.vstack([*(_penalty(order)[0] for order in ROUGHNESS), bands]), *others)
+    return _Equations(np.vstack([*(penalty(order)[0] for order in ROUGHNESS), bands]), *others)
 
 
 def _ascended(
@@ -162,7 +162,7 @@ def _ascended(
 def _solved(equations: _Equations, hyperparameters: _Hyperparameters, half: float) -> _Solution:
     from scipy.linalg import cholesky_banded
 
-    _, log_determinant, log_free = _penalty(hyperparameters.order)
+    _, log_determinant, log_free = penalty(hyperparameters.order)
     pitch, free = 2.0 * half / (SIDE - 1), hyperparameters.order * (hyperparameters.order + 1) // 2
     precision = pitch ** (2 - 2 * hyperparameters.order) / hyperparameters.roughness**2
     neg2_log_evidence = -log_determinant - (SIDE**2 - free) * np.log(precision)
@@ -228,15 +228,8 @@ def _heights_at_coarse_knots() -> Array:
     return found
 
 
-def preparing() -> Iterator[None]:
-    """Finds in steps what all splines have in common; without it the first spline takes ten times as long."""
-    for order in ROUGHNESS:
-        _penalty(order)
-        yield
-
-
 @cache
-def _penalty(order: int) -> tuple[Array, float, float]:
+def penalty(order: int) -> tuple[Array, float, float]:
     """The sum of squares of all derivatives of an order, by differences, for knots at distance 1.
 
     Returns its band; the log of the product of its eigenvalues above 0; and the log of the volume that the

@@ -121,8 +121,7 @@ def evened(vertices: Array, normal: Array, triangles: Indices) -> Array:
     move = links @ vertices / np.maximum(counts, 1.0)[:, None] - vertices
     move -= np.einsum("ni,ni->n", move, normal)[:, None] * normal
     move[border | (counts == 0.0)] = 0.0
-    moved: Array = vertices + SMOOTHING_SHARE * move
-    return moved
+    return vertices + SMOOTHING_SHARE * move
 
 
 def sides_of(triangles: Indices, count: int) -> Indices:

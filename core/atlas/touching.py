@@ -188,7 +188,6 @@ class _Run:
 
     def now(self, joining: float | None = None, new: Sequence[Exploration] = ()) -> Progress:
         """The Progress so far, with the new touches."""
-        assert self.frontier.charts is not None
         rims = (self.frontier.charts.rims * self.frontier.charts.radii[:, None])[-len(new) :] if new else ()
         return Progress(self.done, len(self.frontier.queue), tuple(new), joining, tuple(rims))
 
@@ -219,7 +218,6 @@ class _Run:
 
     def joining(self, earlier: dict[int, tuple[int, Table]]) -> Generator[float, None, Charts]:
         """The joined patches; yields the share that is done."""
-        assert self.frontier.charts is not None
         contours = [[*e.contours, taps] for e, taps in zip(self.found, self.frontier.taps, strict=True)]
         results = [e.result for e in self.found]
         yield 0.0
@@ -239,9 +237,11 @@ class _Run:
         starts, aims, facing, length = rays_at(reference)
         yield 1.0
         ways = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
-        found, missed, at_random = [], [], 0
+        found, missed, at_random, met = [], [], 0, self.frontier.finger.met
         for i, (start, way, aim) in enumerate(zip(starts, ways, aims, strict=True)):
-            contact = self._met(start, vector_of(way), length)
+            # Between faces of a mesh a ray may slip through, but not a hair aside.
+            near = (vector_of(start + aside) for aside in (0.0, HAIR * self.tolerance))
+            contact = next(filter(None, (met(p, vector_of(way), length) for p in near)), None)
             if contact is not None:
                 found.append(contact)
                 at_random += i < CHECKS
@@ -249,12 +249,6 @@ class _Run:
                 missed.append(aim)
         points, normals = np.array(found).reshape(-1, 2, 3).transpose(1, 0, 2)
         return Check(points, normals, np.array(missed).reshape(-1, 3), at_random)
-
-    def _met(self, start: Array, way: Vector, length: float) -> tuple[Vector, Vector] | None:
-        """The first contact of a ray: between faces of a mesh it may slip through, but not a hair aside."""
-        met = self.frontier.finger.met
-        aside = vector_of(start + HAIR * self.tolerance)
-        return met(vector_of(start), way, length) or met(aside, way, length)
 
     def atlas(
         self, earlier: dict[int, tuple[int, Table]]
@@ -292,7 +286,6 @@ class _Run:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
         left, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
         found: list[Contact] = []
-        assert self.frontier.charts is not None
         while len(left):
             worst = left[np.argmax(mesh.std[left])]
             point, normal = vector_of(mesh.vertices[worst]), vector_of(normals[worst])
@@ -380,5 +373,4 @@ def explore_object(
                 more, shown = progress(state.done, state.uncovered), state.done
             state = steps.send(more)
     except StopIteration as end:
-        atlas: Atlas = end.value
-        return atlas
+        return end.value

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..contours.contour import tangent_of, vector_of
+from ..triangles import normalized, triangle_cross
 from .charts import Charts
 from .frontier import Place
 from .meshing import Mesh
@@ -41,8 +42,7 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[Place, .
     while len(left):
         best = left[np.argmax(gains[left])]
         point, up = rim[best], ups[best]
-        ahead = point - charts.origins[patch[best]]
-        ahead = ahead / max(float(np.linalg.norm(ahead)), np.finfo(float).tiny)
+        ahead = normalized(point - charts.origins[patch[best]])
         if not ahead.any() or abs(ahead @ up) > STEEP:
             ahead = np.array(tangent_of(vector_of(up), None))
         ahead = np.cross(up, np.cross(ahead, up))
@@ -54,7 +54,5 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[Place, .
 
 def _areas(mesh: Mesh) -> Array:
     """The area (n,) of each vertex, a third of that of its triangles."""
-    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
-    areas = np.repeat(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0, 3)
-    found: Array = np.bincount(mesh.triangles.ravel(), areas, len(mesh.vertices)).astype(np.float64)
-    return found
+    areas = np.repeat(np.linalg.norm(triangle_cross(mesh.vertices[mesh.triangles]), axis=1) / 6.0, 3)
+    return np.bincount(mesh.triangles.ravel(), areas, len(mesh.vertices)).astype(np.float64)

@@ -106,7 +106,7 @@ def dense_neg2_log_evidence(contacts, order, roughness, noise):
     knots, basis = bases(contacts[:, 0], contacts[:, 1], HALF)
     rows = np.zeros((len(contacts), SIDE**2))
     np.add.at(rows, (np.arange(len(contacts))[:, None], knots), basis[0])
-    band, pitch = splines._penalty(order)[0].reshape(SIDE**2, -1), 2.0 * HALF / (SIDE - 1)
+    band, pitch = splines.penalty(order)[0].reshape(SIDE**2, -1), 2.0 * HALF / (SIDE - 1)
     penalty = np.zeros((SIDE**2, SIDE**2))
     for i, diagonal in enumerate(band.T):
         penalty += np.diag(diagonal[: SIDE**2 - i], -i)

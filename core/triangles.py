@@ -1,0 +1,28 @@
+# SPDX-FileCopyrightText: 2026 Tactile Patch contributors
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows of vectors and of triangles."""
+
+import numpy as np
+
+from .arguments import Array
+
+LEAST_DIVISOR = 1e-300  # No vector is divided by less.
+
+
+def row_dot(u: Array, v: Array) -> Array:
+    """The dot products (...) of vectors (..., 3)."""
+    return np.einsum("...i,...i->...", u, v)
+
+
+def normalized(vectors: Array) -> Array:
+    """The vectors (..., 3) scaled to length 1; 0 stays 0."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), LEAST_DIVISOR)
+
+
+def triangle_cross(triangles: Array) -> Array:
+    """The cross products (..., 3) of two sides of triangles (..., 3, 3).
+
+    They are normal to the triangles, and their lengths are twice the areas.
+    """
+    a, b, c = np.moveaxis(triangles, -2, 0)
+    return np.cross(b - a, c - a)
