@@ -7,8 +7,13 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, TypedDict
 
+import numpy as np
+
 from ... import core
 from .types import Array
+
+SURFACE_STOPS = (core.CREASE, core.NO_CONTACT, core.NOT_MONGE)  # The surface itself ends a curve in these ways.
+AT_POINT = 1e-6  # A half curve that is shorter than this share of the radius ends at the point.
 
 
 class FrameReport(TypedDict):
@@ -128,6 +133,16 @@ def early_ends(contours: Sequence[core.Contour]) -> str:
     return f" {_counted(counts.most_common(), 2 * len(contours))}, before the extent."
 
 
+def stops_at(contours: Sequence[core.Contour], point: Array, reach: float = 0.0) -> list[str]:
+    """Why half curves end at the point already, within `reach`; it is then on a crease or an edge."""
+    return [
+        stop
+        for contour in contours
+        for end, stop in zip((0, -1), contour.stops or (), strict=False)
+        if stop in SURFACE_STOPS and np.linalg.norm(contour.points[end] - point) <= reach
+    ]
+
+
 def _counted(counts: list[tuple[str, int]], total: int) -> str:
     (most, first), *others = [(count, core.WHERE[stop]) for stop, count in counts]
     return ", ".join(
@@ -139,9 +154,18 @@ def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: b
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
     few_facets : see core.has_few_facets
+
+    On a crease or an edge a patch may fit one side. A stability map has none there, so it is in doubt.
     """
     status, message = core.judged_by_mesh(result, mean)
     message += ended if message == result.message else ""
+    if stops := stops_at(result.contours, result.frame.origin, AT_POINT * result.radius):
+        status = "uncertain" if status == "ok" else status
+        where = core.WHERE[Counter(stops).most_common(1)[0][0]]
+        message = (
+            f"The point is {where}, so half curves end there at once: move the point away from that edge. "
+            f"{message}"
+        )
     if not few_facets:
         return {"status": status, "message": message}
     return {
