@@ -12,7 +12,8 @@ import numpy as np
 from ... import core
 from .types import Array
 
-SURFACE_STOPS = (core.CREASE, core.NO_CONTACT, core.NOT_MONGE)  # The surface itself ends a curve in these ways.
+# The surface itself ends a curve in these ways.
+SURFACE_STOPS = (core.CREASE, core.NO_CONTACT, core.NOT_MONGE)
 AT_POINT = 1e-6  # A half curve that is shorter than this share of the radius ends at the point.
 
 
