@@ -23,6 +23,8 @@ SHARES = (0.005, 0.01, 0.02, 0.05)  # The bands, as shares of the radius of a pa
 NORMAL_SHARES = ((1.0, 0.68), (2.0, 0.95), (3.0, 0.997))
 LEAST_RANGE = 1e-12
 WORDS = {"most": "most touches"}  # Settings whose names are no words.
+CHOSEN = ("spacing", "extent", "step")  # Of these lengths, 0 has the surface choose.
+LENGTHS = (*CHOSEN, "tolerance", "noise")
 MANIFEST = Path(__file__).resolve().parents[2] / "blender_manifest.toml"
 
 
@@ -74,13 +76,15 @@ def label(power: int, unit: Unit) -> Callable[[float], str]:
 
 def _settings(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     names = ("method", "degree", "tolerance", "most", "spacing", "extent", "step", "noise", "seed")
-    rows = [
-        (WORDS.get(name, name), f"{record[name]:.4g}" if isinstance(record[name], float) else record[name])
-        for name in names
-        if name in record
-    ]
+    rows = [(WORDS.get(name, name), _setting(name, record[name])) for name in names if name in record]
     planes = [f"{azimuth:.0f}° leaning {tilt:.0f}°" for azimuth, tilt in record.get("planes", ())]
     return [*rows, *([("planes", ", ".join(planes))] if planes else [])]
+
+
+def _setting(name: str, value: Any) -> str:
+    if name in CHOSEN and not value:
+        return "auto"
+    return units.length(value) if name in LENGTHS else str(value)
 
 
 def _versions() -> list[tuple[str, str]]:

@@ -16,6 +16,7 @@ from ..touch.arrays import read_array
 from ..touch.detached_mesh import DetachedMesh
 from ..touch.evaluated_mesh import evaluated_object, size_of
 from ..touch.touch_object import FARTHEST_SHARE, LEAST_STEPS, require_fine, require_lengths
+from ..touch.touch_report import stops_at
 from ..touch.types import Array, Object
 from ..touch.units import length
 
@@ -147,7 +148,7 @@ class StabilityMap:
         for number, vertex, touch in zip(numbers, chosen, found, strict=True):
             if isinstance(touch, ValueError):
                 self.reason[number] = self._why_none(vertex)
-            elif ended := _ended(touch.contours, surface.points[vertex]):
+            elif ended := stops_at(touch.contours, surface.points[vertex]):
                 self.reason[number] = _reason_of(ended)
             else:
                 self._note(number, touch)
@@ -161,7 +162,7 @@ class StabilityMap:
         except ValueError:  # The settings are valid, so a face there has no area.
             return REASON_KEYS.index("nothing")
         shortest = min(contours, key=lambda contour: len(contour.points))
-        return _reason_of(_ended(contours, point) or shortest.stops)
+        return _reason_of(stops_at(contours, point) or shortest.stops)
 
     def _note(self, number: int, touch: core.Exploration) -> None:
         result, surface = touch.result, self.surface
@@ -197,16 +198,6 @@ class StabilityMap:
         report |= {name: getattr(self, name) for name in names} | self.fit
         angles = [(plane.azimuth, plane.tilt) for plane in self.planes]
         return report | {"planes": np.degrees(angles).tolist()}
-
-
-def _ended(contours: Sequence[core.Contour], point: Array) -> list[str]:
-    """The stops of curves that end at the point already, which is then on a crease or an edge."""
-    return [
-        stop
-        for contour in contours
-        for end, stop in zip((0, -1), contour.stops, strict=True)
-        if stop in STOP_CODES and np.array_equal(contour.points[end], point)
-    ]
 
 
 def _reason_of(stops: Iterable[str]) -> int:

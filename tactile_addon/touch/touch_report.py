@@ -7,8 +7,14 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, TypedDict
 
+import numpy as np
+
 from ... import core
 from .types import Array
+
+# The surface itself ends a curve in these ways.
+SURFACE_STOPS = (core.CREASE, core.NO_CONTACT, core.NOT_MONGE)
+AT_POINT = 1e-6  # A half curve that is shorter than this share of the radius ends at the point.
 
 
 class FrameReport(TypedDict):
@@ -126,13 +132,32 @@ def ends(contours: Sequence[core.Contour], has_extent: bool) -> str:
     return f" {', '.join(words)}{', before the extent' if has_extent else ''}."
 
 
+def stops_at(contours: Sequence[core.Contour], point: Array, reach: float = 0.0) -> list[str]:
+    """Why half curves end at the point already, within `reach`; it is then on a crease or an edge."""
+    return [
+        stop
+        for contour in contours
+        for end, stop in zip((0, -1), contour.stops or (), strict=False)
+        if stop in SURFACE_STOPS and np.linalg.norm(contour.points[end] - point) <= reach
+    ]
+
+
 def judgment(result: core.Reconstruction, mean: float, ended: str, few_facets: bool = False) -> TouchReport:
     """Status and message, see core.judged_by_mesh; `ended` is added to the fit's own message.
 
     few_facets : see core.has_few_facets
+
+    On a crease or an edge a patch may fit one side. A stability map has none there, so it is in doubt.
     """
     status, message = core.judged_by_mesh(result, mean)
     message += ended if message == result.message else ""
+    if stops := stops_at(result.contours, result.frame.origin, AT_POINT * result.radius):
+        status = "uncertain" if status == "ok" else status
+        where = core.WHERE[Counter(stops).most_common(1)[0][0]]
+        message = (
+            f"The point is {where}, so half curves end there at once: move the point away from that edge. "
+            f"{message}"
+        )
     if not few_facets:
         return {"status": status, "message": message}
     return {

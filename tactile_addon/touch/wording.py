@@ -15,6 +15,7 @@ from .units import Unit, known, length, say, unit_of
 
 SPREAD = ("mean", "median", "max", "rms")
 FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")  # Spreadsheets run text that begins with one of these.
+ROUNDING = 1e-6  # A component below this share of the largest is what single precision leaves of 0.
 EARLY = ("edge", "crease", "turns away")  # These end a curve early.
 
 
@@ -177,7 +178,10 @@ def _suggestion(plane: SuggestedPlane, unit: Unit) -> str:
 
 
 def vector(v: Iterable[float]) -> str:
-    return " ".join(f"{x:.5g}" for x in v)
+    """Components in words; those that are only rounding beside the largest are 0."""
+    components = list(v)
+    rounding = ROUNDING * max(map(abs, components))
+    return " ".join(f"{x if abs(x) > rounding else 0.0:.5g}" for x in components)
 
 
 def _measured(report: Mapping[str, Any], key: str, power: int, unit: Unit) -> str:

@@ -160,6 +160,37 @@ def test_a_cube_has_patches_on_its_faces_and_none_on_its_edges(empty):
     assert record["refused"]["crease"] == np.count_nonzero(on_edge)
 
 
+@pytest.mark.parametrize(("shape", "extent"), [("cube", 0.25), ("grid", 0.25), ("grid", 0.0)])
+def test_a_probe_is_in_doubt_where_the_map_has_no_patch(empty, shape, extent):
+    if shape == "cube":
+        empty.ops.mesh.primitive_cube_add(size=2.0)
+        edited(empty, number_cuts=9)
+    else:
+        grid(empty, 20)
+    target = empty.context.object
+    painted, _ = stability_map(empty, spacing=0.2, extent=extent)
+    reasons, touched = (values(painted.data, name) for name in ("reason", "is_touched"))
+    for refused, places in ((True, reasons >= CREASE), (False, reasons == PATCH)):
+        for index in np.flatnonzero(touched.astype(bool) & places)[:8]:
+            vertex, record = painted.data.vertices[index], None
+            empty.context.view_layer.objects.active = target
+            try:
+                record = made(
+                    empty.ops.tactile.pick,
+                    "tactile",
+                    target=target.name,
+                    location=vertex.co,
+                    outward=vertex.normal,
+                    extent=extent,
+                    new=True,
+                )[1]
+            except RuntimeError:
+                assert refused
+                continue
+            assert (record["status"] != "ok") == refused, record["message"]
+            assert refused == record["message"].startswith("The point is at a")
+
+
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_what_is_refused_has_no_value_and_a_color_of_its_own(empty, name):
     empty.ops.mesh.primitive_cube_add(size=2.0)

@@ -234,6 +234,10 @@ def test_where_a_few_normals_contradict_each_other_the_surface_is_in_doubt():
     assert "around (" in atlas.message and "contradict each other" in atlas.message
 
 
+def test_no_places_have_no_distances():
+    assert [values.shape for values in ball_atlas().distance(np.empty((0, 3)))] == [(0,), (0,)]
+
+
 def test_three_curves_of_one_patch_are_uncertain():
     solid = solids.ball()
     planes = [core.SamplingPlane(a) for a in np.radians([0, 60, 120])]
