@@ -226,8 +226,7 @@ def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Ar
 def _mean_at(indicator: Indicator, points: Array, size: float) -> Array:
     """The mean of the indicator at the corners of cubes of a length around points (n, 3), (n,)."""
     corners = size * (np.array(list(np.ndindex(2, 2, 2))) - 0.5) if size else np.zeros((1, 3))
-    found: Array = np.mean([indicator.at(points + corner) for corner in corners], axis=0)
-    return found
+    return np.mean([indicator.at(points + corner) for corner in corners], axis=0)
 
 
 def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]:

@@ -225,8 +225,7 @@ def _regions(tree: Any, n: int) -> Indices:
         if a != b and min(sizes[a], sizes[b]) < SMALL * n:
             first[max(a, b)] = min(a, b)
             sizes[min(a, b)] = sizes[a] + sizes[b]
-    found: Indices = np.unique([of(one) for one in range(count)], return_inverse=True)[1][region]
-    return found
+    return np.unique([of(one) for one in range(count)], return_inverse=True)[1][region]
 
 
 def _flips(points: Array, normals: Array, areas: Array, region: Indices) -> tuple[Array, float]:

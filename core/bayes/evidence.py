@@ -77,8 +77,7 @@ def noise_grid(heights: Array, counts: Array, floor: Array) -> Array:
     np.einsum("bii->bi", bordered)[:] += ROUNDING * np.einsum("bii->b", bordered)[:, None]  # a view
     left = np.linalg.cholesky(bordered)[:, -1, -1]  # the root of the sum of squares
     largest = 2.0 + 3.0 / floor * left / np.sqrt(counts)
-    found: Array = floor[:, None] * largest[:, None] ** np.linspace(0.0, 1.0, NOISES)
-    return found
+    return floor[:, None] * largest[:, None] ** np.linspace(0.0, 1.0, NOISES)
 
 
 def hyperparameters(heights: Array, counts: Array, slopes: Array | None, floor: Array) -> Hyperparameters:

@@ -85,8 +85,7 @@ def derived_kernel(p: Array, places: Array, variances: Array, weights: Array) ->
 def kernel_slopes(p: Array, places: Array, variances: Array) -> Array:
     """Derivatives of k(p, places) by p at points (n, 2), (2, n, m)."""
     each = zip(variances, LENGTHS, strict=True)
-    found: Array = sum(v * _derived_matern(p[:, None] - places, length)[1:3] for v, length in each)
-    return found
+    return sum(v * _derived_matern(p[:, None] - places, length)[1:3] for v, length in each)
 
 
 def _derived_matern(apart: Array, length: float) -> Array:

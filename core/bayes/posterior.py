@@ -98,8 +98,7 @@ class SurfacePosterior(HeightField):
         """The heights (b, n) of contacts (b, n, 3) above b polynomials."""
         basis = monomials(contacts[..., 0].ravel(), contacts[..., 1].ravel(), TERMS)
         basis = basis.reshape(*contacts.shape[:2], -1)
-        residuals: Array = contacts[..., 2] - (basis @ self.mean[..., None])[..., 0]
-        return residuals
+        return contacts[..., 2] - (basis @ self.mean[..., None])[..., 0]
 
     # What follows is for a single posterior, not for a stack.
 
@@ -206,8 +205,7 @@ class SurfacePosterior(HeightField):
         within = kernel(self.places, at, self.variances) @ weights.T
         known, left = self._whitened_sums(_projected_terms().T, weights.sum(axis=1), within)
         own = sum(map(np.multiply, self.variances, _projected_kernels(tuple(process.LENGTHS))))
-        covariance: Array = own + left.T @ left - known.T @ known
-        return covariance
+        return own + left.T @ left - known.T @ known
 
     def patch(self, degree: int) -> MongePatch:
         """The patch (1) of this degree that has the mean's curvatures and is nearest to it over the disk."""
@@ -288,8 +286,7 @@ def _turn(angle: Array) -> Array:
     (parts, from_complex), angles = _complex_terms(), np.asarray(angle)[..., None]
     rotated = from_complex * np.exp(angles * WINDING)[..., None, :]
     # Only the real part of the product is needed, so real matrices suffice.
-    turn: Array = np.concatenate([rotated.real, rotated.imag], axis=-1) @ parts
-    return turn
+    return np.concatenate([rotated.real, rotated.imag], axis=-1) @ parts
 
 
 @cache

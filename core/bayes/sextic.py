@@ -45,8 +45,7 @@ class Sextics(NamedTuple):
 
     def residuals(self, coefficients: Array) -> Array:
         """What the coefficients (b, 27) do not explain of the heights, (b, n)."""
-        residuals: Array = self.rows[:, -1] - (coefficients[:, None] @ self.rows[:, :-1])[:, 0]
-        return residuals
+        return self.rows[:, -1] - (coefficients[:, None] @ self.rows[:, :-1])[:, 0]
 
     def equations(self, noise: Array) -> Array:
         """What contacts and normals add to the precision and to its product with the mean, (b, 28, 28)."""
@@ -126,8 +125,7 @@ def _visibility(gram: Array) -> Array:
     diagonal = np.einsum("bii->bi", gram)  # a view
     # What is added exceeds what rounding takes from directions that no contact shows, and is far below noise.
     diagonal += ROUNDING * diagonal.sum(axis=1)[:, None]
-    found: Array = PRIOR_SCALE * np.linalg.cholesky(gram)[:, FREE:, FREE:].transpose(0, 2, 1)
-    return found
+    return PRIOR_SCALE * np.linalg.cholesky(gram)[:, FREE:, FREE:].transpose(0, 2, 1)
 
 
 def _with_prior(precision: Array, prior: Array) -> Array:

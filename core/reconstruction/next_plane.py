@@ -67,8 +67,7 @@ def _lost(
     directions = np.column_stack([np.cos(azimuths), np.sin(azimuths)])
     shared, covariance = covariances(np.linspace(-1.0, 1.0, count)[:, None] * directions[:, None])
     covariance += noise * np.eye(count)
-    lost: Array = np.einsum("kin,kin->kn", shared, np.linalg.solve(covariance, shared))
-    return lost
+    return np.einsum("kin,kin->kn", shared, np.linalg.solve(covariance, shared))
 
 
 def azimuth_of(direction: ArrayLike, normal: ArrayLike, tangent: ArrayLike | None = None) -> float:

@@ -187,8 +187,7 @@ class Reconstruction:
     @property
     def normal(self) -> Array:
         """The outward unit normal at the point, (3,)."""
-        normal: Array = self.frame.axes[:, 2]
-        return normal
+        return self.frame.axes[:, 2]
 
     @property
     def k1_std(self) -> float:

@@ -187,8 +187,7 @@ def toward_farthest(points: Array) -> Array:
     """The unit vector (k,) to the farthest of points (n, k), the first of those that are equally far."""
     distances = np.sqrt(np.einsum("ni,ni->n", points, points))
     reach = max(float(distances.max()), 1e-300)
-    found: Array = points[np.argmax((distances / reach).round(DECIMALS))] / reach
-    return found
+    return points[np.argmax((distances / reach).round(DECIMALS))] / reach
 
 
 def _farthest(distances: Array) -> float:
@@ -221,5 +220,4 @@ def _quadric(local: Array) -> Array | None:
     u, singular, v = np.linalg.svd(basis, full_matrices=False)
     if singular[-1] < DETERMINED * math.sqrt(len(basis)):
         return None
-    found: Array = v.T @ ((u.T @ local[:, 2]) / singular)
-    return found
+    return v.T @ ((u.T @ local[:, 2]) / singular)
