@@ -178,7 +178,7 @@ def agreeing(thing, atlas):
         """Normals (n, 3) of the joined surface near points (n, 3): the field's, or those of the mesh."""
         up, inside = atlas.reference.normals[atlas.reference.feet(at)[1]], atlas.reference.indicator
         found = surface_at(atlas.charts, inside, at, up, BAND * inside.cell)
-        return np.where(found.node[:, None] < 0, up, found.normal)
+        return np.where(found.patch[:, None] < 0, up, found.normal)
 
     some = points[np.random.default_rng(0).permutation(len(points))[:POINTS]]
     up = surface(some)

@@ -64,21 +64,21 @@ class Ties:
     """Within this context, the choices that were made while another place would bring as much."""
 
     def __enter__(self):
-        self.count, self.taking = 0, Frontier.taking
-        ties, taking = self, Frontier.taking
+        self.count, self.next_touches = 0, Frontier.next_touches
+        ties, next_touches = self, Frontier.next_touches
 
         def counted(frontier, count):
-            found = yield from taking(frontier, count)
+            found = yield from next_touches(frontier, count)
             gains = np.array([*(touch.gain for touch in found), *(-entry[0] for entry in frontier.queue)])
             for touch in found:
                 ties.count += int(np.sum(np.abs(gains - touch.gain) <= TIE * touch.gain) > 1)
             return found
 
-        Frontier.taking = counted
+        Frontier.next_touches = counted
         return self
 
     def __exit__(self, *_):
-        Frontier.taking = self.taking
+        Frontier.next_touches = self.next_touches
 
 
 def whole(thing, points, distances):

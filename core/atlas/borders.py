@@ -166,7 +166,7 @@ def _corners(places: Array, before: Indices, after: Indices, edge: float) -> tup
     return np.where(meet[:, None], corners, a), meet
 
 
-def bordered(mesh: Mesh, border: Border) -> Mesh:
+def snapped_to_border(mesh: Mesh, border: Border) -> Mesh:
     """The mesh with the vertices of its border on that of the surface.
 
     What is beyond that is left out first, so that vertices only move outward and no triangle folds over.

@@ -16,7 +16,7 @@ from ..patch.monge import TERMS, derived_monomials
 from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import polynomial_dict
 from .charts import MARGIN, Charts
-from .field import LAYER, least_of, node_weights
+from .field import LAYER, argmin_per_point, node_weights
 from .finger import FACING
 
 # Boundaries are looked for on this many rays from each patch's middle, at this many places.
@@ -120,12 +120,12 @@ def _crossings(
     points, normals = charts.world(np.full(RAYS * RAY_PLACES, node), *xy.reshape(-1, 2).T)
     pairs = charts.pairs(points)
     weights = node_weights(charts, pairs)
-    cosine = np.einsum("mi,mi->m", pairs.normal, normals[pairs.place])
-    same_sheet = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]) & (cosine > FACING)
-    own = pairs.node == node
-    mine = np.bincount(pairs.place[own], weights[own], len(points))
+    cosine = np.einsum("mi,mi->m", pairs.normal, normals[pairs.point_index])
+    same_sheet = (np.abs(pairs.distance) < LAYER * charts.radii[pairs.patch]) & (cosine > FACING)
+    own = pairs.patch == node
+    mine = np.bincount(pairs.point_index[own], weights[own], len(points))
     others = np.where(same_sheet & ~own, weights, 0.0)
-    which = least_of(pairs.place, -others, len(points))
+    which = argmin_per_point(pairs.point_index, -others, len(points))
     best = np.append(others, 0.0)[which]
     ratio = np.log(np.maximum(best, 1e-300)) - np.log(np.maximum(mine, 1e-300))
     ratio = ratio.reshape(RAYS, RAY_PLACES)
@@ -139,4 +139,4 @@ def _crossings(
     flat = (1.0 - share)[:, None] * xy[ray, before] + share[:, None] * xy[ray, at]
     point, _ = charts.world(np.full(len(ray), node), *flat.T)
     angle = np.arccos(np.clip(cosine[which[place]], -1.0, 1.0))
-    return np.full(len(ray), node), pairs.node[which[place]], ray, point, angle
+    return np.full(len(ray), node), pairs.patch[which[place]], ray, point, angle

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from ..triangles import normalized, row_dot
-from .cubic_spline import CUBIC, SIDE, cubics, weights_at
+from .cubic_spline import CUBIC, SIDE, bspline_weights, cubics
 
 # python -m benchmarks.atlas judges these.
 MARGIN = 1.12  # A patch counts to this share of its domain's radius: beside a crease it ends a step early.
@@ -33,15 +33,15 @@ CHUNK = 24_000  # This many pairs of a place and a patch fit into the processor'
 class Pairs(NamedTuple):
     """Patches near places: m pairs of a place and a patch, sorted by place.
 
-    place, node : (m,), indices
+    point_index, patch : (m,), indices
     rho : (m,), how far out the foot of the place is, as a share of the domain's radius there
     distance : (m,), signed distance of the place from the patch
     normal : (m, 3), unit normal of the patch at the foot
     std : (m,), standard deviation of the distance
     """
 
-    place: NDArray[np.intp]
-    node: NDArray[np.intp]
+    point_index: NDArray[np.intp]
+    patch: NDArray[np.intp]
     rho: Array
     distance: Array
     normal: Array
@@ -76,10 +76,12 @@ class Charts:
         margin : how far out a patch counts, as a share of its domain's radius
         """
         reach = np.minimum(REACH, near / self.radii)
-        found = [self._pairs_at(points, reach, margin, *some) for some in self._near(points, reach, margin)]
+        found = [
+            self._pairs_at(points, reach, margin, *some) for some in self.candidates(points, reach, margin)
+        ]
         return Pairs(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
-    def _near(
+    def candidates(
         self, points: Array, reach: Array, margin: float
     ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Pairs of places and patches that may be within reach, sorted by place, about CHUNK at once."""
@@ -91,20 +93,20 @@ class Charts:
             some = points[start : start + rows]
             low, high = some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)
             beside = self.origins - np.minimum(np.maximum(self.origins, low), high)
-            node = np.flatnonzero(np.einsum("ni,ni->n", beside, beside) < reaches**2)
-            place, which = np.nonzero(cdist(some, self.origins[node], "sqeuclidean") < reaches[node] ** 2)
-            yield start + place, node[which]
+            patch = np.flatnonzero(np.einsum("ni,ni->n", beside, beside) < reaches**2)
+            place, which = np.nonzero(cdist(some, self.origins[patch], "sqeuclidean") < reaches[patch] ** 2)
+            yield start + place, patch[which]
 
     @cached_property
     def _extents(self) -> Array:
         """How far patches go across and along their normals, (2, n), in unit radius."""
         return np.array([self.rims.max(axis=1), np.abs(self.heights).max(axis=(1, 2)).clip(max=1.5)])
 
-    def local(self, points: Array, place: NDArray[np.intp], node: NDArray[np.intp]) -> Array:
+    def local(self, points: Array, place: NDArray[np.intp], patch: NDArray[np.intp]) -> Array:
         """Places in the frames of patches and in unit radius, (3, m)."""
         origins, axes = self._frames
-        off = points.T.take(place, axis=1) - origins.take(node, axis=1)
-        return np.einsum("im,ijm->jm", off, axes.take(node, axis=2))
+        off = points.T.take(place, axis=1) - origins.take(patch, axis=1)
+        return np.einsum("im,ijm->jm", off, axes.take(patch, axis=2))
 
     @cached_property
     def _frames(self) -> tuple[Array, Array]:
@@ -112,16 +114,16 @@ class Charts:
         axes = np.moveaxis(self.axes / self.radii[:, None, None], 0, -1)
         return np.ascontiguousarray(self.origins.T), np.ascontiguousarray(axes)
 
-    def shares(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
+    def shares(self, x: Array, y: Array, patch: NDArray[np.intp]) -> Array:
         """How far out local (x, y) are, as shares (m,) of the domain's radius; smooth in the azimuth."""
         at = np.arctan2(y, x) * (AZIMUTHS / (2.0 * np.pi)) + 0.5 * AZIMUTHS
         first = at.astype(np.intp)
-        four = self._all_around.take(node * (AZIMUTHS + 4) + first + np.arange(4)[:, None])
+        four = self._padded_rims.take(patch * (AZIMUTHS + 4) + first + np.arange(4)[:, None])
         radius = np.einsum("km,km->m", four, cubics(CATMULL_ROM, at - first))
         return np.sqrt(x * x + y * y) / np.maximum(radius, 1e-6)
 
     @cached_property
-    def _all_around(self) -> Array:
+    def _padded_rims(self) -> Array:
         """The radii of domains from azimuth -pi to pi, and one before and two more after these."""
         around = np.arange(-1, AZIMUTHS + 3) - AZIMUTHS // 2
         return np.take(self.rims, around, axis=1, mode="wrap").ravel()
@@ -132,42 +134,42 @@ class Charts:
         reach: Array,
         margin: float,
         place: NDArray[np.intp],
-        node: NDArray[np.intp],
+        patch: NDArray[np.intp],
     ) -> Pairs:
         """Those of these pairs that are within reach (n,), measured from the tangent plane at each foot."""
-        x, y, z = self.local(points, place, node)
+        x, y, z = self.local(points, place, patch)
         across, along = self._extents
         across, along = margin * across + reach, along + reach
-        which = np.flatnonzero((x * x + y * y < across[node] ** 2) & (np.abs(z) < along[node]))
-        which = which[self.shares(x[which], y[which], node[which]) < (margin + reach)[node[which]]]
-        place, node, (x, y, z) = place[which], node[which], np.array([x, y, z])[:, which]
-        h, hx, hy = self._heights(x, y, node)
+        which = np.flatnonzero((x * x + y * y < across[patch] ** 2) & (np.abs(z) < along[patch]))
+        which = which[self.shares(x[which], y[which], patch[which]) < (margin + reach)[patch[which]]]
+        place, patch, (x, y, z) = place[which], patch[which], np.array([x, y, z])[:, which]
+        h, hx, hy = self._heights(x, y, patch)
         off = (z - h) / (1.0 + hx**2 + hy**2)
         foot_x, foot_y = x + off * hx, y + off * hy
-        rho = self.shares(foot_x, foot_y, node)
+        rho = self.shares(foot_x, foot_y, patch)
         # The foot of a place on a slope is nearer than the surface below it.
-        inside = (rho < margin) & (np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[node])
+        inside = (rho < margin) & (np.abs(off) * np.sqrt(1.0 + hx**2 + hy**2) < reach[patch])
         which = np.flatnonzero(inside)
-        place, node, rho = place[which], node[which], rho[which]
+        place, patch, rho = place[which], patch[which], rho[which]
         x, y, z, foot_x, foot_y = np.array([x, y, z, foot_x, foot_y])[:, which]
-        h, hx, hy = self._heights(foot_x, foot_y, node)
-        steep, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[node]
+        h, hx, hy = self._heights(foot_x, foot_y, patch)
+        steep, radius = 1.0 / np.sqrt(1.0 + hx**2 + hy**2), self.radii[patch]
         distance = (z - h - hx * (x - foot_x) - hy * (y - foot_y)) * steep
         aside = (x - foot_x) ** 2 + (y - foot_y) ** 2 + (z - h) ** 2 - distance**2
-        std = self.stds_at(foot_x, foot_y, node) * steep
-        normal = self._turned(node, np.array([-hx * steep, -hy * steep, steep]))
-        pairs = Pairs(place, node, rho, distance * radius, normal, std * radius)
-        return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[node]) & (steep > STEEPEST))
+        std = self.stds_at(foot_x, foot_y, patch) * steep
+        normal = self.to_world_directions(patch, np.array([-hx * steep, -hy * steep, steep]))
+        pairs = Pairs(place, patch, rho, distance * radius, normal, std * radius)
+        return pairs.chosen((aside < ASIDE**2) & (np.abs(distance) < reach[patch]) & (steep > STEEPEST))
 
-    def _turned(self, node: NDArray[np.intp], local: Array) -> Array:
+    def to_world_directions(self, patch: NDArray[np.intp], local: Array) -> Array:
         """Directions (3, m) in the frames of patches, as the caller sees them, (m, 3)."""
-        return np.einsum("mij,jm->mi", self.axes[node], local)
+        return np.einsum("mij,jm->mi", self.axes[patch], local)
 
-    def _heights(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
+    def _heights(self, x: Array, y: Array, patch: NDArray[np.intp]) -> Array:
         """Heights, and slopes in x and y, (3, m), at local (x, y)."""
-        pitch = (2.0 * self.halves / (SIDE - 1))[node]
-        (column, row), weights, slopes = weights_at(np.array([x, y]) / pitch)
-        start, steps = (node * SIDE + column - 1) * SIDE + row - 1, np.arange(CUBIC + 1)
+        pitch = (2.0 * self.halves / (SIDE - 1))[patch]
+        (column, row), weights, slopes = bspline_weights(np.array([x, y]) / pitch)
+        start, steps = (patch * SIDE + column - 1) * SIDE + row - 1, np.arange(CUBIC + 1)
         knots = start + (steps[:, None] * SIDE + steps)[:, :, None]
         taps = self.heights.ravel().take(knots)
         across, across_slopes = (np.einsum("ijm,jm->im", taps, by[:, 1]) for by in (weights, slopes))
@@ -179,13 +181,13 @@ class Charts:
             ]
         )
 
-    def stds_at(self, x: Array, y: Array, node: NDArray[np.intp]) -> Array:
+    def stds_at(self, x: Array, y: Array, patch: NDArray[np.intp]) -> Array:
         """Deviations (m,) of the heights at local (x, y), linear between knots."""
-        pitch = (2.0 * self.halves / (SIDE - 1))[node]
+        pitch = (2.0 * self.halves / (SIDE - 1))[patch]
         at = np.clip(np.array([x, y]) / pitch + 0.5 * (SIDE - 1), 0.0, SIDE - 1.0)
         first = np.minimum(at.astype(np.intp), SIDE - 2)
         right, up = at - first
-        start, stds = (node * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
+        start, stds = (patch * SIDE + first[0]) * SIDE + first[1], self.stds.ravel()
         left = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
         start += SIDE
         found: Array = stds.take(start) + up * (stds.take(start + 1) - stds.take(start))
@@ -201,10 +203,10 @@ class Charts:
     def inside(self, share: float) -> NDArray[np.bool_]:
         """Which knots are within this share of the domains' radii, (n, SIDE, SIDE)."""
         x, y = self.knots().reshape(2, -1)
-        node, found = np.repeat(np.arange(len(self.radii)), SIDE**2), np.zeros(len(x), dtype=bool)
+        patch, found = np.repeat(np.arange(len(self.radii)), SIDE**2), np.zeros(len(x), dtype=bool)
         for start in range(0, len(x), CHUNK):
             some = slice(start, start + CHUNK)
-            found[some] = self.shares(x[some], y[some], node[some]) <= share
+            found[some] = self.shares(x[some], y[some], patch[some]) <= share
         return found.reshape(self.heights.shape)
 
     @cached_property
@@ -254,9 +256,11 @@ class Charts:
         ahead = (xy / np.linalg.norm(xy, axis=1, keepdims=True)) @ self.axes[0, :, :2].T
         return points, normals, normalized(ahead - row_dot(ahead, normals)[:, None] * normals)
 
-    def world(self, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
+    def world(self, patch: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
         """Points and normals (m, 3) of patches above local (x, y), which are in unit radius."""
-        h, hx, hy = self._heights(x, y, node)
+        h, hx, hy = self._heights(x, y, patch)
         steep = 1.0 / np.sqrt(1.0 + hx**2 + hy**2)
-        points = self.origins[node] + self._turned(node, np.array([x, y, h]) * self.radii[node])
-        return points, self._turned(node, np.array([-hx * steep, -hy * steep, steep]))
+        points = self.origins[patch] + self.to_world_directions(
+            patch, np.array([x, y, h]) * self.radii[patch]
+        )
+        return points, self.to_world_directions(patch, np.array([-hx * steep, -hy * steep, steep]))

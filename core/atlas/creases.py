@@ -16,7 +16,7 @@ from ..arguments import Array
 from ..steps import chunked
 from ..triangles import normalized
 from .charts import Charts
-from .field import least_of, sheet_facing
+from .field import argmin_per_point, sheet_facing
 from .tetrahedra import Indices, sides_of, split_sides
 
 # python -m benchmarks.atlas judges these.
@@ -29,7 +29,7 @@ SIDES_AT_ONCE = 1000  # A step intersects this many sheets.
 LEAST = 1e-12  # Sheets are parallel below this share of their squared sines.
 
 
-def creased(
+def insert_creases(
     charts: Charts, vertices: Array, triangles: Indices, normals: Array, edge: float
 ) -> Generator[float, None, tuple[Array, Indices, Indices, Array]]:
     """The mesh with vertices on all creases and corners; yields the share that is done.
@@ -116,16 +116,16 @@ def _intersections(
         distance = np.einsum("nki,nki->nk", points[:, None] - places, normals)
         for i in range(count):
             sheet = sheet_facing(charts, points, normals[:, i], near)
-            there = sheet.node >= 0
+            there = sheet.patch >= 0
             felt |= there
             up[there, i], distance[there, i] = sheet.normal[there], sheet.distance[there]
-        steps, apart = _steps(up, distance)
+        steps, apart = _least_norm_steps(up, distance)
         met &= apart
         points += np.where(met[:, None], steps, 0.0)
         met &= np.linalg.norm(points - middle, axis=1) < near
     if count == 3:  # Near a tip the sheets of patches merge, but the planes of the vertices still meet there.
         distance = np.einsum("nki,nki->nk", middle[:, None] - places, normals)
-        steps, apart = _steps(normals, distance)
+        steps, apart = _least_norm_steps(normals, distance)
         tip = ~met & apart & (np.linalg.norm(steps, axis=1) < near)
         points, met, felt = np.where(tip[:, None], middle + steps, points), met | tip, felt & ~tip
     met &= ~_rounded(charts, points, normals, edge)
@@ -140,23 +140,23 @@ def _rounded(charts: Charts, points: Array, normals: Array, edge: float) -> NDAr
     """
     between = normalized(normals.sum(axis=1))
     pairs = charts.pairs(points, edge)
-    toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.place])
-    own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.place]).max(axis=1)
+    toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.point_index])
+    own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.point_index]).max(axis=1)
     rounded = (toward > own) & (pairs.rho < 1.0) & (np.abs(pairs.distance) > ROUND * edge)
-    flat = pairs.chosen(rounded & charts.is_flat[pairs.node])
-    strip = least_of(flat.place, np.abs(flat.distance), len(points))
+    flat = pairs.chosen(rounded & charts.is_flat[pairs.patch])
+    strip = argmin_per_point(flat.point_index, np.abs(flat.distance), len(points))
     some = np.flatnonzero(strip >= 0)
     onto = flat.chosen(strip[some])
     points[some] -= onto.distance[:, None] * onto.normal
     found = np.zeros(len(points), dtype=bool)
-    found[pairs.place[rounded & ~charts.is_flat[pairs.node]]] = True
+    found[pairs.point_index[rounded & ~charts.is_flat[pairs.patch]]] = True
     return found
 
 
-def _steps(normals: Array, distance: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """The shortest steps (n, 3) onto planes with these normals (n, k, 3) at signed distances (n, k).
+def _least_norm_steps(normals: Array, distance: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """The least steps (n, 3) onto k planes, -N' (N N')^-1 d, with normals N (n, k, 3) at distances d (n, k).
 
-    Also whether the planes are turned enough, (n,); those with the normal 0 are none.
+    Also whether each pair of planes is turned by SHARP, (n,).
     """
     gram, count = normals @ np.swapaxes(normals, 1, 2), normals.shape[1]
     apart = np.all([np.abs(gram[:, i, i - 1]) < SHARP * gram[:, i, i] for i in range(count)], axis=0)

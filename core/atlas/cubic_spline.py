@@ -16,7 +16,7 @@ VALUES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) 
 VALUES_AND_SLOPES = np.vstack([VALUES, np.pad(VALUES[:, 1:] * np.arange(1, 4), ((0, 0), (0, 1)))])
 
 
-def between(some: Array) -> Array:
+def upsampled(some: Array) -> Array:
     """Values (SIDE, SIDE) at all knots, interpolated linearly from those at every other knot."""
     full, coarse = np.empty((SIDE, SIDE)), slice(None, None, 2)
     full[coarse, coarse] = some
@@ -28,7 +28,7 @@ def between(some: Array) -> Array:
 def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
     """The 16 knots (n, 16) around n places, and their shares (3, n, 16) in height and slopes there."""
     pitch = 2.0 * half / (SIDE - 1)
-    (column, *by_x), (row, *by_y) = (weights_at(along / pitch) for along in (x, y))
+    (column, *by_x), (row, *by_y) = (bspline_weights(along / pitch) for along in (x, y))
     steps = np.arange(-1, 3)
     knots = (column[:, None, None] + steps[:, None]) * SIDE + row[:, None, None] + steps
     orders = ((0, 0), (1, 0), (0, 1))
@@ -36,7 +36,7 @@ def bases(x: Array, y: Array, half: float) -> tuple[Any, Array]:
     return knots.reshape(-1, 16), np.array(found).reshape(3, -1, 16)
 
 
-def weights_at(at: Array) -> tuple[Any, Array, Array]:
+def bspline_weights(at: Array) -> tuple[Any, Array, Array]:
     """The knots before places, in steps from the middle, (...); weights (4, ...) of four knots, and slopes.
 
     The spline ends one step inside the square: what is beyond counts as on its edge.

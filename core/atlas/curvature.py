@@ -30,7 +30,7 @@ BY_STD, BY_MISFIT = 0.9, 0.4  # The shares of the surface's deviation and of the
 LEAST_SQUARE = 1e-9  # So much, in unit radius, is added to the squares, because places may be in a row.
 
 
-class Sheets(NamedTuple):
+class NormalSamples(NamedTuple):
     """The mesh of a surface as places to which quadrics are fitted.
 
     tree : the KD-tree of n places
@@ -55,13 +55,13 @@ class Curvatures(NamedTuple):
     mean_std: Array
 
 
-def sheets_of(mesh: Mesh) -> Sheets:
+def sheets_of(mesh: Mesh) -> NormalSamples:
     """The places and the ends of a mesh."""
     from scipy.spatial import cKDTree
 
     normals = mesh.normals
     trees = cKDTree(mesh.vertices[::EVERY]), cKDTree(mesh.vertices[np.unique(_ends(mesh, normals))])
-    return Sheets(trees[0], normals[::EVERY], mesh.std[::EVERY], trees[1], mesh.edge)
+    return NormalSamples(trees[0], normals[::EVERY], mesh.std[::EVERY], trees[1], mesh.edge)
 
 
 def _ends(mesh: Mesh, normals: Array) -> Indices:
@@ -83,7 +83,7 @@ def _ends(mesh: Mesh, normals: Array) -> Indices:
     return sides[is_end]
 
 
-def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
+def curvatures_of(sheets: NormalSamples, points: Array, normals: Array) -> Curvatures:
     """The curvatures at points (n, 3) of the surface with unit normals (n, 3).
 
     They are unknown where a crease or a rim is nearer than the least radius, and where no surface is near.
@@ -91,14 +91,16 @@ def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
     distance, at = sheets.tree.query(points, min(PLACES, sheets.tree.n))
     least, ends = LEAST * sheets.edge, sheets.ends.query(points)[0]
     most = np.maximum(np.minimum(ends, distance[:, -1]), least)
-    distance, local = _around(sheets, points, normals, distance, at)
+    distance, local = _neighborhoods(sheets, points, normals, distance, at)
     std = sheets.stds[at[:, 0]]
     near = np.minimum(2.0 * least, most)
-    gauss, mean, _ = _fitted(distance, local, near)
+    gauss, mean, _ = _fit_weingarten(distance, local, near)
     largest = np.abs(mean) + np.sqrt(np.maximum(mean**2 - gauss, 0.0))
     radius = np.sqrt(2.0 * SAGITTA * std / np.maximum(largest, LEAST_DIVISOR)).clip(least, most)
     determined = (ends >= least) & ((distance < near[:, None]).sum(axis=1) >= FEWEST) & np.isfinite(std)
-    gauss, mean, misfit = (np.where(determined, values, 0.0) for values in _fitted(distance, local, radius))
+    gauss, mean, misfit = (
+        np.where(determined, values, 0.0) for values in _fit_weingarten(distance, local, radius)
+    )
     mean_std = np.where(determined, np.hypot(BY_STD * std / radius, BY_MISFIT * misfit) / radius, np.inf)
     # For errors of heights that are alike in all directions, the variances of z_xx, z_yy and z_xy are as
     # 3 : 3 : 1 and the covariance of the first two as 1, so that of H is as 2.
@@ -106,7 +108,9 @@ def curvatures_of(sheets: Sheets, points: Array, normals: Array) -> Curvatures:
     return Curvatures(gauss, mean, gauss_std, mean_std)
 
 
-def _around(sheets: Sheets, points: Array, normals: Array, distance: Array, at: Array) -> tuple[Array, Array]:
+def _neighborhoods(
+    sheets: NormalSamples, points: Array, normals: Array, distance: Array, at: Array
+) -> tuple[Array, Array]:
     """Distances (n, k) of the places `at` (n, k), inf on other sheets, and these places in local terms.
 
     Those are (n, k, 4): two coordinates along the tangent plane, and two components of the normal.
@@ -120,10 +124,15 @@ def _around(sheets: Sheets, points: Array, normals: Array, distance: Array, at: 
     return np.where(same, distance, np.inf), np.concatenate([off @ plane, ups @ plane], axis=2)
 
 
-def _fitted(distance: Array, local: Array, radius: Array) -> tuple[Array, Array, Array]:
-    """Gaussian and mean curvatures of quadrics, and the root mean square misfit of the normals, (n,) each.
+def _fit_weingarten(distance: Array, local: Array, radius: Array) -> tuple[Array, Array, Array]:
+    """Gaussian and mean curvature, and the root mean square misfit of the normals, (n,) each.
 
-    They are fitted to places at distances (n, k) within radii (n,), with local terms (n, k, 4).
+    The Weingarten map W is the weighted least squares fit of n = n0 - W x, with weights (1 - (d /
+    radius)^2)^2.
+
+    distance : (n, k), distances d of the places, a length; inf on other sheets
+    local : (n, k, 4), tangent coordinates x (2), and the same two components of the normal
+    radius : (n,), a length
     """
     inside: Array = np.maximum(1.0 - (distance / radius[:, None]) ** 2, 0.0)
     weights = inside * inside

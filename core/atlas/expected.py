@@ -14,7 +14,7 @@ from ..exploration.side_by_side import exploring_many
 from ..reconstruction.result import Reconstruction
 from ..steps import result_of
 from .finger import Finger
-from .rims import felt_rim
+from .rims import radial_extent
 from .touching import FIRST_EXTENT, NEAR, SIZE
 
 # Patches overlap, so that all have this many times the area of the object: python -m benchmarks.add_menu.
@@ -50,7 +50,7 @@ def expected_touches(
             continue
         normal = vector_of(n)
         side = first_contact(surface, vector_of(point), normal, tangent_of(normal, None), e.step)[2]
-        radii = e.result.radius * felt_rim(e.result, Finger(surface, side), NEAR * tolerance)
+        radii = e.result.radius * radial_extent(e.result, Finger(surface, side), NEAR * tolerance)
         felt.append(float(np.pi * np.mean(radii**2)))
     if not any(felt):
         raise ValueError("points: expected some where a patch can be felt, got none")

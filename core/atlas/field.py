@@ -41,13 +41,13 @@ class Blend(NamedTuple):
 
     distance, std : (k,), signed, and its deviation; 0 and inf where no patch reaches
     normal : (k, 3), the gradient
-    node : (k,), index of the patch of most weight; -1 where no patch reaches
+    patch : (k,), index of the patch of most weight; -1 where no patch reaches
     """
 
     distance: Array
     std: Array
     normal: Array
-    node: NDArray[np.intp]
+    patch: NDArray[np.intp]
 
     def chosen(self, which: NDArray[np.intp]) -> "Blend":
         """The sheet near some of the places."""
@@ -59,14 +59,14 @@ class Blend(NamedTuple):
             np.where(which, self.distance, other.distance),
             np.where(which, self.std, other.std),
             np.where(which[:, None], self.normal, other.normal),
-            np.where(which, self.node, other.node),
+            np.where(which, self.patch, other.patch),
         )
 
 
-class Surface(NamedTuple):
+class SurfaceSample(NamedTuple):
     """The surface near k places.
 
-    distance, std, normal, node : as in a Blend
+    distance, std, normal, patch : as in a Blend
     rho : (k,), how far out the places are on the patch where they are least so; inf where no patch reaches
     creases : (k,), the number of other sheets there
     """
@@ -74,18 +74,18 @@ class Surface(NamedTuple):
     distance: Array
     std: Array
     normal: Array
-    node: NDArray[np.intp]
+    patch: NDArray[np.intp]
     rho: Array
     creases: NDArray[np.intp]
 
-    def chosen(self, which: NDArray[np.intp]) -> "Surface":
+    def chosen(self, which: NDArray[np.intp]) -> "SurfaceSample":
         """The surface near some of the places."""
-        return Surface._make(values[which] for values in self)
+        return SurfaceSample._make(values[which] for values in self)
 
 
 def node_weights(charts: Charts, pairs: Pairs) -> Array:
     """The weights (m,) of patches in a blend."""
-    return weights_of(pairs.rho, pairs.std, charts.radii[pairs.node])
+    return weights_of(pairs.rho, pairs.std, charts.radii[pairs.patch])
 
 
 def weights_of(rho: Array, std: Array, radius: Array) -> Array:
@@ -99,14 +99,14 @@ def facing_alike(charts: Charts, pairs: Pairs, up: Array, offset: Array, radius:
 
     radius : (m,), that of a patch of the sheet
     """
-    band = LAYER * np.maximum(charts.radii[pairs.node], radius) + SLANT * np.abs(offset)
+    band = LAYER * np.maximum(charts.radii[pairs.patch], radius) + SLANT * np.abs(offset)
     return _facing(charts, pairs, up) * _within(pairs.distance - offset, band)
 
 
 def _facing(charts: Charts, pairs: Pairs, up: Array) -> Array:
     """From 1 to 0, (m,), how much patches face the way of normals (m, 3)."""
     cosine: Array = np.einsum("mi,mi->m", pairs.normal, up)
-    is_flat = charts.is_flat[pairs.node]
+    is_flat = charts.is_flat[pairs.patch]
     apart, most = np.where(is_flat, FLAT_APART, APART), np.where(is_flat, FLAT_AGREE, AGREE)
     agree: Array = np.clip((cosine - apart) / (most - apart), 0.0, 1.0)
     agree *= agree * (3.0 - 2.0 * agree)
@@ -123,59 +123,68 @@ def sheets_at(charts: Charts, pairs: Pairs, count: int) -> list[Blend]:
     """At most SHEETS sheets at each of `count` places, the nearest first, of pairs of places and patches."""
     weights, sheets = node_weights(charts, pairs), []
     for _ in range(SHEETS):
-        key = np.abs(pairs.distance) + 0.5 * LAYER * charts.radii[pairs.node] * pairs.rho**2
-        nearest = least_of(pairs.place, key, count)[pairs.place]
-        up, offset, radius = pairs.normal[nearest], pairs.distance[nearest], charts.radii[pairs.node[nearest]]
+        key = np.abs(pairs.distance) + 0.5 * LAYER * charts.radii[pairs.patch] * pairs.rho**2
+        nearest = argmin_per_point(pairs.point_index, key, count)[pairs.point_index]
+        up, offset, radius = (
+            pairs.normal[nearest],
+            pairs.distance[nearest],
+            charts.radii[pairs.patch[nearest]],
+        )
         alike = facing_alike(charts, pairs, up, offset, radius)
-        sheets.append(_mean(pairs, weights * alike, count))
+        sheets.append(_weighted_mean(pairs, weights * alike, count))
         left = np.flatnonzero(alike <= 0.0)
         pairs, weights = pairs.chosen(left), weights[left]
     return sheets
 
 
-def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, band: float) -> Surface:
+def surface_at(charts: Charts, indicator: Indicator, points: Array, up: Array, band: float) -> SurfaceSample:
     """The surface within a length of places (k, 3) that faces about as `up` (k, 3)."""
-    found = patched(charts, indicator, points, up, band)
-    lost = np.flatnonzero(found.node < 0)
+    found = surface_within_margin(charts, indicator, points, up, band)
+    lost = np.flatnonzero(found.patch < 0)
     if len(lost):
-        farther = patched(charts, indicator, points[lost], up[lost], band, CONTINUED)
+        farther = surface_within_margin(charts, indicator, points[lost], up[lost], band, CONTINUED)
         for old, new in zip(found, farther, strict=True):
             old[lost] = new
     return found
 
 
-def patched(
+def surface_within_margin(
     charts: Charts, indicator: Indicator, points: Array, up: Array, band: float, margin: float = MARGIN
-) -> Surface:
+) -> SurfaceSample:
     """The surface of `surface_at`, but only where patches are that count as far out as a margin."""
     pairs, count = charts.pairs(points, band, margin), len(points)
-    pairs = pairs.chosen(np.einsum("mi,mi->m", pairs.normal, up[pairs.place]) > SIDEWAYS)
+    pairs = pairs.chosen(np.einsum("mi,mi->m", pairs.normal, up[pairs.point_index]) > SIDEWAYS)
     rho = np.full(count, np.inf)
-    np.minimum.at(rho, pairs.place, pairs.rho)
+    np.minimum.at(rho, pairs.point_index, pairs.rho)
     sheets = sheets_at(charts, pairs, count)
-    found, several = sheets[0], np.flatnonzero(sheets[1].node >= 0)
+    found, several = sheets[0], np.flatnonzero(sheets[1].patch >= 0)
     if len(several):
         some = [sheet.chosen(several) for sheet in sheets]
-        for old, new in zip(found, _met(indicator, points[several], some), strict=True):
+        for old, new in zip(found, _combine_sheets(indicator, points[several], some), strict=True):
             old[several] = new
-    return Surface(*found, rho, (sheets[1].node >= 0).astype(np.intp) + (sheets[2].node >= 0))
+    return SurfaceSample(*found, rho, (sheets[1].patch >= 0).astype(np.intp) + (sheets[2].patch >= 0))
 
 
-def _met(indicator: Indicator, points: Array, sheets: list[Blend]) -> Blend:
-    """The surface of two or three sheets at places (k, 3)."""
+def _combine_sheets(indicator: Indicator, points: Array, sheets: list[Blend]) -> Blend:
+    """The surface where two or three sheets (k places each) meet, (k,).
+
+    The inside of a convex crease is the intersection of both half spaces, so the larger signed distance
+    counts; that of a concave one is their union, so the smaller one does. At a corner the pair whose crease
+    differs from the other two is combined first.
+    """
     one, two, three = sheets
     convex = [_is_convex(indicator, points, a, b) for a, b in ((one, two), (one, three), (two, three))]
-    third = three.node >= 0
+    third = three.patch >= 0
     # Of three creases at a corner two are alike: the sheets of the other one meet first.
     last = third & (convex[0] == convex[1]) & (convex[0] != convex[2])
     middle = third & (convex[0] == convex[2]) & (convex[0] != convex[1])
     a, b, c = two.where(last, one), three.where(last | middle, two), one.where(last, two.where(middle, three))
     first = np.where(last, convex[2], np.where(middle, convex[1], convex[0]))
-    found = _both(a, b, first)
-    return _both(found, c, np.where(last | middle, convex[0], convex[1])).where(third, found)
+    found = _min_or_max(a, b, first)
+    return _min_or_max(found, c, np.where(last | middle, convex[0], convex[1])).where(third, found)
 
 
-def _both(a: Blend, b: Blend, convex: NDArray[np.bool_]) -> Blend:
+def _min_or_max(a: Blend, b: Blend, convex: NDArray[np.bool_]) -> Blend:
     """The surface of two sheets, inside both where their crease is convex, and inside either elsewhere."""
     return b.where((b.distance > a.distance) == convex, a)
 
@@ -195,19 +204,19 @@ def _is_convex(indicator: Indicator, points: Array, a: Blend, b: Blend) -> NDArr
 def sheet_facing(charts: Charts, points: Array, up: Array, near: Array | float) -> Blend:
     """The sheet with normals `up` (k, 3) near places (k, 3), of patches within a length (k,)."""
     pairs, near = charts.pairs(points, float(np.max(near, initial=0.0))), np.broadcast_to(near, len(points))
-    alike = _facing(charts, pairs, up[pairs.place]) * _within(pairs.distance, near[pairs.place])
-    return _mean(pairs, node_weights(charts, pairs) * alike, len(points))
+    alike = _facing(charts, pairs, up[pairs.point_index]) * _within(pairs.distance, near[pairs.point_index])
+    return _weighted_mean(pairs, node_weights(charts, pairs) * alike, len(points))
 
 
 def covered(charts: Charts, points: Array, normals: Array) -> NDArray[np.bool_]:
     """Which of the places (k, 3) lie on a patch that faces the way of their normals (k, 3)."""
     pairs = charts.pairs(points)
-    near = np.abs(pairs.distance) < LAYER * charts.radii[pairs.node]
-    on = (pairs.rho < INSIDE) & near & (_facing(charts, pairs, normals[pairs.place]) > 0.0)
-    return np.bincount(pairs.place[on], minlength=len(points)) > 0
+    near = np.abs(pairs.distance) < LAYER * charts.radii[pairs.patch]
+    on = (pairs.rho < INSIDE) & near & (_facing(charts, pairs, normals[pairs.point_index]) > 0.0)
+    return np.bincount(pairs.point_index[on], minlength=len(points)) > 0
 
 
-def least_of(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
+def argmin_per_point(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[np.intp]:
     """The pair of the least key (m,) at each of `count` places, -1 where there is none.
 
     place : (m,), sorted
@@ -221,9 +230,9 @@ def least_of(place: NDArray[np.intp], key: NDArray[Any], count: int) -> NDArray[
     return found
 
 
-def _mean(pairs: Pairs, w: Array, count: int) -> Blend:
+def _weighted_mean(pairs: Pairs, w: Array, count: int) -> Blend:
     """Weighted means. Deviations do not average out, because patches that rho contacts err alike."""
-    place = pairs.place
+    place = pairs.point_index
 
     def total(values: Array) -> Array:
         """Weighted sums (count,) over the pairs at each place."""
@@ -235,10 +244,10 @@ def _mean(pairs: Pairs, w: Array, count: int) -> Blend:
     mean = scale * total(pairs.distance)
     variance = scale * total(pairs.std**2 + (pairs.distance - mean[place]) ** 2)
     up = normalized(np.stack([total(pairs.normal[:, i]) for i in range(3)], axis=1))
-    best = least_of(place, -w, count)
+    best = argmin_per_point(place, -w, count)
     return Blend(
         mean,
         np.where(there, np.sqrt(variance), np.inf),
         up,
-        np.where(there, np.append(pairs.node, -1)[best], -1),
+        np.where(there, np.append(pairs.patch, -1)[best], -1),
     )

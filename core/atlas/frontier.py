@@ -23,10 +23,10 @@ from ..triangles import normalized
 from .charts import AZIMUTHS, Charts
 from .field import INSIDE, covered
 from .finger import DISK_PLACES, Finger
-from .join import stacked, table_of
+from .join import stacked, tabulate
 from .meshing import Mesh
 from .reference_mesh import ReferenceMesh
-from .rims import felt_rim
+from .rims import radial_extent
 
 # python -m benchmarks.atlas judges these.
 RIM = 24  # Each rim has this many places.
@@ -34,10 +34,8 @@ RIM = 24  # Each rim has this many places.
 BETWEEN = ((0.97, 1), (0.6, 2))
 REACHES = (0.35, 0.12, 0.04)  # The finger goes on by these shares of the radius, until something is new.
 DISK_REACHES = 3.0  # What is new is measured on a disk of this many reaches, at most the patch's radius.
-BORDER_RADIUS, BORDER_APART = (
-    5.0,
-    0.5,
-)  # Places on the border of a mesh have a radius of this many edges, and are this many radii apart.
+BORDER_RADIUS = 5.0  # The radius of a place on the border of a mesh, in edges.
+BORDER_APART = 0.5  # The distance between such places, in their radii.
 OFF = 0.5  # Beyond a border a contact counts from this many edges off the mesh.
 SLIVER = 0.03  # The blend of patches bridges what is new if it is less than this share of the disk.
 IN_VAIN = 2.0  # What is within this many radii of the least patch of a touch in vain brings nothing, too.
@@ -53,7 +51,7 @@ GAIN_DIGITS = 9  # Gains are areas in the caller's unit, and equal if this many 
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class RimPlace:
     """A place on a rim, its normal and the way away from its patch, (3,) each, and the radius of the patch.
 
     tried : where touches that went on from it were, (3,) each
@@ -76,7 +74,7 @@ class Next(NamedTuple):
     point: Array
     outward: Array
     gain: float
-    place: Place
+    place: RimPlace
 
 
 @dataclass(eq=False)
@@ -87,7 +85,7 @@ class Frontier:
     least : the least area that a touch has to bring
     noise : standard deviation of the contacts between curves, drawn from `rng`
     taps : these contacts, for each patch
-    in_vain : where touches that could not make a patch were, (3,) each
+    failed_points : where touches that could not make a patch were, (3,) each
 
     The first place is the one that can bring most. That only shrinks as patches come, so only there it is
     measured again.
@@ -99,9 +97,9 @@ class Frontier:
     noise: float = 0.0
     rng: np.random.Generator = field(default_factory=np.random.default_rng)
     taps: list[Contour] = field(default_factory=list)
-    in_vain: list[Vector] = field(default_factory=list)
+    failed_points: list[Vector] = field(default_factory=list)
     charts: Charts = field(init=False)
-    queue: list[tuple[float, int, Place]] = field(default_factory=list)
+    queue: list[tuple[float, int, RimPlace]] = field(default_factory=list)
     pushed: int = 0
 
     def add(self, r: Reconstruction, least: float = 0.0, goes_on: float = 0.0) -> bool:
@@ -109,15 +107,15 @@ class Frontier:
 
         least, goes_on : lengths; patches that the finger feels to be smaller are left out, or have no places
         """
-        rim = felt_rim(r, self.finger, self.near)
+        rim = radial_extent(r, self.finger, self.near)
         radius = r.radius * math.sqrt(np.mean(rim**2))
         if radius <= least:
             return False
-        chart = stacked([r], [table_of(r, rim, deviations=False)])
+        chart = stacked([r], [tabulate(r, rim, deviations=False)])
         self.charts = self.charts.joined(chart) if self.taps else chart
         self.taps.append(self._felt_between(chart))
         for p, n, t in zip(*chart.rim(RIM, 1.01 * INSIDE), strict=True) if radius >= goes_on else ():
-            self.push(Place(vector_of(p), vector_of(n), vector_of(t), r.radius), np.pi * r.radius**2)
+            self.push(RimPlace(vector_of(p), vector_of(n), vector_of(t), r.radius), np.pi * r.radius**2)
         return True
 
     def _felt_between(self, chart: Charts) -> Contour:
@@ -131,7 +129,7 @@ class Frontier:
         offsets = self.rng.normal(0.0, self.noise, len(points))
         return Contour(points + offsets[:, None] * normals, normals=normals)
 
-    def push(self, place: Place, gain: float) -> None:
+    def push(self, place: RimPlace, gain: float) -> None:
         """Queues a place by the area that a touch there may bring."""
         self.pushed += 1
         heapq.heappush(self.queue, (-_rounded(gain), self.pushed, place))
@@ -141,12 +139,12 @@ class Frontier:
         tried = *touch.place.tried, vector_of(touch.point)
         self.push(replace(touch.place, tried=tried), touch.gain)
 
-    def taking(self, count: int) -> Generator[None, None, list[Next]]:
+    def next_touches(self, count: int) -> Generator[None, None, list[Next]]:
         """At most `count` touches, far apart, that bring most. Yields each time before it looks at places."""
         yield from self._forget_covered()
         found: list[Next] = []
-        aside: list[tuple[float, int, Place]] = []
-        touches: dict[Place, Next | None] = {}
+        aside: list[tuple[float, int, RimPlace]] = []
+        touches: dict[RimPlace, Next | None] = {}
         while self.queue and len(found) < count:
             _, _, place = entry = heapq.heappop(self.queue)
             distances = ((other, TOUCHES_APART * max(place.radius, other.place.radius)) for other in found)
@@ -169,7 +167,7 @@ class Frontier:
             heapq.heappush(self.queue, entry)
         return found
 
-    def uncovered(self, reference: ReferenceMesh) -> Generator[float, None, list[tuple[Place, Contact]]]:
+    def uncovered(self, reference: ReferenceMesh) -> Generator[float, None, list[tuple[RimPlace, Contact]]]:
         """Places on the border of a mesh beyond which the object goes on, each with a contact there.
 
         Yields 1 after each.
@@ -189,7 +187,7 @@ class Frontier:
 
     def _forget_covered(self) -> Generator[None, None, None]:
         """Takes the places that patches now cover out of the queue; yields between its steps."""
-        still: list[tuple[float, int, Place]] = []
+        still: list[tuple[float, int, RimPlace]] = []
         for start in range(0, len(self.queue), PLACES_AT_ONCE):
             some = self.queue[start : start + PLACES_AT_ONCE]
             free = self._free(np.array([(place.point, place.normal) for _, _, place in some]))
@@ -198,27 +196,27 @@ class Frontier:
         self.queue = still
         heapq.heapify(self.queue)
 
-    def beyond(self, places: Sequence[Place]) -> list[Next | None]:
+    def beyond(self, places: Sequence[RimPlace]) -> list[Next | None]:
         """The touch that goes on from each place, or None if it would bring nothing."""
         found: list[Next | None] = [None] * len(places)
-        middles = self._looked(places)
+        middles = self._probe_disks(places)
         for share in REACHES:
             left = [i for i, touch in enumerate(found) if touch is None]
             new = [places[i] for i in left if (places[i], share) in middles]
             wide = min(1.0, DISK_REACHES * share)
             disks = [self._disk(place, middles[place, share], wide * place.radius) for place in new]
-            for place, disk in zip(new, self._uncovered(disks), strict=True):
+            for place, disk in zip(new, self._uncovered_part(disks), strict=True):
                 place.felt[share] = disk
             for i in left:
                 found[i] = self._touch(places[i], share)
         return found
 
-    def _disk(self, place: Place, contact: Contact, radius: float) -> Array:
+    def _disk(self, place: RimPlace, contact: Contact, radius: float) -> Array:
         """What the finger feels around a contact beyond a place, (k, 2, 3)."""
         rim = cross(place.normal, place.ahead)  # An edge along the rim leaves this across the normal.
         return self.finger.disk(*contact, place.ahead if abs(dot(contact[1], rim)) > ALONG else rim, radius)
 
-    def _looked(self, places: Sequence[Place]) -> dict[tuple[Place, float], Contact]:
+    def _probe_disks(self, places: Sequence[RimPlace]) -> dict[tuple[RimPlace, float], Contact]:
         """Notes what is still uncovered of the disks that were felt, and returns the middles of new ones.
 
         These are uncovered contacts, by place and share.
@@ -234,13 +232,13 @@ class Frontier:
                     middles[place, share], disks[place, share] = contact, np.array([contact])
                 else:
                     place.felt[share] = np.zeros((0, 2, 3))
-        for (place, share), disk in zip(disks, self._uncovered(list(disks.values())), strict=True):
+        for (place, share), disk in zip(disks, self._uncovered_part(list(disks.values())), strict=True):
             if not len(disk) or (place, share) not in middles:
                 place.felt[share] = disk
                 middles.pop((place, share), None)
         return middles
 
-    def _uncovered(self, disks: Sequence[Array]) -> list[Array]:
+    def _uncovered_part(self, disks: Sequence[Array]) -> list[Array]:
         """What no patch covers of disks (k, 2, 3), each: nothing if one covers the first contact, the middle.
 
         What patches cover stays covered.
@@ -254,11 +252,11 @@ class Frontier:
         """Which of the contacts (k, 2, 3) no patch covers."""
         return ~covered(self.charts, contacts[:, 0], contacts[:, 1])
 
-    def _touch(self, place: Place, share: float) -> Next | None:
+    def _touch(self, place: RimPlace, share: float) -> Next | None:
         """The touch in the middle of what is uncovered on a disk that was felt, if it brings enough."""
         hits, disk = place.felt[share], math.pi * (min(1.0, DISK_REACHES * share) * place.radius) ** 2
-        if self.in_vain and len(hits):
-            apart = ((hits[:, 0, None] - np.array(self.in_vain)) ** 2).sum(axis=2).min(axis=1)
+        if self.failed_points and len(hits):
+            apart = ((hits[:, 0, None] - np.array(self.failed_points)) ** 2).sum(axis=2).min(axis=1)
             hits = hits[apart > IN_VAIN**2 * self.least / math.pi]
         area = len(hits) / (DISK_PLACES + 1) * disk
         if area <= max(SLIVER * disk, self.least):
@@ -285,7 +283,7 @@ def _first_least(squares: Array) -> int:
     return int(np.argmax(squares <= squares.min() + TIE * np.abs(squares).max()))
 
 
-def border_places(mesh: Mesh) -> Iterator[Place]:
+def border_places(mesh: Mesh) -> Iterator[RimPlace]:
     """Places on the border of a mesh, some edges apart, with the way beyond it."""
     ends, corners = mesh.border, mesh.vertices
     if not len(ends):
@@ -300,4 +298,4 @@ def border_places(mesh: Mesh) -> Iterator[Place]:
         taken |= ((middles - middles[i]) ** 2).sum(axis=1) < (BORDER_APART * radius) ** 2
         up = normalized(normals[a] + normals[b])
         beyond = normalized(np.cross(corners[b] - corners[a], up))
-        yield Place(vector_of(middles[i]), vector_of(up), vector_of(beyond), radius)
+        yield RimPlace(vector_of(middles[i]), vector_of(up), vector_of(beyond), radius)

@@ -64,7 +64,9 @@ class Indicator(NamedTuple):
         )
 
 
-def solved(points: Array, areas: Array, cell: float, thinnest: float) -> Generator[float, None, Indicator]:
+def solve_poisson(
+    points: Array, areas: Array, cell: float, thinnest: float
+) -> Generator[float, None, Indicator]:
     """The indicator of a surface; yields 0 between its steps. Raises ValueError for fewer than two points.
 
     points : (n, 3), samples of the surface
@@ -84,7 +86,7 @@ def solved(points: Array, areas: Array, cell: float, thinnest: float) -> Generat
     values = np.zeros(shape, dtype=np.float32)
     for start in range(0, len(points), SAMPLES_AT_ONCE):
         some = slice(start, start + SAMPLES_AT_ONCE)
-        _spread(values, (points[some] - low) / cell, areas[some] / cell**2)
+        _add_divergence(values, (points[some] - low) / cell, areas[some] / cell**2)
         yield 0.0
     waves = [(np.pi / (n + 1.0) * np.arange(1, n + 1)) ** 2 for n in shape]
     for axis in range(3):
@@ -112,7 +114,7 @@ def _slabs(values: NDArray[np.float32], axis: int) -> Iterator[tuple[slice, ...]
         yield (slice(None),) * other + (slice(start, start + rows),)
 
 
-def _spread(values: NDArray[np.float32], at: Array, flow: Array) -> None:
+def _add_divergence(values: NDArray[np.float32], at: Array, flow: Array) -> None:
     """Adds the divergence of `flow` (n, 3) at places (n, 3), in cells, spread by cubic B-splines."""
     first = np.floor(at).astype(np.intp)
     f = at - first

@@ -16,7 +16,7 @@ from ..contours.contour import Contour
 from ..reconstruction.result import Reconstruction
 from ..triangles import normalized
 from .charts import AZIMUTHS, MARGIN, Charts, Pairs
-from .cubic_spline import SIDE, between
+from .cubic_spline import SIDE, upsampled
 from .field import LAYER, sheet_facing
 from .finger import FACING
 from .smoothing_spline import ROUGHNESS, penalty, smoothing_spline
@@ -37,7 +37,7 @@ Table = tuple[Array, float, Array, Array]  # Radii of the domain, half the side,
 Joining = Generator[float, None, Charts]
 
 
-def joined(
+def refit(
     contours: Sequence[list[Contour]],
     results: Sequence[Reconstruction],
     charts: Charts,
@@ -53,7 +53,7 @@ def joined(
     parts = []
     for start in range(0, len(points), PLACES_AT_ONCE):
         part = charts.pairs(points[start : start + PLACES_AT_ONCE])
-        parts.append(part._replace(place=start + part.place))
+        parts.append(part._replace(point_index=start + part.point_index))
         yield 0.0
     for order in ROUGHNESS:  # Otherwise the first spline would take ten times as long as the others.
         penalty(order)
@@ -63,15 +63,15 @@ def joined(
         columns.append(np.concatenate(values))
         yield 0.0
     pairs = Pairs(*columns)
-    each = np.argsort(pairs.node, kind="stable")
+    each = np.argsort(pairs.patch, kind="stable")
     yield 0.0
-    bounds = np.searchsorted(pairs.node[each], np.arange(len(results) + 1))
+    bounds = np.searchsorted(pairs.patch[each], np.arange(len(results) + 1))
     tables: list[Table] = []
     for i, r in enumerate(results):
         some = pairs.chosen(each[bounds[i] : bounds[i + 1]])
-        if i not in earlier or earlier[i][0] != len(some.place):
+        if i not in earlier or earlier[i][0] != len(some.point_index):
             table = _joined_table(r, charts.rims[i], some, points, normals, owner == i, noise)
-            earlier[i] = len(some.place), table
+            earlier[i] = len(some.point_index), table
         tables.append(earlier[i][1])
         if len(tables) % PATCHES_AT_ONCE == 0:
             yield len(tables) / len(results)
@@ -93,16 +93,16 @@ def _joined_table(
     likely = np.hypot(least, UNDOUBTED * r.mean_height_std / r.radius)
     likely = likely * (1.0 + LOOSER * np.maximum(some.rho - 1.0, 0.0))
     off = np.abs(some.distance) / (r.radius * likely)
-    facing = np.einsum("mi,mi->m", some.normal, normals[some.place]) > ALIGNED
-    on = own[some.place] | ((off < FARTHEST) & facing)
-    place = some.place[on]
+    facing = np.einsum("mi,mi->m", some.normal, normals[some.point_index]) > ALIGNED
+    on = own[some.point_index] | ((off < FARTHEST) & facing)
+    place = some.point_index[on]
     local = (points[place] - r.frame.origin) @ r.frame.axes / r.radius
     weights = 1.0 / np.maximum(off[on], 1.0) ** 2
     found = smoothing_spline(local, normals[place] @ r.frame.axes, weights, half, least)
     return rim, half, *found
 
 
-def agreed(charts: Charts) -> Joining:
+def blend_heights(charts: Charts) -> Joining:
     """The patches moved onto the blend of all of them, as often as ROUNDS; yields 1 after each part."""
     from scipy.ndimage import spline_filter1d
 
@@ -124,13 +124,13 @@ def agreed(charts: Charts) -> Joining:
     return charts
 
 
-def _move(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> Array:
+def _move(charts: Charts, patch: NDArray[np.intp], x: Array, y: Array) -> Array:
     """How far patches (k,) have to move above local (x, y), in unit radius, to lie on the blend."""
-    points, normals = charts.world(node, x, y)
-    field = sheet_facing(charts, points, normals, LAYER * charts.radii[node])
-    up = np.einsum("ki,ki->k", field.normal, charts.axes[node, :, 2])
-    move = -field.distance / np.maximum(up, FACING) / charts.radii[node]
-    on = (field.node >= 0) & (up > FACING) & (np.abs(move) < MOVED)
+    points, normals = charts.world(patch, x, y)
+    field = sheet_facing(charts, points, normals, LAYER * charts.radii[patch])
+    up = np.einsum("ki,ki->k", field.normal, charts.axes[patch, :, 2])
+    move = -field.distance / np.maximum(up, FACING) / charts.radii[patch]
+    on = (field.patch >= 0) & (up > FACING) & (np.abs(move) < MOVED)
     return np.where(on, move, 0.0)
 
 
@@ -145,7 +145,7 @@ def _contacts(contours: Sequence[list[Contour]]) -> tuple[Array, Array, NDArray[
 
 def charts_of(results: Sequence[Reconstruction], deviations: bool = True) -> Charts:
     """The tables of patches, each fitted to its own contacts alone; `deviations` may be left out, as 0."""
-    return stacked(results, [table_of(r, r.domain.radii(AZIMUTHS) / r.radius, deviations) for r in results])
+    return stacked(results, [tabulate(r, r.domain.radii(AZIMUTHS) / r.radius, deviations) for r in results])
 
 
 def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Charts:
@@ -162,7 +162,7 @@ def stacked(results: Sequence[Reconstruction], tables: Sequence[Table]) -> Chart
     )
 
 
-def table_of(r: Reconstruction, rim: Array, deviations: bool) -> Table:
+def tabulate(r: Reconstruction, rim: Array, deviations: bool) -> Table:
     """The table of a patch with this rim (AZIMUTHS,), in unit radius, fitted to its own contacts alone."""
     from scipy.ndimage import spline_filter
 
@@ -186,4 +186,4 @@ def _stds(r: Reconstruction, x: Array, y: Array) -> Array:
     """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and cost the most."""
     coarse = slice(None, None, 2)
     x, y = x.reshape(SIDE, SIDE)[coarse, coarse], y.reshape(SIDE, SIDE)[coarse, coarse]
-    return between(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)
+    return upsampled(r.height_std(x.ravel(), y.ravel()).reshape(x.shape) / r.radius)

@@ -17,10 +17,10 @@ from ..reconstruction.start import TOUCH_ROUNDING, too_coarse
 from ..steps import part_of, result_of
 from .charts import AZIMUTHS, Charts
 from .finger import FACING
-from .join import stacked, table_of
-from .meshing import BETWEEN, Contacts
-from .object_atlas import Atlas, surfaced
-from .orientation import doubt_of, middle, oriented, planes_of, sharpened
+from .join import stacked, tabulate
+from .meshing import BETWEEN, MeasuredContacts
+from .object_atlas import Atlas, joined_surface
+from .orientation import doubt_of, oriented, place_text, planes_of, sharpened
 from .unfelt import uncovered_places
 
 # python -m benchmarks.robot judges these.
@@ -83,7 +83,7 @@ def cover_contacts(
     yield 0.0
     cloud = _Cloud(contacts, cKDTree(contacts.points), _linked(contacts.links), noise, largest)
     found, charts = yield from _patches(cloud)
-    reference = yield from part_of(surfaced(found, charts, largest, contacts), 1.0, 1.0)
+    reference = yield from part_of(joined_surface(found, charts, largest, contacts), 1.0, 1.0)
     places = uncovered_places(reference, charts)
     atlas = Atlas(tuple(found), charts, reference, largest, places, contacts=contacts)
     return replace(atlas, doubt=doubt or _off_contacts(atlas, contacts, noise))
@@ -91,7 +91,7 @@ def cover_contacts(
 
 def _contacts(
     given: Sequence[ArrayLike | Contour], outward: ArrayLike | None, noise: float | None
-) -> tuple[Contacts, float, tuple[str, str] | None]:
+) -> tuple[MeasuredContacts, float, tuple[str, str] | None]:
     """Contacts with outward normals, the noise, and why the normals are in doubt, if they are."""
     strokes, points, noise = _strokes(given, noise)
     up = None if outward is None else unit_vector("outward", outward)
@@ -110,7 +110,7 @@ def _contacts(
     if balls.any():
         points = points - balls[:, None] * normals
         planes = planes_of(points, noise)
-    return Contacts(points, normals, planes.reach, planes.links), noise, doubt
+    return MeasuredContacts(points, normals, planes.reach, planes.links), noise, doubt
 
 
 def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple[list[Contour], Array, float]:
@@ -146,8 +146,8 @@ def _require_one_side(points: Array, normals: Array) -> None:
     facing = np.einsum("nki,ni->nk", others, normals)
     sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
     apart = np.abs(np.einsum("nki,nki->nk", chords, sums))
-    alike = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
-    wrong = (facing < -FACING) & (apart <= SAME_SHEET_COSINE * alike)
+    same_sheet = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
+    wrong = (facing < -FACING) & (apart <= SAME_SHEET_COSINE * same_sheet)
     if wrong.mean() > OPPOSITE:
         raise ValueError(
             "normals: expected those of neighboring contacts on one side, got opposite ones at "
@@ -155,7 +155,7 @@ def _require_one_side(points: Array, normals: Array) -> None:
         )
 
 
-def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> tuple[str, str] | None:
+def _off_contacts(atlas: Atlas, contacts: MeasuredContacts, noise: float) -> tuple[str, str] | None:
     """The status and a sentence, if many contacts are off the surface or face the other way."""
     some = np.unique(np.linspace(0, len(contacts.points) - 1, CHECKED).astype(np.intp))
     points, normals = contacts.points[some], contacts.normals[some]
@@ -168,7 +168,7 @@ def _off_contacts(atlas: Atlas, contacts: Contacts, noise: float) -> tuple[str, 
         return None
     return "uncertain", (
         f"{100.0 * off.mean():.0f} % of the contacts are off the surface or face the other way, as around "
-        f"{middle(points[off])}: their normals contradict each other, or they are too far apart there."
+        f"{place_text(points[off])}: their normals contradict each other, or they are too far apart there."
     )
 
 
@@ -183,13 +183,13 @@ def _linked(links: NDArray[np.intp]) -> Any:
 class _Cloud(NamedTuple):
     """Contacts, a KD-tree, a matrix of links, the noise, and the deviation up to which patches grow."""
 
-    contacts: Contacts
+    contacts: MeasuredContacts
     tree: Any
     links: Any
     noise: float
     largest: float | None
 
-    def alike(self, i: int, radius: float) -> NDArray[np.intp]:
+    def same_sheet(self, i: int, radius: float) -> NDArray[np.intp]:
         """Those contacts around contact i that face the same way and are linked with it, so of its wall."""
         from scipy.sparse.csgraph import connected_components
 
@@ -201,7 +201,7 @@ class _Cloud(NamedTuple):
     def patch(self, i: int, radius: float) -> Reconstruction | None:
         """The patch of those contacts around contact i that face the same way, or None if they carry none."""
         points, normals = self.contacts.points, self.contacts.normals
-        strokes, place, outward = [[points[self.alike(i, radius)]]], points[i][None], normals[i][None]
+        strokes, place, outward = [[points[self.same_sheet(i, radius)]]], points[i][None], normals[i][None]
         (r,) = reconstruct_many(place, [()], outward=outward, strokes_list=strokes, noise=self.noise)
         return r if isinstance(r, Reconstruction) else None
 
@@ -214,7 +214,7 @@ class _Cloud(NamedTuple):
         from scipy.spatial import cKDTree
 
         domain = r.domain.radii(AZIMUTHS) / r.radius
-        near = self.alike(i, 2.0 * r.radius)
+        near = self.same_sheet(i, 2.0 * r.radius)
         shares = np.arange(1, RAY_PLACES + 1) / RAY_PLACES
         turns = 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
@@ -286,12 +286,12 @@ def _patches(cloud: _Cloud) -> Generator[float, None, tuple[list[Reconstruction]
         if not left[i]:
             continue
         r = cloud.largest_patch(i, radius)
-        some = cloud.alike(i, MISSING * radius)
+        some = cloud.same_sheet(i, MISSING * radius)
         left[some] = False
         if r is not None:
             found.append(r)
-            tables.append(table_of(r, cloud.rim(i, r), deviations=True))
-            chart, some = stacked([r], tables[-1:]), cloud.alike(i, PATCHES_APART * r.radius)
+            tables.append(tabulate(r, cloud.rim(i, r), deviations=True))
+            chart, some = stacked([r], tables[-1:]), cloud.same_sheet(i, PATCHES_APART * r.radius)
             x, y, _ = chart.local(points[some], np.arange(len(some)), np.zeros(len(some), dtype=np.intp))
             left[some] &= chart.shares(x, y, np.zeros(len(some), dtype=np.intp)) > COVERED
         left[i] = False

@@ -16,11 +16,11 @@ from ..arguments import Array
 from ..steps import chunked
 from ..triangles import normalized, row_dot, triangle_cross
 from .charts import MARGIN, Charts
-from .creases import creased
-from .field import INSIDE, Surface, surface_at
+from .creases import insert_creases
+from .field import INSIDE, SurfaceSample, surface_at
 from .finger import FACING
 from .indicator import Indicator
-from .tetrahedra import Indices, cut, evened, halved, tetrahedra_of, unique
+from .tetrahedra import Indices, march, smoothed, subdivided, tetrahedra_of, unique
 
 # python -m benchmarks.atlas judges these.
 CELL = 2.1  # A cube of the lattice is as long as this many edges of the mesh.
@@ -112,7 +112,7 @@ class Mesh(NamedTuple):
         return len(self.triangles) > 0 and self._sides[3]
 
 
-class Contacts(NamedTuple):
+class MeasuredContacts(NamedTuple):
     """Contacts that were measured: there the surface was felt, though patches may leave gaps between them.
 
     points, normals : (n, 3)
@@ -163,7 +163,7 @@ def meshed(
     indicator: Indicator,
     edge: float,
     ended: Callable[[Array], NDArray[np.bool_]] | None = None,
-    contacts: Contacts | None = None,
+    contacts: MeasuredContacts | None = None,
 ) -> Generator[float, None, tuple[Mesh, Mesh]]:
     """The mesh of the surface, and that of what the indicator has where nothing was felt.
 
@@ -177,21 +177,21 @@ def meshed(
     size, halvings = lattice_of(indicator, edge)
     vertices, up, triangles = yield from _level(indicator, size)
     band = max(BAND * indicator.cell, CLIP * size)
-    vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, band)
+    vertices, surface = yield from _project_and_smooth(charts, indicator, vertices, up, triangles, band)
     for _ in range(halvings):
-        vertices, triangles = halved(vertices, triangles)
+        vertices, triangles = subdivided(vertices, triangles)
         up = indicator.outward(vertices)
         yield 0.7
-        vertices, surface = yield from _settled(charts, indicator, vertices, up, triangles, band)
+        vertices, surface = yield from _project_and_smooth(charts, indicator, vertices, up, triangles, band)
     yield 0.9
     every = np.arange(len(vertices))
-    vertices, triangles, parents, unfelt = yield from creased(
+    vertices, triangles, parents, unfelt = yield from insert_creases(
         charts, vertices, triangles, surface.normal, edge
     )
     yield 0.9
     surface = surface.chosen(np.append(every, parents))
     surface = surface._replace(std=np.hypot(surface.std, CONTINUED_STD * unfelt))
-    return (yield from _felt(vertices, triangles, surface, indicator, ended, contacts))
+    return (yield from trim_unfelt(vertices, triangles, surface, indicator, ended, contacts))
 
 
 def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Array, Array, Indices]]:
@@ -205,7 +205,7 @@ def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Ar
     smooth = max(0.0, size**2 - (SPREAD * indicator.cell) ** 2) ** 0.5
     means = chunked(lambda some: (-_mean_at(indicator, some, smooth),), LATTICE_AT_ONCE, 0.1, points)
     (values,) = yield from means
-    ends, triangles = cut(tetrahedra, values)
+    ends, triangles = march(tetrahedra, values)
     yield 0.2
     found = []
     for few in np.array_split(ends, len(ends) // PLACES_AT_ONCE + 1):
@@ -253,44 +253,48 @@ def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]
     return unique((cells[:, None] + beside).reshape(-1, 3))
 
 
-def _settled(
+def _project_and_smooth(
     charts: Charts, indicator: Indicator, vertices: Array, up: Array, triangles: Indices, band: float
-) -> Generator[float, None, tuple[Array, Surface]]:
-    """Vertices (k, 3) evened out on the surface, and the surface there; yields the share that is done.
+) -> Generator[float, None, tuple[Array, SurfaceSample]]:
+    """Vertices (k, 3) projected onto the surface, with tangential Laplacian smoothing, and the surface there.
 
-    up : (k, 3), the way outward; band : a length within which the surface is
+    up : (k, 3), outward directions
+    band : the length within which the surface lies
+
+    Folded triangles, and vertices that are still off the surface, are projected again, at most STEPS times.
+    Yields the share that is done.
     """
-    surface = yield from _onto(charts, indicator, vertices, up, band)
+    surface = yield from project_onto_surface(charts, indicator, vertices, up, band)
     far = np.abs(surface.distance) > FAR * indicator.cell
-    yield from _again(charts, indicator, vertices, up, surface, far, band)
+    yield from _reproject(charts, indicator, vertices, up, surface, far, band)
     for _ in range(SMOOTHINGS):
-        vertices = evened(vertices, surface.normal, triangles)
+        vertices = smoothed(vertices, surface.normal, triangles)
         yield 0.5
-    surface = yield from _onto(charts, indicator, vertices, up, band)
+    surface = yield from project_onto_surface(charts, indicator, vertices, up, band)
     for _ in range(STEPS):
         far = np.abs(surface.distance) > FAR * indicator.cell
         folded = _folded(vertices, surface.normal, triangles)
         if folded.any():
-            vertices[folded] = evened(vertices, surface.normal, triangles)[folded]
+            vertices[folded] = smoothed(vertices, surface.normal, triangles)[folded]
         if not (far | folded).any():
             break
-        yield from _again(charts, indicator, vertices, up, surface, far | folded, band)
+        yield from _reproject(charts, indicator, vertices, up, surface, far | folded, band)
     return vertices, surface
 
 
-def _again(
+def _reproject(
     charts: Charts,
     indicator: Indicator,
     vertices: Array,
     up: Array,
-    surface: Surface,
+    surface: SurfaceSample,
     which: NDArray[np.bool_],
     band: float,
 ) -> Generator[float, None, None]:
     """Moves some of the vertices (k, 3) onto the surface again, and changes both in place."""
     some = np.flatnonzero(which)
     moved = vertices[some]
-    again = yield from _onto(charts, indicator, moved, up[some], band)
+    again = yield from project_onto_surface(charts, indicator, moved, up[some], band)
     for old, new in zip((vertices, *surface), (moved, *again), strict=True):
         old[some] = new
 
@@ -303,11 +307,11 @@ def _folded(vertices: Array, normals: Array, triangles: Indices) -> NDArray[np.b
     return folded
 
 
-def _onto(
+def project_onto_surface(
     charts: Charts, indicator: Indicator, vertices: Array, up: Array, band: float
-) -> Generator[float, None, Surface]:
+) -> Generator[float, None, SurfaceSample]:
     """Moves vertices (k, 3) onto the surface, in place; returns the surface where they were before."""
-    surface = Surface._make(
+    surface = SurfaceSample._make(
         (
             yield from chunked(
                 lambda places, ups: surface_at(charts, indicator, places, ups, band),
@@ -322,13 +326,13 @@ def _onto(
     return surface
 
 
-def _felt(
+def trim_unfelt(
     vertices: Array,
     triangles: Indices,
-    surface: Surface,
+    surface: SurfaceSample,
     indicator: Indicator,
     ended: Callable[[Array], NDArray[np.bool_]] | None,
-    contacts: Contacts | None,
+    contacts: MeasuredContacts | None,
 ) -> Generator[float, None, tuple[Mesh, Mesh]]:
     """The mesh without triangles where nothing was felt, and these; yields the share that is done.
 
@@ -363,7 +367,7 @@ def _felt(
     some = np.flatnonzero(gone)
     if contacts is not None:
         gone[some] = ~contacts.near(vertices[some], indicator.outward(vertices[some]))
-    std = np.where(surface.node < 0, indicator.cell, surface.std)
+    std = np.where(surface.patch < 0, indicator.cell, surface.std)
     std[some] = np.hypot(std[some], indicator.cell)  # No patch is there.
-    mesh, unfelt = Mesh(vertices, triangles, std, surface.node), gone[triangles].any(axis=1)
+    mesh, unfelt = Mesh(vertices, triangles, std, surface.patch), gone[triangles].any(axis=1)
     return mesh.chosen(~unfelt), mesh.chosen(unfelt)

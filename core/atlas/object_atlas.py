@@ -16,13 +16,13 @@ from ..reconstruction.result import Reconstruction
 from ..reconstruction.serialization import plain
 from ..steps import chunked, result_of
 from ..triangles import LEAST_DIVISOR, triangle_cross
-from .borders import Border, bordered
+from .borders import Border, snapped_to_border
 from .boundaries import Edge, edges_of, gaussian_curvature_of, node_dict
 from .charts import Charts
-from .curvature import Sheets, curvatures_of, sheets_of
-from .frontier import Place
+from .curvature import NormalSamples, curvatures_of, sheets_of
+from .frontier import RimPlace
 from .indicator import Indicator
-from .meshing import MOST_BYTES, WALL, Contacts, Mesh, lattice_of, memory_of, meshed
+from .meshing import MOST_BYTES, WALL, MeasuredContacts, Mesh, lattice_of, memory_of, meshed
 from .reference_mesh import ReferenceMesh
 from .samples import indicated
 
@@ -90,11 +90,11 @@ def suggested_edge(patches: Sequence[Reconstruction], charts: Charts, indicator:
     return max(min(edge, WALL * indicator.resolved), FINEST * indicator.size)
 
 
-def surfaced(
+def joined_surface(
     patches: Sequence[Reconstruction],
     charts: Charts,
     tolerance: float | None,
-    contacts: Contacts | None = None,
+    contacts: MeasuredContacts | None = None,
 ) -> Generator[float, None, ReferenceMesh]:
     """The joined surface of patches, as a mesh with edges of the suggested length; yields the share done."""
     indicator = yield from indicated(charts, tolerance)
@@ -131,12 +131,12 @@ class Atlas:
     charts: Charts
     reference: ReferenceMesh
     tolerance: float | None = None
-    uncovered: tuple[Place, ...] = ()
+    uncovered: tuple[RimPlace, ...] = ()
     check: Check = NO_CHECK
     taps: tuple[Contour, ...] = ()
     border: Border | None = None
     is_cut_short: bool = False
-    contacts: Contacts | None = None
+    contacts: MeasuredContacts | None = None
     doubt: tuple[str, str] | None = None
 
     def __repr__(self) -> str:
@@ -181,6 +181,7 @@ class Atlas:
 
     @cached_property
     def _verdict(self) -> tuple[str, str]:
+        """The status and the message of what comes first: doubt, unfelt places, thin walls, the check."""
         if self.doubt:
             return self.doubt
         if self.uncovered:
@@ -363,7 +364,7 @@ class Atlas:
         }
 
     @cached_property
-    def _sheets(self) -> Sheets:
+    def _sheets(self) -> NormalSamples:
         return sheets_of(self.reference.mesh)
 
     def meshing(self, edge: float) -> Generator[float, None, Mesh]:
@@ -383,7 +384,7 @@ class Atlas:
             )
         indicator, ended = self.reference.indicator, self.reference.ended
         mesh, _ = yield from meshed(self.charts, indicator, edge, ended, self.contacts)
-        return mesh if self.border is None else bordered(mesh, self.border)
+        return mesh if self.border is None else snapped_to_border(mesh, self.border)
 
     def to_dict(self) -> dict[str, Any]:
         """The graph as JSON has it: a dict of numbers, words, lists and dicts, in the caller's unit.

@@ -108,7 +108,7 @@ def sharpened(points: Array, normals: Array, planes: Planes) -> Array:
     return np.where(np.isfinite(off[every, best])[:, None], other, normals)
 
 
-def mirrored(points: Array, normals: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
+def reflection_agreement(points: Array, normals: Array, i: Indices, j: Indices) -> tuple[Array, Array]:
     """Cosines (m,) between normals j and normals i mirrored in the plane between both contacts.
 
     Also the larger absolute cosine between a normal and the way from one contact to the other, (m,).
@@ -131,11 +131,11 @@ def oriented(
     points = np.vstack(list(strokes))
     links = _links(points, planes, [len(stroke) for stroke in strokes])
     links = _bridged(points, planes.normals, *links)
-    sides, region = _sides(points, planes.normals, *links)
+    sides, region = _propagated_signs(points, planes.normals, *links)
     normals = sides[:, None] * planes.normals
-    flips, number = _flips(points, normals, planes.areas, region)
+    flips, number = _winding_signs(points, normals, planes.areas, region)
     normals *= flips[region, None]
-    return normals * _side(normals, known, up, number)
+    return normals * _global_sign(normals, known, up, number)
 
 
 def _links(points: Array, planes: Planes, lengths: Sequence[int]) -> tuple[Indices, Indices, Array]:
@@ -153,7 +153,7 @@ def _links(points: Array, planes: Planes, lengths: Sequence[int]) -> tuple[Indic
 
 def _weights(points: Array, normals: Array, i: Indices, j: Indices) -> Array:
     """How uncertain it is which side of one contact follows from another, (m,)."""
-    cosine, bend = mirrored(points, normals, i, j)
+    cosine, bend = reflection_agreement(points, normals, i, j)
     return 1e-6 + 1.0 - np.abs(cosine) + BEND * bend**2
 
 
@@ -181,7 +181,9 @@ def _bridged(
             weights = np.append(weights, far + _weights(points, normals, a, b))
 
 
-def _sides(points: Array, normals: Array, i: Indices, j: Indices, weights: Array) -> tuple[Array, Indices]:
+def _propagated_signs(
+    points: Array, normals: Array, i: Indices, j: Indices, weights: Array
+) -> tuple[Array, Indices]:
     """The sides (n,), 1 or -1, of normals (n, 3) that follow from the first along the minimal tree of links.
 
     Also the regions (n,) that uncertain links of the tree separate from each other.
@@ -189,14 +191,14 @@ def _sides(points: Array, normals: Array, i: Indices, j: Indices, weights: Array
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-    n, (cosine, _) = len(points), mirrored(points, normals, i, j)
+    n, (cosine, _) = len(points), reflection_agreement(points, normals, i, j)
     # Neighbors that have each other as a neighbor count twice, so they are more likely of one wall.
     votes = coo_matrix((cosine / weights, (np.minimum(i, j), np.maximum(i, j))), (n, n)).tocsr()
     votes.sum_duplicates()
     votes.data = 1.0 / np.maximum(np.abs(votes.data), LEAST_VOTE)
     tree = minimum_spanning_tree(votes)
     order, before = breadth_first_order(tree, 0, directed=False)
-    cosine, _ = mirrored(points, normals, before[order[1:]], order[1:])
+    cosine, _ = reflection_agreement(points, normals, before[order[1:]], order[1:])
     sides = [1.0] * n
     for at, past, same in zip(order[1:].tolist(), before[order[1:]].tolist(), cosine.tolist(), strict=True):
         sides[at] = sides[past] if same > 0.0 else -sides[past]
@@ -228,13 +230,11 @@ def _regions(tree: Any, n: int) -> Indices:
     return np.unique([of(one) for one in range(count)], return_inverse=True)[1][region]
 
 
-def _flips(points: Array, normals: Array, areas: Array, region: Indices) -> tuple[Array, float]:
-    """The sides (k,), 1 or -1, of regions with which winding numbers at contacts come nearest to a half.
+def _winding_signs(points: Array, normals: Array, areas: Array, region: Indices) -> tuple[Array, float]:
+    """The signs (k,) of regions that bring winding numbers at contacts nearest to a half; their mean.
 
-    Also their mean then.
-
-    On a closed surface these are 0 outside and 1 inside (Barill et al. 2018), and a half on it. A region that
-    faces the wrong way, also around a cavity, has others.
+    The sum of squares is minimized by coordinate descent over single regions and all of them, ROUNDS times.
+    On a closed surface the winding number is 1 inside, 0 outside and a half on it (Barill et al. 2018).
     """
     count = int(region.max()) + 1
     rng = np.random.default_rng(0)
@@ -260,7 +260,7 @@ def _flips(points: Array, normals: Array, areas: Array, region: Indices) -> tupl
     return sides, float(sizes @ (numbers @ sides)) / len(points)
 
 
-def _side(normals: Array, known: Array | None, up: Array | None, number: float) -> float:
+def _global_sign(normals: Array, known: Array | None, up: Array | None, number: float) -> float:
     """1, or -1 if normals (n, 3) face inward, as measured normals, a hint or the winding number have it.
 
     Raises ValueError if nothing of these is decisive.
@@ -281,25 +281,25 @@ def _side(normals: Array, known: Array | None, up: Array | None, number: float) 
 def doubt_of(points: Array, normals: Array, planes: Planes) -> tuple[str, str] | None:
     """The status and a sentence that names a place, if outward normals (n, 3) of contacts are in doubt."""
     i, j = np.repeat(np.arange(len(points)), LINKS), planes.links.ravel()
-    cosine, bend = mirrored(points, normals, i, j)
+    cosine, bend = reflection_agreement(points, normals, i, j)
     against = np.bincount(i, cosine < OPPOSED) * 2 > LINKS
     if against.mean() > DOUBTED:
         return "uncertain", (
-            f"Normals contradict each other around {middle(points[against])}: strokes are too far apart "
+            f"Normals contradict each other around {place_text(points[against])}: strokes are too far apart "
             "there, or normals are wrong."
         )
     facing = np.einsum("mi,mi->m", normals[i], normals[j]) < -FACING
     walls = np.bincount(i, facing & (bend > FACING)) > 0
     if walls.mean() > CONFUSED:
         return "uncertain", (
-            f"Strokes around {middle(points[walls])} are farther apart than half the thickness of the wall "
-            "or gap there, so its sides may be confused: make strokes nearer to each other, or measure "
+            f"Strokes around {place_text(points[walls])} are farther apart than half the thickness of the "
+            "wall or gap there, so its sides may be confused: make strokes nearer to each other, or measure "
             "normals."
         )
     return None
 
 
-def middle(points: Array) -> str:
-    """The point (3,) of points (n, 3) that is nearest to their middle, in words."""
+def place_text(points: Array) -> str:
+    """The one of points (n, 3) that is nearest to their median, as text in a sentence."""
     best = points[np.argmin(((points - np.median(points, axis=0)) ** 2).sum(axis=1))]
     return "(" + ", ".join(f"{x:.3g}" for x in best) + ")"

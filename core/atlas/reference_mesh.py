@@ -14,7 +14,7 @@ from ..arguments import Array
 from ..contours.contour import Vector
 from ..triangles import LEAST_DIVISOR, normalized, row_dot, triangle_cross
 from .charts import Charts
-from .field import Surface, patched
+from .field import SurfaceSample, surface_within_margin
 from .indicator import Indicator
 from .meshing import Mesh
 from .tetrahedra import Indices
@@ -110,7 +110,7 @@ class ReferenceMesh:
         count = min(NEAREST, len(self.mesh.vertices))
         nearest = self.tree.query(points, count)[1].reshape(len(points), count)
         some = self.fans[nearest].reshape(len(points), count * self.fans.shape[1])
-        feet, weights = closest(self.mesh.vertices[self.mesh.triangles[some]], points[:, None])
+        feet, weights = closest_point(self.mesh.vertices[self.mesh.triangles[some]], points[:, None])
         off = points[:, None] - feet
         away = np.linalg.norm(off, axis=2)
         across = np.abs(np.einsum("nki,nki->nk", off, self.normals[some]))
@@ -139,14 +139,14 @@ class ReferenceMesh:
         """Signed distances (n,) of places (n, 3), and deviations (n,), inf beyond where the mesh ends."""
         feet, triangle, std, ends = self.feet(points)
         up, side = self.normals[triangle], np.einsum("ni,ni->n", points - feet, self.normals[triangle])
-        surface, feet = self._settled(charts, feet, up)
+        surface, feet = self._project(charts, feet, up)
         off = points - feet
         ahead = np.einsum("ni,ni->n", off, surface.normal)
         away = np.linalg.norm(off, axis=1)
         # A triangle is a chord: the foot of its plane is a little beside that of the surface.
         across = off - ahead[:, None] * surface.normal
         some = np.flatnonzero((np.abs(ahead) > AHEAD * away) & (np.linalg.norm(across, axis=1) < self.edge))
-        there, tried = self._settled(charts, feet[some] + across[some], up[some])
+        there, tried = self._project(charts, feet[some] + across[some], up[some])
         left = np.linalg.norm(points[some] - tried, axis=1)
         nearer = (left < away[some]) & (np.abs(there.distance) < there.std)
         some = some[nearer]
@@ -154,16 +154,16 @@ class ReferenceMesh:
             old[some] = new[nearer]
         ahead = np.einsum("ni,ni->n", points - feet, surface.normal)
         smooth = np.abs(ahead) > AHEAD * away
-        side = np.where(smooth & (surface.node >= 0), ahead, side)
+        side = np.where(smooth & (surface.patch >= 0), ahead, side)
         if not self.is_open.any():
             side = np.where(away > FAR * self.indicator.cell, -self.indicator.at(points), side)
-        std = np.where(surface.node < 0, std, surface.std)
+        std = np.where(surface.patch < 0, std, surface.std)
         if self.unfelt is not None and self.is_open.any():
             rim, behind = self._rim.query(points)[0], self.indicator.at(points)
-            return self._partly(away, side, ahead, rim, std, behind, ends)
+            return self._distances_near_border(away, side, ahead, rim, std, behind, ends)
         return np.copysign(away, side), np.where(ends, np.inf, std)
 
-    def _partly(
+    def _distances_near_border(
         self,
         away: Array,
         side: Array,
@@ -200,15 +200,15 @@ class ReferenceMesh:
 
         return cKDTree(self.mesh.vertices[self.is_open])
 
-    def _settled(self, charts: Charts, places: Array, up: Array) -> tuple[Surface, Array]:
+    def _project(self, charts: Charts, places: Array, up: Array) -> tuple[SurfaceSample, Array]:
         """The surface near places (n, 3) that faces `up` (n, 3), and the places moved onto it."""
         for _ in range(2):  # Farther away than an edge there is only another part of the surface.
-            surface = patched(charts, self.indicator, places, up, self.edge)
+            surface = surface_within_margin(charts, self.indicator, places, up, self.edge)
             places = places - surface.distance[:, None] * surface.normal
         return surface, places
 
 
-def closest(triangles: Array, points: Array) -> tuple[Array, Array]:
+def closest_point(triangles: Array, points: Array) -> tuple[Array, Array]:
     """The places (..., 3) of triangles (..., 3, 3) nearest to points (..., 3), and their weights (..., 3)."""
     a, b, c = np.moveaxis(triangles, -2, 0)
     ab, ac, ap = b - a, c - a, points - a

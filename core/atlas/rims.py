@@ -32,7 +32,7 @@ NARROWEST = 5.0  # A patch reaches at most this many times as far as it is wide.
 SLOPE = 1e-3  # Slopes are differences over this share of the radius.
 
 
-def felt_rim(r: Reconstruction, finger: Finger, near: float) -> Array:
+def radial_extent(r: Reconstruction, finger: Finger, near: float) -> Array:
     """The radii (AZIMUTHS,) of a patch, in unit radius, up to where the surface or the patch turns away.
 
     near : the finger feels the patch where the surface is within this length of it
@@ -42,7 +42,7 @@ def felt_rim(r: Reconstruction, finger: Finger, near: float) -> Array:
     radii = domain[azimuths]
     turns = 2.0 * np.pi * azimuths / AZIMUTHS
     rays = r.radius * radii * np.stack([np.cos(turns), np.sin(turns)])
-    shares, ended = _shares(r, finger, near, rays)
+    shares, ended = _extents(r, finger, near, rays)
     if not ended.any():
         return domain
     radii = radii * shares
@@ -77,7 +77,7 @@ def _corners(inverse: Array, ended: NDArray[np.bool_]) -> Array:
     return np.where(four & (both > 0.0), np.sin(step) / np.where(both > 0.0, both, 1.0), 0.0)
 
 
-def _shares(r: Reconstruction, finger: Finger, near: float, rays: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _extents(r: Reconstruction, finger: Finger, near: float, rays: Array) -> tuple[Array, NDArray[np.bool_]]:
     """How far the patch goes along rays (2, TAPS), as shares of these, and whether it ends there."""
     low, high, left = np.zeros(TAPS), np.zeros(TAPS), np.arange(TAPS)
     shares, ended = np.ones(TAPS), np.zeros(TAPS, dtype=bool)

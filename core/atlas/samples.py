@@ -13,7 +13,7 @@ from ..arguments import Array
 from ..steps import chunked
 from .charts import STEEPEST, Charts
 from .field import facing_alike, node_weights, weights_of
-from .indicator import LAYERS, Indicator, solved
+from .indicator import LAYERS, Indicator, solve_poisson
 
 # python -m benchmarks.atlas judges these.
 PITCH = 1.2  # Samples of a patch are this many cells apart.
@@ -39,7 +39,9 @@ def indicated(charts: Charts, tolerance: float | None) -> Generator[float, None,
     cell = max(min(cell, COARSEST * size, thinnest / LAYERS), FINEST * size)
     if PITCH * cell < DENSER * pitch:  # Between samples that are too far apart the indicator has bubbles.
         samples = yield from samples_of(charts, PITCH * cell)
-    return (yield from solved(samples.points, samples.areas[:, None] * samples.normals, cell, thinnest))
+    return (
+        yield from solve_poisson(samples.points, samples.areas[:, None] * samples.normals, cell, thinnest)
+    )
 
 
 class Samples(NamedTuple):
@@ -69,16 +71,21 @@ def samples_of(charts: Charts, pitch: float) -> Generator[float, None, Samples]:
     """
     half = charts.rims.max(axis=1)
     across = np.maximum(ACROSS, np.ceil(2.0 * half * charts.radii / pitch).astype(np.intp))
-    node, x, y, middle, group = yield from _spread(charts, half, across)
+    patch, x, y, middle, group = yield from _sample_grid(charts, half, across)
     others, thickness = yield from chunked(
-        partial(_others, charts), SAMPLES_AT_ONCE, 0.0, node[middle], x[middle], y[middle]
+        partial(_overlap_weight_and_thickness, charts),
+        SAMPLES_AT_ONCE,
+        0.0,
+        patch[middle],
+        x[middle],
+        y[middle],
     )
-    flat = ((2.0 * half * charts.radii / across) ** 2)[node]
-    each = node, x, y, flat, others[group], thickness[group]
+    flat = ((2.0 * half * charts.radii / across) ** 2)[patch]
+    each = patch, x, y, flat, others[group], thickness[group]
     return Samples._make((yield from chunked(partial(_samples, charts), SAMPLES_AT_ONCE, 0.0, *each)))
 
 
-def _spread(
+def _sample_grid(
     charts: Charts, half: Array, across: NDArray[np.intp]
 ) -> Generator[float, None, tuple[NDArray[np.intp], Array, Array, NDArray[np.intp], NDArray[np.intp]]]:
     """The patches and local x and y of evenly spread samples, (n,) each; yields 0.
@@ -100,40 +107,46 @@ def _spread(
         groups += (count // few + 1) ** 2
         if i % PATCHES_AT_ONCE == 0:
             yield 0.0
-    node, x, y, group, aside = (np.concatenate(values) for values in zip(*places, strict=True))
+    patch, x, y, group, aside = (np.concatenate(values) for values in zip(*places, strict=True))
     # The sample in the middle of a group is first.
     order = np.lexsort((aside, group))
     yield 0.0
     _, first, of = np.unique(group[order], return_index=True, return_inverse=True)
     group = np.empty(len(order), dtype=np.intp)
     group[order] = of
-    return node, x, y, order[first], group
+    return patch, x, y, order[first], group
 
 
-def _others(charts: Charts, node: NDArray[np.intp], x: Array, y: Array) -> tuple[Array, Array]:
+def _overlap_weight_and_thickness(
+    charts: Charts, patch: NDArray[np.intp], x: Array, y: Array
+) -> tuple[Array, Array]:
     """Sums of the weights of other patches of the sheet at local (x, y) of patches, (n,).
 
     Also the thickness of the wall or gap between the sheet and what faces the other way, (n,).
     """
-    points, normals = charts.world(node, x, y)
+    points, normals = charts.world(patch, x, y)
     pairs, count = charts.pairs(points), len(points)
-    up, radius = normals[pairs.place], charts.radii[node[pairs.place]]
-    alike = facing_alike(charts, pairs, up, np.zeros(len(up)), radius) * (pairs.node != node[pairs.place])
-    others: Array = np.bincount(pairs.place, node_weights(charts, pairs) * alike, count).astype(np.float64)
+    up, radius = normals[pairs.point_index], charts.radii[patch[pairs.point_index]]
+    alike = facing_alike(charts, pairs, up, np.zeros(len(up)), radius) * (
+        pairs.patch != patch[pairs.point_index]
+    )
+    others: Array = np.bincount(pairs.point_index, node_weights(charts, pairs) * alike, count).astype(
+        np.float64
+    )
     opposite = (np.einsum("mi,mi->m", pairs.normal, up) < OPPOSITE) & (pairs.rho < 1.0)
     opposite &= np.abs(pairs.distance) > CERTAIN * pairs.std
     thickness = np.full(count, np.inf)
-    np.minimum.at(thickness, pairs.place[opposite], np.abs(pairs.distance[opposite]))
+    np.minimum.at(thickness, pairs.point_index[opposite], np.abs(pairs.distance[opposite]))
     return others, thickness
 
 
 def _samples(
-    charts: Charts, node: NDArray[np.intp], x: Array, y: Array, flat: Array, others: Array, thickness: Array
+    charts: Charts, patch: NDArray[np.intp], x: Array, y: Array, flat: Array, others: Array, thickness: Array
 ) -> Samples:
     """Samples of patches at local (x, y); `flat` are their areas in the tangent planes."""
-    points, normals = charts.world(node, x, y)
-    share, steep = charts.shares(x, y, node), np.einsum("ni,ni->n", normals, charts.axes[node, :, 2])
+    points, normals = charts.world(patch, x, y)
+    share, steep = charts.shares(x, y, patch), np.einsum("ni,ni->n", normals, charts.axes[patch, :, 2])
     inside = steep > STEEPEST
-    own = weights_of(share, charts.radii[node] * charts.stds_at(x, y, node) * steep, charts.radii[node])
+    own = weights_of(share, charts.radii[patch] * charts.stds_at(x, y, patch) * steep, charts.radii[patch])
     areas = flat * own / (own + others) / np.maximum(steep, STEEPEST)
     return Samples(*(values[inside] for values in (points, normals, areas, thickness)))

@@ -20,7 +20,7 @@ import numpy as np
 from ..arguments import Array
 from ..lapack import on_one_thread
 from ..patch.monge import exponents, monomials
-from .cubic_spline import CUBIC, SIDE, bases, between
+from .cubic_spline import CUBIC, SIDE, bases, upsampled
 
 # python -m benchmarks.atlas chose these.
 # The orders of derivatives, each with the grid of their size.
@@ -160,6 +160,11 @@ def _ascended(
 
 
 def _solved(equations: _Equations, hyperparameters: _Hyperparameters, half: float) -> _Solution:
+    """The penalized least squares solution for given hyperparameters, by a banded Cholesky factor L L' = A.
+
+    neg2_log_evidence is y'y - |L^-1 b|^2 + log |A| - log |prior precision| and the terms of the noise, in
+    unit radius.
+    """
     from scipy.linalg import cholesky_banded
 
     _, log_determinant, log_free = penalty(hyperparameters.order)
@@ -215,7 +220,7 @@ def _stds(factor: Array) -> Array:
     """Deviations (SIDE, SIDE), computed at every other knot, because they are smooth and take the longest."""
     coarse = _heights_at_coarse_knots()
     some = np.sqrt((_triangular(factor, coarse, "N") ** 2).sum(axis=0))
-    return between(some.reshape((SIDE + 1) // 2, -1))
+    return upsampled(some.reshape((SIDE + 1) // 2, -1))
 
 
 @cache

@@ -65,7 +65,7 @@ def tetrahedra_of(cells: Indices) -> Generator[float, None, tuple[Indices, Indic
     return points, np.concatenate(index)
 
 
-def cut(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
+def march(tetrahedra: Indices, values: Array) -> tuple[Indices, Indices]:
     """Lattice edges (n, 2) that the surface crosses, and its triangles (m, 3) between these crossings."""
     inside = values < 0.0
     signs = inside[tetrahedra]
@@ -108,7 +108,7 @@ def _table() -> dict[int, Indices]:
     return found
 
 
-def evened(vertices: Array, normal: Array, triangles: Indices) -> Array:
+def smoothed(vertices: Array, normal: Array, triangles: Indices) -> Array:
     """Vertices moved along the surface, towards the mean of their neighbors; those of a border stay."""
     from scipy.sparse import coo_matrix
 
@@ -131,7 +131,7 @@ def sides_of(triangles: Indices, count: int) -> Indices:
     return np.stack(np.divmod(keys, count), axis=1)
 
 
-def halved(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
+def subdivided(vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
     """Vertices (n, 3) and triangles (m, 3) with a vertex more in the middle of each edge."""
     sides = sides_of(triangles, len(vertices))
     middles = vertices[sides].mean(axis=1)

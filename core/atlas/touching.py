@@ -18,13 +18,13 @@ from ..exploration.one_touch import Exploration
 from ..exploration.options import ExplorationOptions
 from ..exploration.side_by_side import exploring_many
 from ..steps import part_of, result_of
-from .borders import bordered, felt_border
+from .borders import felt_border, snapped_to_border
 from .charts import Charts
 from .finger import FACING, Finger
 from .frontier import Frontier
-from .join import Table, agreed, joined
+from .join import Table, blend_heights, refit
 from .meshing import Mesh
-from .object_atlas import LIMIT, Atlas, Check, surfaced
+from .object_atlas import LIMIT, Atlas, Check, joined_surface
 from .reference_mesh import ReferenceMesh
 
 # python -m benchmarks.atlas judges these.
@@ -47,7 +47,7 @@ BORDERS = 2  # This often a mesh is moved to the borders that are felt.
 ROUGH_APART = 0.5  # Touches where the surface is less certain are this many radii apart.
 LARGER = 2.0  # A touch reaches at most this many radii of the patch from which it goes on.
 
-Contact = tuple[ArrayLike, ArrayLike]  # A point and its normal, (3,) each.
+PointNormal = tuple[ArrayLike, ArrayLike]  # A point and its normal, (3,) each.
 
 
 class Progress(NamedTuple):
@@ -97,13 +97,13 @@ def touch_all_over(
     run = _Run(surface, tolerance, most, options)
     yield from run.show(run.first(p, up))
     yield from _all_over(run)
-    return (yield from _joined(run))
+    return (yield from _joined_and_refined(run))
 
 
 def _all_over(run: "_Run") -> Generator[Progress, object, None]:
     """Touches until nothing within reach is uncovered."""
     while not run.is_stopped and run.done < run.most:
-        chosen = yield from run.showing(run.frontier.taking(min(SIDE_BY_SIDE, run.most - run.done)))
+        chosen = yield from run.showing(run.frontier.next_touches(min(SIDE_BY_SIDE, run.most - run.done)))
         if not chosen or run.is_stopped:
             break
         farthest = LARGER * max(touch.place.radius for touch in chosen)
@@ -192,7 +192,7 @@ class _Run:
         return Progress(self.done, len(self.frontier.queue), tuple(new), joining, tuple(rims))
 
     def touching(
-        self, contacts: Sequence[Contact], farthest: float, least: Sequence[float]
+        self, contacts: Sequence[PointNormal], farthest: float, least: Sequence[float]
     ) -> Generator[None, None, list[Exploration]]:
         """Touches at contacts; returns those that succeed, and adds their rims to the frontier.
 
@@ -206,12 +206,12 @@ class _Run:
         for e, point, up, times in zip(results, points, outward, least, strict=True):
             # At an edge a fit may end up on the other side.
             if isinstance(e, ValueError) or e.result.frame.axes[:, 2] @ up < FACING:
-                self.frontier.in_vain.append(vector_of(point))
+                self.frontier.failed_points.append(vector_of(point))
             elif self.frontier.add(e.result, times * self.tolerance, SMALL * self.tolerance):
                 new.append(e)
                 yield
             elif times < SMALL:
-                self.frontier.in_vain.append(vector_of(point))
+                self.frontier.failed_points.append(vector_of(point))
         self.found += new
         self.done += len(contacts)
         return new
@@ -221,9 +221,9 @@ class _Run:
         contours = [[*e.contours, taps] for e, taps in zip(self.found, self.frontier.taps, strict=True)]
         results = [e.result for e in self.found]
         yield 0.0
-        return (yield from joined(contours, results, self.frontier.charts, self.options.noise, earlier))
+        return (yield from refit(contours, results, self.frontier.charts, self.options.noise, earlier))
 
-    def going_on(self, contacts: Sequence[Contact], farthest: float) -> Generator[Progress, object, None]:
+    def going_on(self, contacts: Sequence[PointNormal], farthest: float) -> Generator[Progress, object, None]:
         """Touches at contacts, and all over from there."""
         few = contacts[: self.most - self.done]
         new: list[Exploration] = []
@@ -252,22 +252,22 @@ class _Run:
 
     def atlas(
         self, earlier: dict[int, tuple[int, Table]]
-    ) -> Generator[float, None, tuple[Atlas, list[Contact]]]:
+    ) -> Generator[float, None, tuple[Atlas, list[PointNormal]]]:
         """The atlas of what was found so far, and contacts where something is missing or less certain.
 
         These are where the joined surface ends though the object goes on, where a finger from outside meets
         something else, and where the surface is less certain than the tolerance.
         """
         charts = yield from part_of(self.joining(earlier), 0.0, JOINED)
-        charts = yield from part_of(agreed(charts), 0.0, JOINED)
+        charts = yield from part_of(blend_heights(charts), 0.0, JOINED)
         patches = tuple(e.result for e in self.found)
-        reference = yield from part_of(surfaced(patches, charts, self.tolerance), JOINED, 1.0)
+        reference = yield from part_of(joined_surface(patches, charts, self.tolerance), JOINED, 1.0)
         yield 1.0
         for _ in range(BORDERS):
             steps = felt_border(self.frontier.finger, self.frontier.near, reference.mesh)
             border = yield from part_of(steps, 1.0, 1.0)
             # The finger has looked for what goes on unfelt.
-            reference = replace(reference, mesh=bordered(reference.mesh, border), unfelt=None)
+            reference = replace(reference, mesh=snapped_to_border(reference.mesh, border), unfelt=None)
         yield from reference.prepared()
         check = yield from self.check(reference)
         yield 1.0
@@ -278,14 +278,14 @@ class _Run:
         off = atlas.improvable
         yield 1.0
         atlas = yield from atlas.widened()
-        contacts: list[Contact] = [contact for _, contact in uncovered]
+        contacts: list[PointNormal] = [contact for _, contact in uncovered]
         contacts += zip(check.points[off], check.normals[off], strict=True)
-        return atlas, contacts + (self.rough(atlas.reference.mesh) if atlas.is_rough else [])
+        return atlas, contacts + (self.uncertain_contacts(atlas.reference.mesh) if atlas.is_rough else [])
 
-    def rough(self, mesh: Mesh) -> list[Contact]:
+    def uncertain_contacts(self, mesh: Mesh) -> list[PointNormal]:
         """Contacts where the surface is less certain than LIMIT tolerances, apart from each other."""
         left, normals = np.flatnonzero(mesh.std > LIMIT * self.tolerance), mesh.normals
-        found: list[Contact] = []
+        found: list[PointNormal] = []
         while len(left):
             worst = left[np.argmax(mesh.std[left])]
             point, normal = vector_of(mesh.vertices[worst]), vector_of(normals[worst])
@@ -326,7 +326,7 @@ def rays_at(reference: ReferenceMesh) -> tuple[Array, Array, NDArray[np.bool_], 
     return starts, np.vstack([aims, mesh.vertices[sharpest], centers[around]]), facing, 3.0 * far
 
 
-def _joined(run: _Run) -> Steps:
+def _joined_and_refined(run: _Run) -> Steps:
     """The atlas of what was found, after more touches where something is missing or less certain."""
     earlier: dict[int, tuple[int, Table]] = {}
     for again in range(AGAIN, -1, -1):

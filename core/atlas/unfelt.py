@@ -8,7 +8,7 @@ from ..arguments import Array
 from ..contours.contour import tangent_of, vector_of
 from ..triangles import normalized, triangle_cross
 from .charts import Charts
-from .frontier import Place
+from .frontier import RimPlace
 from .meshing import Mesh
 from .reference_mesh import ReferenceMesh
 
@@ -16,24 +16,24 @@ APART = 0.8  # Places are at least so many radii of the patch beside them from e
 STEEP = 0.95  # The way from a patch to its rim is not along the normal there by a larger cosine.
 
 
-def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[Place, ...]:
+def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[RimPlace, ...]:
     """Places on the border of a mesh beyond which nothing was felt; a closed surface has none.
 
     Their areas are those of the indicator's surface around them that no patch covers.
     """
     from scipy.spatial import cKDTree
 
-    found: list[Place] = []
+    found: list[RimPlace] = []
     mesh, unfelt = reference.mesh, reference.unfelt
     if unfelt is None or not reference.is_open.any():
         return tuple(found)
     rim, patch = mesh.vertices[reference.is_open], mesh.patch[reference.is_open]
-    patched, missing = np.flatnonzero(mesh.patch >= 0), patch < 0
+    surface_within_margin, missing = np.flatnonzero(mesh.patch >= 0), patch < 0
     if missing.any():
-        nearest = cKDTree(charts.origins if not len(patched) else mesh.vertices[patched]).query(rim[missing])[
-            1
-        ]
-        patch[missing] = mesh.patch[patched[nearest]] if len(patched) else nearest
+        nearest = cKDTree(
+            charts.origins if not len(surface_within_margin) else mesh.vertices[surface_within_margin]
+        ).query(rim[missing])[1]
+        patch[missing] = mesh.patch[surface_within_margin[nearest]] if len(surface_within_margin) else nearest
     ups = mesh.normals[reference.is_open]
     radii, areas = charts.radii[patch], _areas(unfelt)
     around = cKDTree(unfelt.vertices).query_ball_point(rim, radii)
@@ -47,7 +47,7 @@ def uncovered_places(reference: ReferenceMesh, charts: Charts) -> tuple[Place, .
             ahead = np.array(tangent_of(vector_of(up), None))
         ahead = np.cross(up, np.cross(ahead, up))
         place = vector_of(point), vector_of(up), vector_of(ahead), float(radii[best])
-        found.append(Place(*place, area=float(gains[best])))
+        found.append(RimPlace(*place, area=float(gains[best])))
         left = left[np.linalg.norm(rim[left] - point, axis=1) > APART * radii[best]]
     return tuple(found)
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arguments import Array
 from ..contours.contour import Contour
-from ..contours.curves import besides_point, stacked
+from ..contours.curves import distances_from_point, stacked
 from ..contours.local_geometry import Frame
 from ..patch.monge import TERMS, derived_monomials
 from .posterior import SurfacePosterior
@@ -69,7 +69,7 @@ def measured_normals(contours: Sequence[Contour], frame: Frame, radius: float) -
     points, present, normals = stacked(frame.origin[None], [contours])
     if normals is None:
         return np.empty((0, 3)), np.empty((0, 3))
-    chosen = present & besides_point(points)[1] & normals.any(axis=-1)
+    chosen = present & distances_from_point(points)[1] & normals.any(axis=-1)
     return points[chosen] @ frame.axes / radius, normals[chosen] @ frame.axes
 
 

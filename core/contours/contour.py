@@ -32,7 +32,7 @@ WHERE = {  # The stops in words.
     NOT_MONGE: "where the surface turns away",
     UNEXPLAINED: "where the patch could no longer be trusted",
 }
-OPEN_STOPS = (NO_CONTACT, CREASE)  # The surface ends at these stops.
+SURFACE_ENDS = (NO_CONTACT, CREASE)  # The surface ends at these stops.
 
 Vector = tuple[float, float, float]
 

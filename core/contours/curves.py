@@ -85,7 +85,7 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
     """
     shape, each = present.shape, np.arange(present[..., 0].size)
     r, present, curve = r.reshape(len(each), -1, 3), present.reshape(len(each), -1), each[:, None]
-    distance, beside = besides_point(r)
+    distance, beside = distances_from_point(r)
     present = present & beside
     far = np.where(present, distance, np.inf)
     near = far.argsort(axis=1, kind="stable")[:, :WINDOW]
@@ -113,7 +113,7 @@ def curves_through(r: Array, present: NDArray[np.bool_], normals: Array | None =
     )
 
 
-def besides_point(r: Array) -> tuple[Array, NDArray[np.bool_]]:
+def distances_from_point(r: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Distances (..., n) of contacts (..., n, 3) from the point, and a mask of those that are above 0.
 
     A distance counts as 0 up to 1e-9 of the largest one, or up to SMALLEST.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..arguments import Array
 from .contour import Contour, consistently_oriented
-from .curves import WINDOW, besides_point
+from .curves import WINDOW, distances_from_point
 
 # With this many contacts a contour no fit is worse, with noise in all directions (tests: test_thinning).
 MOST_CONTACTS = 100
@@ -29,7 +29,7 @@ def thinned(contour: Contour, point: Array) -> tuple[Contour, int]:
     if len(contour.points) <= MOST_CONTACTS:
         return contour, 1
     r = contour.points - point
-    beside = np.flatnonzero(besides_point(r)[1])
+    beside = np.flatnonzero(distances_from_point(r)[1])
     size = math.ceil(len(beside) / MOST_CONTACTS)
     if size <= 1:
         return contour, 1

@@ -16,7 +16,14 @@ from ..bayes.other_curves import contradicting_curve
 from ..bayes.posterior import SurfacePosterior, terms_to
 from ..bayes.prior import FREE
 from ..contours.contour import Contour, read_only
-from ..contours.curves import Curves, besides_point, curves_through, has_measured_normals, misses, stacked
+from ..contours.curves import (
+    Curves,
+    curves_through,
+    distances_from_point,
+    has_measured_normals,
+    misses,
+    stacked,
+)
 from ..contours.local_geometry import Frame
 from ..paper import least_squares
 from ..patch.domain import Domain
@@ -95,7 +102,7 @@ class Reconstruction:
         """The fitted contacts besides the reference point, (n, 3), in the frame."""
         curves = [contour.points - self.frame.origin for contour in self.contours]
         strokes = self.strokes - self.frame.origin
-        return np.vstack([*(r[besides_point(r)[1]] for r in curves), strokes]) @ self.frame.axes
+        return np.vstack([*(r[distances_from_point(r)[1]] for r in curves), strokes]) @ self.frame.axes
 
     @cached_property
     def misses(self) -> Array:
@@ -301,7 +308,7 @@ class Reconstruction:
         """The number of deviations, and the share of L, by which a curve is off what the others tell."""
         if self.method != "bayes":
             return 0.0, 0.0
-        counted = [besides_point(contour.points - self.frame.origin)[1] for contour in self.contours]
+        counted = [distances_from_point(contour.points - self.frame.origin)[1] for contour in self.contours]
         curve = np.repeat(np.arange(len(counted)), list(map(np.count_nonzero, counted)))
         curve = np.append(curve, np.full(len(self.strokes), -1))
         return contradicting_curve(self.contacts / self.radius, curve, self.posterior, self.noise)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arguments import Array
-from ..contours.contour import OPEN_STOPS, Contour
+from ..contours.contour import SURFACE_ENDS, Contour
 from ..contours.curves import LEAST_CONTACTS, Curves, curves_through, misses, stacked
 from ..contours.local_geometry import (
     DegenerateCurvesError,
@@ -240,7 +240,7 @@ def domain_of(curves: Curves, contours: Sequence[Contour]) -> Domain:
     ends = np.array([curves.points[rows, 0, :2], curves.points[rows, last, :2]])
     open_ends = np.zeros_like(sides)
     for i, contour in enumerate(contours):
-        open_ends[:, i] = [stop in OPEN_STOPS for stop in contour.stops or ("", "")]
+        open_ends[:, i] = [stop in SURFACE_ENDS for stop in contour.stops or ("", "")]
     counted = sides
     if open_ends.any():
         at_point = open_ends & (np.linalg.norm(ends, axis=2) * sides < AT_POINT)

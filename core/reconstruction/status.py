@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..bayes.posterior import CONFIDENCE, terms_to
-from ..contours.contour import OPEN_STOPS
+from ..contours.contour import SURFACE_ENDS
 from ..patch.domain import AT_POINT
 
 # benchmarks.stability chose these, and benchmarks.real LIKELY and what taps say. A fit is in doubt beyond
@@ -95,7 +95,7 @@ def _is_at_edge(r: Judged) -> bool:
     for contour in r.contours:
         reaches = np.linalg.norm(contour.points[[0, -1]] - r.frame.origin, axis=1) / r.radius
         for reach, stop in zip(reaches, contour.stops or (), strict=False):
-            if reach <= AT_POINT and stop in OPEN_STOPS:
+            if reach <= AT_POINT and stop in SURFACE_ENDS:
                 return True
     return False
 

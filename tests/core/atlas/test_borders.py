@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import core
-from core.atlas.borders import Border, bordered
+from core.atlas.borders import Border, snapped_to_border
 from core.atlas.meshing import Mesh
 from tests import solids
 
@@ -129,7 +129,7 @@ def test_a_mesh_that_is_too_wide_or_too_narrow_ends_at_the_border_and_does_not_f
         ends = np.stack([square, np.roll(square, -1, axis=0)], axis=1)
         ends = np.pad(ends, ((0, 0), (0, 0), (0, 1)))
         ways = np.array([(0, -1, 0), (1, 0, 0), (0, 1, 0), (-1, 0, 0)], dtype=float)
-        mesh = bordered(grid_mesh(), Border(ends, ways, ends[:, 0]))
+        mesh = snapped_to_border(grid_mesh(), Border(ends, ways, ends[:, 0]))
         a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
         areas = 0.5 * np.cross(b - a, c - a)[:, 2]
         assert areas.min() > -1e-12
@@ -139,4 +139,4 @@ def test_a_mesh_that_is_too_wide_or_too_narrow_ends_at_the_border_and_does_not_f
 
 def test_a_mesh_without_a_border_stays():
     mesh = grid_mesh()
-    assert bordered(mesh, Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)))) is mesh
+    assert snapped_to_border(mesh, Border(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)))) is mesh

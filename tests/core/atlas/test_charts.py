@@ -40,14 +40,16 @@ def test_pairs_are_those_of_each_place_and_each_patch_alone(charts, near):
     points = places(4000, 1)  # They are more than one chunk.
     found = charts.pairs(points, near)
     one_by_one = []
-    for node in range(len(charts.radii)):
+    for patch in range(len(charts.radii)):
         for start in range(0, len(points), 500):
-            pairs = charts.chosen([node]).pairs(points[start : start + 500], near)
-            one_by_one += [(start + at, node, d) for at, d in zip(pairs.place, pairs.distance, strict=True)]
-    together = list(zip(found.place.tolist(), found.node.tolist(), strict=True))
-    assert sorted(together) == sorted((at, node) for at, node, _ in one_by_one)
-    assert (np.diff(found.place) >= 0).all()
-    alone = {(at, node): d for at, node, d in one_by_one}
+            pairs = charts.chosen([patch]).pairs(points[start : start + 500], near)
+            one_by_one += [
+                (start + at, patch, d) for at, d in zip(pairs.point_index, pairs.distance, strict=True)
+            ]
+    together = list(zip(found.point_index.tolist(), found.patch.tolist(), strict=True))
+    assert sorted(together) == sorted((at, patch) for at, patch, _ in one_by_one)
+    assert (np.diff(found.point_index) >= 0).all()
+    alone = {(at, patch): d for at, patch, d in one_by_one}
     assert found.distance == pytest.approx([alone[pair] for pair in together], abs=1e-12)
 
 
@@ -56,12 +58,12 @@ def test_pairs_are_the_same_in_other_units_and_far_away(charts, unit, shift):
     points = places(500, 2)
     moved = replace(charts, origins=unit * charts.origins + shift, radii=unit * charts.radii)
     here, there = charts.pairs(points), moved.pairs(unit * points + shift)
-    assert (here.place == there.place).all() and (here.node == there.node).all()
+    assert (here.point_index == there.point_index).all() and (here.patch == there.patch).all()
     assert there.distance == pytest.approx(unit * here.distance, abs=1e-8 * unit * max(1.0, shift))
 
 
 def test_no_places_have_no_pairs(charts):
-    assert len(charts.pairs(np.zeros((0, 3))).place) == 0
+    assert len(charts.pairs(np.zeros((0, 3))).point_index) == 0
 
 
 def test_a_place_far_beside_the_normal_at_its_foot_has_no_foot():
@@ -69,8 +71,8 @@ def test_a_place_far_beside_the_normal_at_its_foot_has_no_foot():
     result = core.explore(BALL, BALL.start, BALL.outward, farthest=1.2, rng=0).result
     points = result.frame.origin + np.random.default_rng(3).uniform(-1.2, 1.2, (20_000, 3))
     pairs = charts_of([result]).pairs(points)
-    assert len(pairs.place) > 4000
-    assert np.abs(pairs.distance - BALL.distances(points[pairs.place])).max() < 0.1 * result.radius
+    assert len(pairs.point_index) > 4000
+    assert np.abs(pairs.distance - BALL.distances(points[pairs.point_index])).max() < 0.1 * result.radius
     assert (pairs.rho < MARGIN).all()
 
 

@@ -10,7 +10,7 @@ import pytest
 import core
 from core.atlas.charts import AZIMUTHS
 from core.atlas.finger import Finger
-from core.atlas.rims import felt_rim
+from core.atlas.rims import radial_extent
 from tests import solids
 
 NEAR, TURNS = 0.02, 2.0 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
@@ -28,7 +28,7 @@ class Pierced(solids.Convex):
 def rim_of(solid, extent=0.35, near=NEAR):
     """The patch at the start of a solid, and its rim there, (AZIMUTHS, 2), as long as it is."""
     r = core.explore(solid, solid.start, solid.outward, extent=extent, rng=0).result
-    return r, r.radius * felt_rim(r, Finger(solid, 1.0), near)[:, None] * RAYS
+    return r, r.radius * radial_extent(r, Finger(solid, 1.0), near)[:, None] * RAYS
 
 
 def area(rim):
@@ -62,7 +62,7 @@ def test_on_a_ball_a_patch_ends_where_its_curves_do():
 
 def test_off_the_surface_a_patch_has_no_rim():
     r = core.explore(solids.ball(), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), extent=0.35, rng=0).result
-    assert (felt_rim(r, Finger(solids.ball(1.1), 1.0), NEAR) == 0.0).all()
+    assert (radial_extent(r, Finger(solids.ball(1.1), 1.0), NEAR) == 0.0).all()
 
 
 def test_a_rim_turns_and_grows_with_the_object():

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import core
-from core.atlas.creases import creased
-from core.atlas.reference_mesh import ReferenceMesh, closest
+from core.atlas.creases import insert_creases
+from core.atlas.reference_mesh import ReferenceMesh, closest_point
 from core.atlas.touching import CHECKS, SHARPEST, rays_at
 from core.steps import result_of
 from tests import solids
@@ -112,7 +112,7 @@ def test_edges_are_straight_to_half_a_tolerance(block):
             near = np.linalg.norm(triangles.mean(axis=1)[None] - points[:, None], axis=2).argsort(axis=1)[
                 :, :12
             ]
-            feet, _ = closest(triangles[near], points[:, None])
+            feet, _ = closest_point(triangles[near], points[:, None])
             off = np.linalg.norm(feet - points[:, None], axis=2).min(axis=1)
             assert np.percentile(off, 95) < 0.5 * TOLERANCE
 
@@ -243,7 +243,7 @@ def test_half_a_shell_has_a_border_and_beyond_it_the_deviation_is_infinite():
 def test_the_nearest_places_on_triangles_are_no_farther_than_any_of_their_places():
     rng = np.random.default_rng(0)
     triangles, points = rng.normal(size=(300, 3, 3)), 2.0 * rng.normal(size=(300, 3))
-    feet, weights = closest(triangles, points)
+    feet, weights = closest_point(triangles, points)
     assert weights.min() > -1e-12
     assert weights.sum(axis=1) == pytest.approx(np.ones(300))
     assert np.einsum("ni,nij->nj", weights, triangles) == pytest.approx(feet, abs=1e-12)
@@ -261,7 +261,7 @@ def test_where_walls_turn_smoothly_there_is_no_crease():
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1.0).max() < TOLERANCE
     a, b = mesh.vertices[mesh.triangles[:, :2]].transpose(1, 0, 2)
     assert np.einsum("ni,ni->n", a, b).min() < 0.8
-    vertices, *_ = result_of(creased(atlas.charts, mesh.vertices, mesh.triangles, mesh.vertices, 0.6))
+    vertices, *_ = result_of(insert_creases(atlas.charts, mesh.vertices, mesh.triangles, mesh.vertices, 0.6))
     assert len(vertices) == len(mesh.vertices)
     assert (vertices == mesh.vertices).all()
 

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from core.atlas.tetrahedra import cut, evened, halved, sides_of, split_sides, tetrahedra_of
+from core.atlas.tetrahedra import march, sides_of, smoothed, split_sides, subdivided, tetrahedra_of
 from core.steps import result_of
 from tests import solids
 
@@ -20,7 +20,7 @@ def lattice(size):
 def ball(size=0.3):
     """Vertices and triangles of a ball, each vertex in the middle of an edge of the lattice."""
     points, tetrahedra = lattice(size)
-    ends, triangles = cut(tetrahedra, np.linalg.norm(points, axis=1) - 1.0)
+    ends, triangles = march(tetrahedra, np.linalg.norm(points, axis=1) - 1.0)
     return points[ends].mean(axis=1), triangles
 
 
@@ -66,7 +66,7 @@ def test_split_sides_leave_the_same_surface_without_a_gap(share):
 
 def test_halved_triangles_are_four_times_as_many_on_the_same_planes():
     vertices, triangles = ball()
-    more, found = halved(vertices, triangles)
+    more, found = subdivided(vertices, triangles)
     assert len(found) == 4 * len(triangles)
     assert volume(more, found) == pytest.approx(volume(vertices, triangles))
     assert np.median(np.linalg.norm(more[found[:, 0]] - more[found[:, 1]], axis=1)) == pytest.approx(
@@ -79,7 +79,7 @@ def test_evened_vertices_stay_on_the_surface_and_a_border_stays():
     vertices, triangles = ball()
     vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
     upper = triangles[(vertices[triangles, 2] > 0.0).all(axis=1)]
-    moved = evened(vertices, vertices, upper)
+    moved = smoothed(vertices, vertices, upper)
     ends, counts = np.unique(
         np.sort(upper[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True
     )
