@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from core.atlas.join import agreed, charts_of, joined
-from core.atlas.object_atlas import Atlas, surfaced
+from core.atlas.join import blend_heights, charts_of, refit
+from core.atlas.object_atlas import Atlas, joined_surface
 from core.steps import result_of
 
 NOISE = 0.0005
@@ -16,9 +16,9 @@ def put_together(found, tolerance):
     """The atlas of explorations, joined as they are, without a search for places that were not felt."""
     results = [e.result for e in found]
     charts = charts_of(results, deviations=False)
-    charts = result_of(joined([e.contours for e in found], results, charts, NOISE, {}))
-    charts = result_of(agreed(charts))
-    return Atlas(tuple(results), charts, result_of(surfaced(results, charts, tolerance)), tolerance)
+    charts = result_of(refit([e.contours for e in found], results, charts, NOISE, {}))
+    charts = result_of(blend_heights(charts))
+    return Atlas(tuple(results), charts, result_of(joined_surface(results, charts, tolerance)), tolerance)
 
 
 def contacts_of(found, taps=()):

@@ -41,7 +41,7 @@ def block_samples():
 
 
 def test_a_ball_is_1_inside_and_0_outside():
-    found = result_of(indicator.solved(*ball_samples(), 0.05, np.inf))
+    found = result_of(indicator.solve_poisson(*ball_samples(), 0.05, np.inf))
     ways = np.random.default_rng(0).normal(size=(500, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     inside, surface, outside = (found.at(r * ways) for r in (0.8, 1.0, 1.15))
@@ -54,13 +54,13 @@ def test_a_ball_is_1_inside_and_0_outside():
 
 
 def test_far_outside_of_the_grid_is_the_outside():
-    found = result_of(indicator.solved(*ball_samples(), 0.05, np.inf))
+    found = result_of(indicator.solve_poisson(*ball_samples(), 0.05, np.inf))
     assert (found.at(np.array([[9.0, 0.0, 0.0], [-3.0, 4.0, 100.0]])) < -0.3).all()
 
 
 @pytest.mark.parametrize("cell", [0.2, 0.1, 0.05])
 def test_the_level_is_much_nearer_to_the_surface_than_a_cell(cell):
-    found = result_of(indicator.solved(*ball_samples(), cell, np.inf))
+    found = result_of(indicator.solve_poisson(*ball_samples(), cell, np.inf))
     line, ways = np.linspace(0.8, 1.2, 4001), np.random.default_rng(1).normal(size=(60, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     values = found.at((ways[:, None] * line[:, None]).reshape(-1, 3)).reshape(60, -1)
@@ -69,7 +69,7 @@ def test_the_level_is_much_nearer_to_the_surface_than_a_cell(cell):
 
 def test_a_convex_edge_has_a_quarter_of_the_inside_around_it_and_a_corner_an_eighth():
     points, areas = block_samples()
-    found = result_of(indicator.solved(points, areas, 0.02, np.inf))
+    found = result_of(indicator.solve_poisson(points, areas, 0.02, np.inf))
     middle = found.at(np.array([[0.5, 0.5, 0.5]]))[0]
     edge, corner = found.at(np.array([[0.5, 0.0, 0.0], [0.0, 0.0, 0.0]])) - middle + 1.0
     assert edge == pytest.approx(0.25, abs=0.04)
@@ -78,7 +78,7 @@ def test_a_convex_edge_has_a_quarter_of_the_inside_around_it_and_a_corner_an_eig
 
 def test_spread_area_has_no_total_divergence_and_the_moment_of_its_flow():
     values, flow = np.zeros((12, 12, 12), dtype=np.float32), np.array([[0.3, -1.2, 2.0]])
-    indicator._spread(values, np.array([[5.3, 6.7, 4.9]]), flow)
+    indicator._add_divergence(values, np.array([[5.3, 6.7, 4.9]]), flow)
     grid = np.stack(np.meshgrid(*[np.arange(12.0)] * 3, indexing="ij"), axis=-1)
     assert values.sum() == pytest.approx(0.0, abs=1e-5)
     # The integral of x div v is minus that of v; the indicator solves for minus the divergence.
@@ -88,7 +88,7 @@ def test_spread_area_has_no_total_divergence_and_the_moment_of_its_flow():
 
 def test_cells_are_as_large_as_memory_allows(monkeypatch):
     monkeypatch.setattr(indicator, "MOST_CELLS", 50_000)
-    found = result_of(indicator.solved(*ball_samples(), 0.01, np.inf))
+    found = result_of(indicator.solve_poisson(*ball_samples(), 0.01, np.inf))
     assert found.values.size < 80_000
     assert found.cell > 0.05
 

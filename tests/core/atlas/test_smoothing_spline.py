@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eigh
 
 from core.atlas import smoothing_spline as splines
-from core.atlas.cubic_spline import SIDE, bases, between
+from core.atlas.cubic_spline import SIDE, bases, upsampled
 from core.atlas.smoothing_spline import smoothing_spline
 
 HALF = 1.3
@@ -177,4 +177,4 @@ def test_deviations_are_true_even_if_noise_is_said_to_be_less(given):
 def test_between_every_other_knot_values_are_interpolated():
     x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE), indexing="ij")
     plane = 1.0 + 2.0 * x - 3.0 * y
-    assert between(plane[::2, ::2]) == pytest.approx(plane)
+    assert upsampled(plane[::2, ::2]) == pytest.approx(plane)
