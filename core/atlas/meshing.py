@@ -24,9 +24,6 @@ from .tetrahedra import Indices, march, smoothed, subdivided, tetrahedra_of, uni
 
 # python -m benchmarks.atlas judges these.
 CELL = 2.1  # A cube of the lattice is as long as this many edges of the mesh.
-# The indicator is spread over this many of its cells. Where the lattice is wider, it is spread over that: a
-# sharp notch, which ends between points of the lattice, would otherwise have handles.
-SPREAD = 1.6
 CLIP = 0.25  # A vertex is at least this share of a lattice edge from both ends of it.
 SMOOTHINGS = 3  # This often vertices move toward their neighbors' mean.
 BESIDE = 8  # A place is felt if it is beside one of this many contacts that are nearest:
@@ -39,7 +36,7 @@ WALL = 0.25  # Edges are at most this share of the thinnest wall, so that none i
 CONTINUED_STD = 0.25  # The deviation of what is continued beyond all patches is this share of the way there.
 BAND = 5.0  # The surface is within this many cells of the level of the indicator.
 HALVINGS = 5  # This many halvings of an edge of the lattice find the level.
-LATTICE_AT_ONCE = 20_000  # A step takes this many points of the lattice,
+LATTICE_AT_ONCE = 100_000  # A step takes this many points of the lattice,
 PLACES_AT_ONCE = 3000  # or the surface near this many places.
 # The squares of an edge and of a cube's side take so much memory, and a mesh takes at most so much.
 EDGE_BYTES, LATTICE_BYTES, MOST_BYTES = 900.0, 17_000.0, 2e9
@@ -202,31 +199,23 @@ def _level(indicator: Indicator, size: float) -> Generator[float, None, tuple[Ar
     cells = yield from _cells(indicator, size)
     lattice, tetrahedra = yield from tetrahedra_of(cells)
     points = 0.5 * size * lattice.astype(np.float64)
-    smooth = max(0.0, size**2 - (SPREAD * indicator.cell) ** 2) ** 0.5
-    means = chunked(lambda some: (-_mean_at(indicator, some, smooth),), LATTICE_AT_ONCE, 0.1, points)
-    (values,) = yield from means
+    (values,) = yield from chunked(lambda some: (-indicator.at(some),), LATTICE_AT_ONCE, 0.1, points)
     ends, triangles = march(tetrahedra, values)
     yield 0.2
     found = []
     for few in np.array_split(ends, len(ends) // PLACES_AT_ONCE + 1):
         a, b = points[few].transpose(1, 0, 2)
         low, high = np.zeros(len(few)), np.ones(len(few))
-        is_inside = _mean_at(indicator, a, smooth) > 0.0
+        is_inside = indicator.at(a) > 0.0
         for _ in range(HALVINGS):  # The indicator is a step, so its values do not show how far the level is.
             middle = 0.5 * (low + high)
-            same = (_mean_at(indicator, a + middle[:, None] * (b - a), smooth) > 0.0) == is_inside
+            same = (indicator.at(a + middle[:, None] * (b - a)) > 0.0) == is_inside
             low, high = np.where(same, middle, low), np.where(same, high, middle)
         level, clipped = 0.5 * (low + high)[:, None], np.clip(low, CLIP, 1.0 - CLIP)[:, None]
         found.append((a + clipped * (b - a), indicator.outward(a + level * (b - a))))
         yield 0.2
     vertices, up = (np.concatenate(values) for values in zip(*found, strict=True))
     return vertices, up, triangles
-
-
-def _mean_at(indicator: Indicator, points: Array, size: float) -> Array:
-    """The mean of the indicator at the corners of cubes of a length around points (n, 3), (n,)."""
-    corners = size * (np.array(list(np.ndindex(2, 2, 2))) - 0.5) if size else np.zeros((1, 3))
-    return np.mean([indicator.at(points + corner) for corner in corners], axis=0)
 
 
 def _cells(indicator: Indicator, size: float) -> Generator[float, None, Indices]:

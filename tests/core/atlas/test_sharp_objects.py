@@ -264,19 +264,3 @@ def test_where_walls_turn_smoothly_there_is_no_crease():
     vertices, *_ = result_of(insert_creases(atlas.charts, mesh.vertices, mesh.triangles, mesh.vertices, 0.6))
     assert len(vertices) == len(mesh.vertices)
     assert (vertices == mesh.vertices).all()
-
-
-def notched(strip):
-    """A box with a notch of 36 degrees along z, whose bottom is a flat strip at x = .5 of this width."""
-    cosine, sine = math.cos(math.radians(18.0)), math.sin(math.radians(18.0))
-
-    def distance(x, y, z):
-        notch = max(cosine * (abs(y) - 0.5 * strip) - sine * (x - 0.5), 0.5 - x)
-        return max(abs(x) - 0.7, abs(y) - 0.6, abs(z) - 0.5, -notch)
-
-    return solids.Solid(distance, (-0.7, 0.05, 0.03), (-1.0, 0.0, 0.0))
-
-
-def test_a_sharp_notch_has_no_handles_at_its_bottom():
-    atlas = explored(notched(0.006), tolerance=2.8e-3, noise=0.0)
-    assert solids.topology(atlas.reference.mesh.triangles) == solids.Topology(0, 0, 2, 1)
