@@ -16,7 +16,7 @@ from ..arguments import Array
 from ..steps import chunked
 from ..triangles import normalized
 from .charts import Charts
-from .field import argmin_per_point, sheet_facing
+from .field import sheet_facing
 from .tetrahedra import Indices, sides_of, split_sides
 
 # python -m benchmarks.atlas judges these.
@@ -128,29 +128,13 @@ def _intersections(
         steps, apart = _least_norm_steps(normals, distance)
         tip = ~met & apart & (np.linalg.norm(steps, axis=1) < near)
         points, met, felt = np.where(tip[:, None], middle + steps, points), met | tip, felt & ~tip
-    met &= ~_rounded(charts, points, normals, edge)
-    met &= np.linalg.norm(points - middle, axis=1) < near
-    return points, np.where(felt, 0.0, np.linalg.norm(points - middle, axis=1)), met
-
-
-def _rounded(charts: Charts, points: Array, normals: Array, edge: float) -> NDArray[np.bool_]:
-    """Which creases (n,) are rounded by patches between their sheets; points on flat strips move onto these.
-
-    points, normals : (n, 3), changed in place, and (n, k, 3), those of the sheets
-    """
     between = normalized(normals.sum(axis=1))
     pairs = charts.pairs(points, edge)
     toward = np.einsum("mi,mi->m", pairs.normal, between[pairs.point_index])
     own = np.einsum("mi,mji->mj", pairs.normal, normals[pairs.point_index]).max(axis=1)
     rounded = (toward > own) & (pairs.rho < 1.0) & (np.abs(pairs.distance) > ROUND * edge)
-    flat = pairs.chosen(rounded & charts.is_flat[pairs.patch])
-    strip = argmin_per_point(flat.point_index, np.abs(flat.distance), len(points))
-    some = np.flatnonzero(strip >= 0)
-    onto = flat.chosen(strip[some])
-    points[some] -= onto.distance[:, None] * onto.normal
-    found = np.zeros(len(points), dtype=bool)
-    found[pairs.point_index[rounded & ~charts.is_flat[pairs.patch]]] = True
-    return found
+    met[pairs.point_index[rounded]] = False
+    return points, np.where(felt, 0.0, np.linalg.norm(points - middle, axis=1)), met
 
 
 def _least_norm_steps(normals: Array, distance: Array) -> tuple[Array, NDArray[np.bool_]]:
