@@ -52,15 +52,18 @@ def finite_array(
 def list_of(name: str, values: Iterable[T], kind: type[T]) -> list[T]:
     """The list of `values`. Raises ValueError if they are no list, or one of them is of another kind.
 
-    One array of contacts in place of a list of such arrays would be a list of its rows.
+    One array (n, 3) in place of a list of such arrays is refused, because it would count as its rows, and
+    one string, because it would count as its letters.
     """
     shape = getattr(values, "shape", ())
     if len(shape) == 2:
         raise ValueError(f"{name}: expected a list, got one array of shape {shape}: put it into a list")
     try:
-        found = list(values)
+        found = None if isinstance(values, str) else list(values)
     except TypeError:
-        raise ValueError(f"{name}: expected a list, got {shown(values)}") from None
+        found = None
+    if found is None:
+        raise ValueError(f"{name}: expected a list, got {shown(values)}")
     for value in found:
         if not isinstance(value, kind):
             raise ValueError(f"{name}: expected a list of {kind.__name__}, got {shown(value)} in it")

@@ -22,10 +22,9 @@ SAGITTA = 80.0  # A quadric is so wide that its sagitta is this many deviations 
 LEAST = 2.0  # The least radius, in edges of the mesh; the sagitta follows from a quadric twice as wide.
 EVERY, PLACES, FEWEST = 2, 128, 6  # It is fitted to every other vertex, the nearest 128 at most, 6 at least.
 TURNED = 0.966  # Normals on both sides of a crease are turned by 15 degrees, half of what its triangles are.
-SAME_SHEET_COSINE = (
-    0.5  # Places are on one sheet if the cosine between their normals is more, and the sum of both
-)
-ACROSS = 0.5  # has less of the way between them, which is 0 on a ball.
+# Places are on one sheet if the cosine between their normals is more, and if the sum of both has at most the
+# share ACROSS of the way between them, which is 0 on a ball.
+LEAST_COSINE, ACROSS = 0.5, 0.5
 BY_STD, BY_MISFIT = 0.9, 0.4  # The shares of the surface's deviation and of the misfit in that of H.
 LEAST_SQUARE = 1e-9  # So much, in unit radius, is added to the squares, because places may be in a row.
 
@@ -116,7 +115,7 @@ def _neighborhoods(
     Those are (n, k, 4): two coordinates along the tangent plane, and two components of the normal.
     """
     off, ups = sheets.tree.data[at] - points[:, None], sheets.normals[at]
-    alike = np.einsum("nki,ni->nk", ups, normals) > SAME_SHEET_COSINE
+    alike = np.einsum("nki,ni->nk", ups, normals) > LEAST_COSINE
     across = np.abs(np.einsum("nki,nki->nk", off, ups + normals[:, None]))
     x = normalized(np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)]))
     plane = np.stack([x, np.cross(normals, x)], axis=2)

@@ -36,7 +36,7 @@ CHECKED = 1000  # So many contacts check the surface:
 OFF_STDS, OFF_CELLS = 5.0, 0.5  # they are off it if they are by so many deviations and cells,
 OFF = 0.03  # and not more than this share may be off or face the other way.
 ABREAST = 8  # So many neighbors of each contact are to face the same way.
-SAME_SHEET_COSINE = 2.0  # Neighbors share a place if they are apart by up to so many times the median of all.
+SAME_PLACE = 2.0  # Neighbors share a place if the chord's share is up to this many times the usual one.
 OPPOSITE = 0.05  # At most this share of neighbors may face opposite ways in one place (tests: test_measured).
 GROWN = 0.012  # Without a tolerance, patches grow up to this mean deviation, as a share of the radius.
 
@@ -135,9 +135,8 @@ def _strokes(given: Sequence[ArrayLike | Contour], noise: float | None) -> tuple
 def _require_one_side(points: Array, normals: Array) -> None:
     """Raises ValueError if many measured normals (n, 3) of neighbors face opposite ways in one place.
 
-    The normals of two places on a sphere have a sum across the chord between them, and so have nearly those
-    of neighbors on any smooth surface; with the second normal reversed if one of them is wrong. On the two
-    sides of a wall this leaves its thickness.
+    On a sphere (n1 + n2) . (p2 - p1) = 0, and nearly so on any smooth surface between neighbors. If n2 has
+    the wrong sign, (n1 - n2) . (p2 - p1) is as small; for the two sides of a wall it is twice its thickness.
     """
     from scipy.spatial import cKDTree
 
@@ -146,8 +145,8 @@ def _require_one_side(points: Array, normals: Array) -> None:
     facing = np.einsum("nki,ni->nk", others, normals)
     sums = normals[:, None] + np.copysign(1.0, facing)[..., None] * others
     apart = np.abs(np.einsum("nki,nki->nk", chords, sums))
-    same_sheet = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
-    wrong = (facing < -FACING) & (apart <= SAME_SHEET_COSINE * same_sheet)
+    usual = np.median(apart[facing > FACING]) if (facing > FACING).any() else 0.0
+    wrong = (facing < -FACING) & (apart <= SAME_PLACE * usual)
     if wrong.mean() > OPPOSITE:
         raise ValueError(
             "normals: expected those of neighboring contacts on one side, got opposite ones at "

@@ -32,7 +32,8 @@ def map_table_rows(record: Mapping[str, Any]) -> list[tuple[str, str]]:
 def map_summary(record: Mapping[str, Any]) -> str:
     """A sentence on what a stability map has found."""
     words = [f"{record['patches']} patches at {record['touched']} points, {record['in_doubt']} in doubt"]
-    words += [f"{count} refused by {key}" for key, count in record["refused"].items() if count]
+    names = {key: name for key, name, _ in REASONS}
+    words += [f"{count} refused: {names[key]}" for key, count in record["refused"].items() if count]
     return "; ".join(words)
 
 

@@ -232,6 +232,7 @@ GOOD = track(
         ),
         ({"weight": 10**400}, "weight: expected a finite number above 0, got 1000"),
         ({"weight": 1e60}, r"weight: expected a number up to 1e\+50, got 1e\+60"),
+        ({"contours": "ab"}, "contours: expected a list, got 'ab'"),
         ({"contours": None}, "contours: expected a list, got None"),
         ({"contours": [GOOD[0].points]}, "contours: expected a list of Contour, got array"),
     ],
